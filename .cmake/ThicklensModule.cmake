@@ -1,0 +1,34 @@
+# A folder is a module is a target is a namespace (see CONTRIBUTING.md).
+
+# Compiler settings that every target of the project shares.
+function(thicklens_compile_settings target)
+  target_compile_options(
+    ${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
+                      $<$<BOOL:${THICKLENS_WARNINGS_AS_ERRORS}>:-Werror>)
+  if(THICKLENS_SANITIZE)
+    target_compile_options(${target} PUBLIC -fsanitize=${THICKLENS_SANITIZE}
+                                            -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=${THICKLENS_SANITIZE})
+  endif()
+endfunction()
+
+# thicklens_module(<name> SOURCES <files...> HEADERS <files below include/...>)
+function(thicklens_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS" ${ARGN})
+  set(target thicklens_${name})
+  add_library(${target} STATIC ${ARG_SOURCES})
+  add_library(thicklens::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS include FILES ${ARG_HEADERS})
+  target_include_directories(
+    ${target}
+    PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>
+           $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+    PRIVATE src)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  thicklens_compile_settings(${target})
+  install(
+    TARGETS ${target}
+    EXPORT thicklensTargets
+    FILE_SET HEADERS)
+endfunction()

@@ -1,0 +1,45 @@
+#ifndef THICKLENS_CALIB_FOCUS_SWEEP_H_
+#define THICKLENS_CALIB_FOCUS_SWEEP_H_
+
+#include <cstddef>
+#include <functional>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/camera.h"
+#include "thicklens/model/sweep_file.h"
+
+namespace thicklens::calib {
+
+// Reads the frame of an index as its file stores it: 8 or 16 bit, 1, 3 (RGB) or 4 channels. Must be
+// callable from several threads at once. Throws Error that names the file.
+using FrameReader = std::function<cv::Mat(std::size_t index)>;
+
+// A sweep ready to be measured: frames are streamed through `read_frame`, never all held.
+struct FocusSweep {
+  model::Camera camera;  // d1 and kappa need not be known
+  std::vector<model::SweepFrame> frames;
+  FrameReader read_frame;
+  double reading_sigma_mm = 0;
+  std::optional<model::Estimate> offset_mm;  // absent: found from the image scale
+  model::BenchDirection direction = model::BenchDirection::kAway;
+  model::SweepTarget target = model::SweepTarget::kAuto;
+  model::FloorKnowledge floor;
+  model::RegionOfInterest roi;
+
+  // True if a calibration can be attempted: frames, distinct readings, a possible camera.
+  bool IsValid(std::string* why) const;
+};
+
+// A FocusSweep from its description; `read_frame` is left to the caller.
+FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& camera);
+
+// The frame's region of interest as linear grey light in [0, 1], CV_32F (.2126 R + .7152 G +
+// .0722 B). Throws Error naming the frame if its size is not the sensor's or the roi leaves it.
+cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_FOCUS_SWEEP_H_

@@ -1,0 +1,59 @@
+#ifndef THICKLENS_MODEL_OUTPUT_FILE_H_
+#define THICKLENS_MODEL_OUTPUT_FILE_H_
+
+#include <memory>
+#include <string>
+
+namespace thicklens::model {
+
+// An output file that appears whole or not at all.
+//
+// The constructor claims the name: it creates ".NAME.part" beside the target and locks it, so that
+// an unwritable folder or a second run with the same output is told before any work is done. Commit
+// writes, syncs and renames. Without Commit the destructor removes the part file and whatever stood
+// at the target stays as it was. A part file left by a killed run is taken over.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::string& path);  // throws Error
+  ~OutputFile();
+  OutputFile(OutputFile&&) noexcept;
+  OutputFile& operator=(OutputFile&&) noexcept;
+
+  void Commit(const std::string& content);  // throws Error, e.g. on a full disk
+  const std::string& path() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// The same for a folder: files are written into staging_path(), and Commit puts the folder in
+// place, replacing an older one. A folder at the target is replaced only if it is empty or contains
+// `marker_file` (the sign that this program wrote it); else the constructor throws Error.
+class OutputFolder {
+ public:
+  OutputFolder(const std::string& path, const std::string& marker_file);
+  ~OutputFolder();
+  OutputFolder(OutputFolder&&) noexcept;
+  OutputFolder& operator=(OutputFolder&&) noexcept;
+
+  const std::string& staging_path() const;
+  // Writes one file below the staging folder; `name` may have one folder in front. Throws Error.
+  void Write(const std::string& name, const std::string& content);
+  void Commit();
+  const std::string& path() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// Claims, writes and commits in one step.
+void WriteFileAtomically(const std::string& path, const std::string& content);
+
+// The whole content of a file; throws Error naming the path and the reason.
+std::string ReadWholeFile(const std::string& path);
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_OUTPUT_FILE_H_

@@ -1,0 +1,19 @@
+#ifndef THICKLENS_MODEL_PARALLEL_H_
+#define THICKLENS_MODEL_PARALLEL_H_
+
+#include <functional>
+
+namespace thicklens::model {
+
+// Calls work(i) once for each i in [0, count) on up to `threads` threads (0: one per core), taking
+// the next index when one is free. If calls throw, the exception of the smallest index is rethrown
+// after the running calls have ended, and no new ones are started: errors do not depend on timing
+// where every call is independent.
+void ParallelFor(int count, int threads, const std::function<void(int)>& work);
+
+// The number of threads that a setting of `threads` stands for.
+int ResolveThreads(int threads);
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_PARALLEL_H_

@@ -1,0 +1,84 @@
+#ifndef THICKLENS_MODEL_SWEEP_FILE_H_
+#define THICKLENS_MODEL_SWEEP_FILE_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/camera.h"
+
+namespace thicklens::model {
+
+// Which way the bench scale runs: z = offset + reading (away) or offset - reading (toward).
+enum class BenchDirection { kAway, kToward };
+std::string BenchDirectionName(BenchDirection direction);
+double DirectionSign(BenchDirection direction);  // +1 away, -1 toward
+
+enum class SweepTarget { kAuto, kTexture, kPrintedEdge, kKnifeEdge };
+std::string SweepTargetName(SweepTarget target);
+
+// What is known of the lens floor beforehand: nothing, a value, or an interval.
+struct FloorKnowledge {
+  std::optional<Estimate> given_px;
+  std::optional<double> from_px, to_px;  // both or none
+};
+
+struct RegionOfInterest {
+  int x = 0, y = 0, width = 0, height = 0;  // px; width 0: the whole field
+};
+
+struct SweepFrame {
+  std::string image;  // path as it can be opened
+  double reading_mm = 0;
+};
+
+// A focus sweep as its file describes it, schema thicklens/sweep/1 (docs/file-formats.md).
+// Readings are in mm here, whatever unit the file gives them in.
+struct SweepFile {
+  std::string source;       // the file, for messages
+  std::string camera_path;  // resolved
+  double reading_sigma_mm = 0;
+  bool reading_sigma_stated = false;
+  std::optional<Estimate> offset_mm;  // absent: unknown
+  BenchDirection direction = BenchDirection::kAway;
+  SweepTarget target = SweepTarget::kAuto;
+  FloorKnowledge floor;
+  RegionOfInterest roi;
+  std::vector<SweepFrame> frames;  // in the file's order
+};
+
+// Reads the YAML and, with `frames_csv`, the table. Throws Error with file:line:column, also for a
+// row without a file, duplicate rows and rows that are no numbers. Files in `frames_dir` without a
+// row are told in `notices`.
+SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
+
+// A sweep out of a folder and a table, all else at its default: `thicklens calibrate DIR
+// --readings`.
+SweepFile SweepFromFolder(const std::string& folder, const std::string& readings_csv,
+                          const std::string& camera_path, std::vector<std::string>* notices);
+
+// The YAML text. Paths in `sweep` are written as they stand, so they should be relative to where
+// the text will lie.
+std::string SweepToYaml(const SweepFile& sweep);
+
+// What a simulated sweep was made with, schema thicklens/sweep-truth/1.
+struct SweepTruth {
+  double image_distance_mm = 0;
+  double focus_depth_mm = 0;
+  double blur_ratio = 0;
+  double blur_floor_px = 0;
+  double bench_offset_mm = 0;
+  struct Frame {
+    std::string image;
+    double depth_mm = 0;       // true z
+    double reading_mm = 0;     // as the bench showed it, with its error
+    double blur_sigma_px = 0;  // sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel box
+  };
+  std::vector<Frame> frames;
+};
+SweepTruth ReadSweepTruth(const std::string& path);
+std::string SweepTruthToYaml(const SweepTruth& truth);
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SWEEP_FILE_H_

@@ -1,0 +1,49 @@
+#include "thicklens/model/parallel.h"
+
+#include <algorithm>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace thicklens::model {
+
+int ResolveThreads(int threads) {
+  if (threads > 0) return threads;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void ParallelFor(int count, int threads, const std::function<void(int)>& work) {
+  std::mutex mutex;
+  int next = 0;
+  int failed_index = count;
+  std::exception_ptr failure;
+  const auto run = [&] {
+    for (;;) {
+      int index = 0;
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        // Indices are handed out in order, so one below a failed index has already been started.
+        if (next >= count || failure) return;
+        index = next++;
+      }
+      try {
+        work(index);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (index < failed_index) {
+          failed_index = index;
+          failure = std::current_exception();
+        }
+      }
+    }
+  };
+  const int workers = std::min(ResolveThreads(threads), count);
+  std::vector<std::thread> pool;
+  for (int i = 1; i < workers; ++i) pool.emplace_back(run);
+  run();
+  for (std::thread& thread : pool) thread.join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,253 @@
+#include "thicklens/model/yaml_reader.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "thicklens/model/output_file.h"
+
+namespace thicklens::model {
+namespace {
+
+std::string Join(const std::vector<std::string>& items) {
+  return fmt::format("{}", fmt::join(items, ", "));
+}
+
+// "pixel_pitch_mm" -> "pixel_pitch"; what has no unit suffix stays as it is.
+std::string WithoutUnit(const std::string& key) {
+  static const std::set<std::string> kUnits = {
+      "nm",  "um",  "mm",  "cm", "dm",        "m",      "in",      "inch",  "px",
+      "pix", "deg", "rad", "e",  "electrons", "micron", "microns", "pixel", "pixels"};
+  const auto underscore = key.rfind('_');
+  if (underscore == std::string::npos || kUnits.count(key.substr(underscore + 1)) == 0) return key;
+  return key.substr(0, underscore);
+}
+
+std::size_t EditDistance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row[b.size()];
+}
+
+std::string SuggestionFor(const std::string& key, const std::vector<std::string>& allowed) {
+  for (const std::string& candidate : allowed) {
+    if (WithoutUnit(candidate) == WithoutUnit(key)) {
+      return fmt::format("wrong unit: this field is '{}'", candidate);
+    }
+  }
+  for (const std::string& candidate : allowed) {
+    if (EditDistance(key, candidate) <= 2) return fmt::format("did you mean '{}'?", candidate);
+  }
+  return fmt::format("allowed here: {}", Join(allowed));
+}
+
+std::string KindOf(const YAML::Node& node) {
+  switch (node.Type()) {
+    case YAML::NodeType::Map:
+      return "a map";
+    case YAML::NodeType::Sequence:
+      return "a list";
+    case YAML::NodeType::Scalar:
+      return "'" + node.Scalar() + "'";
+    default:
+      return "nothing";
+  }
+}
+
+}  // namespace
+
+struct YamlNode::Impl {
+  YAML::Node node;
+  std::string source;
+  std::string path;
+};
+
+YamlNode YamlNode::LoadFile(const std::string& path) { return Parse(ReadWholeFile(path), path); }
+
+YamlNode YamlNode::Parse(const std::string& text, const std::string& source_name) {
+  try {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() != 1) {
+      throw Error(fmt::format("{}: one YAML document is expected, found {}", source_name,
+                              documents.size()));
+    }
+    auto impl = std::make_shared<Impl>();
+    impl->node.reset(documents.front());
+    impl->source = source_name;
+    return YamlNode(impl);
+  } catch (const YAML::Exception& e) {
+    throw Error(fmt::format("{}:{}:{}: no valid YAML: {}", source_name, e.mark.line + 1,
+                            e.mark.column + 1, e.msg));
+  }
+}
+
+Error YamlNode::ErrorHere(const std::string& what) const {
+  const YAML::Mark mark = impl_->node.Mark();
+  const std::string where =
+      mark.is_null() ? impl_->source
+                     : fmt::format("{}:{}:{}", impl_->source, mark.line + 1, mark.column + 1);
+  return Error(impl_->path.empty() ? fmt::format("{}: {}", where, what)
+                                   : fmt::format("{}: {}: {}", where, impl_->path, what));
+}
+
+void YamlNode::RequireSchema(const std::string& schema) const {
+  if (!IsMap())
+    throw ErrorHere(
+        fmt::format("a map with 'schema: {}' is expected, found {}", schema, KindOf(impl_->node)));
+  if (!Has("schema")) throw ErrorHere(fmt::format("'schema: {}' is missing", schema));
+  const YamlNode found = At("schema");
+  if (found.Text() != schema) {
+    throw found.ErrorHere(fmt::format("'{}' is expected, found '{}'", schema, found.Text()));
+  }
+}
+
+void YamlNode::RequireKeys(const std::vector<std::string>& allowed) const {
+  if (!IsMap()) throw ErrorHere(fmt::format("a map is expected, found {}", KindOf(impl_->node)));
+  std::set<std::string> seen;
+  for (const auto& entry : impl_->node) {
+    auto key_impl = std::make_shared<Impl>(*impl_);
+    key_impl->node.reset(entry.first);
+    const YamlNode key(key_impl);
+    if (!entry.first.IsScalar()) throw key.ErrorHere("a key must be a plain word");
+    const std::string name = entry.first.Scalar();
+    if (std::find(allowed.begin(), allowed.end(), name) == allowed.end()) {
+      throw key.ErrorHere(fmt::format("unknown key '{}'; {}", name, SuggestionFor(name, allowed)));
+    }
+    if (!seen.insert(name).second)
+      throw key.ErrorHere(fmt::format("key '{}' stands here twice", name));
+  }
+}
+
+bool YamlNode::Has(const std::string& key) const { return Find(key).has_value(); }
+
+std::optional<YamlNode> YamlNode::Find(const std::string& key) const {
+  if (!IsMap()) throw ErrorHere(fmt::format("a map is expected, found {}", KindOf(impl_->node)));
+  const YAML::Node& constant = impl_->node;  // the non-const operator[] would insert
+  const YAML::Node child = constant[key];
+  if (!child.IsDefined() || child.IsNull()) return std::nullopt;
+  auto impl = std::make_shared<Impl>();
+  impl->node.reset(child);
+  impl->source = impl_->source;
+  impl->path = impl_->path.empty() ? key : impl_->path + "." + key;
+  return YamlNode(impl);
+}
+
+YamlNode YamlNode::At(const std::string& key) const {
+  std::optional<YamlNode> child = Find(key);
+  if (!child) throw ErrorHere(fmt::format("'{}' is missing", key));
+  return *child;
+}
+
+bool YamlNode::IsMap() const { return impl_->node.IsMap(); }
+bool YamlNode::IsSequence() const { return impl_->node.IsSequence(); }
+bool YamlNode::IsScalar() const { return impl_->node.IsScalar(); }
+
+std::vector<YamlNode> YamlNode::Elements() const {
+  if (!IsSequence())
+    throw ErrorHere(fmt::format("a list is expected, found {}", KindOf(impl_->node)));
+  std::vector<YamlNode> elements;
+  elements.reserve(impl_->node.size());
+  for (const auto& child : impl_->node) {
+    auto impl = std::make_shared<Impl>();
+    impl->node.reset(child);
+    impl->source = impl_->source;
+    impl->path = fmt::format("{}[{}]", impl_->path, elements.size());
+    elements.push_back(YamlNode(impl));
+  }
+  return elements;
+}
+
+std::vector<YamlNode> YamlNode::ElementsExactly(std::size_t count) const {
+  std::vector<YamlNode> elements = Elements();
+  if (elements.size() != count) {
+    throw ErrorHere(fmt::format("a list of {} is expected, found {}", count, elements.size()));
+  }
+  return elements;
+}
+
+double YamlNode::Number() const {
+  const std::string expected = "a number is expected";
+  if (!IsScalar()) throw ErrorHere(fmt::format("{}, found {}", expected, KindOf(impl_->node)));
+  const std::string& text = impl_->node.Scalar();
+  const char* begin = text.data() + (text.rfind('+', 0) == 0 ? 1 : 0);
+  const char* end = text.data() + text.size();
+  double value = 0;
+  const auto [rest, status] = std::from_chars(begin, end, value);
+  if (status != std::errc() || rest != end || begin == end) {
+    const bool has_unit = status == std::errc() && rest != end;
+    throw ErrorHere(fmt::format(
+        "{}, found '{}'{}", expected, text,
+        has_unit ? "; the unit is in the key's name, the value is the bare number" : ""));
+  }
+  if (!std::isfinite(value))
+    throw ErrorHere(fmt::format("a finite number is expected, found '{}'", text));
+  return value;
+}
+
+double YamlNode::PositiveNumber() const {
+  const double value = Number();
+  if (!(value > 0)) throw ErrorHere(fmt::format("must be > 0, found {}", value));
+  return value;
+}
+
+double YamlNode::NonNegativeNumber() const {
+  const double value = Number();
+  if (!(value >= 0)) throw ErrorHere(fmt::format("must be >= 0, found {}", value));
+  return value;
+}
+
+int YamlNode::Integer(int min, int max) const {
+  const std::string expected = fmt::format("a whole number from {} to {} is expected", min, max);
+  if (!IsScalar()) throw ErrorHere(fmt::format("{}, found {}", expected, KindOf(impl_->node)));
+  const std::string& text = impl_->node.Scalar();
+  int value = 0;
+  const auto [rest, status] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (status != std::errc() || rest != text.data() + text.size() || value < min || value > max) {
+    throw ErrorHere(fmt::format("{}, found '{}'", expected, text));
+  }
+  return value;
+}
+
+bool YamlNode::Boolean() const { return OneOf({"true", "false"}) == "true"; }
+
+std::string YamlNode::Text() const {
+  if (!IsScalar() || impl_->node.Scalar().empty()) {
+    throw ErrorHere(fmt::format("a text is expected, found {}", KindOf(impl_->node)));
+  }
+  return impl_->node.Scalar();
+}
+
+std::string YamlNode::OneOf(const std::vector<std::string>& allowed) const {
+  const std::string text = Text();
+  if (std::find(allowed.begin(), allowed.end(), text) == allowed.end()) {
+    throw ErrorHere(fmt::format("one of {} is expected, found '{}'", Join(allowed), text));
+  }
+  return text;
+}
+
+const std::string& YamlNode::path() const { return impl_->path; }
+const std::string& YamlNode::source() const { return impl_->source; }
+
+std::string YamlNode::ResolvePath(const std::string& relative) const {
+  const std::filesystem::path path(relative);
+  if (path.is_absolute()) return relative;
+  return (std::filesystem::path(impl_->source).parent_path() / path).lexically_normal().string();
+}
+
+std::string YamlNumber(double value) { return fmt::format("{}", value); }
+
+}  // namespace thicklens::model

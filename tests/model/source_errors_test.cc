@@ -1,0 +1,211 @@
+// Errors of the source (the supplement of Couillaud & Ziou) that can be shown with the camera and
+// its light field alone. Each test shows the claim fail, and what holds in its place.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/matrix_lens.h"
+#include "thicklens/model/light_field_grid.h"
+
+namespace thicklens::model {
+namespace {
+
+using ::thicklens::testing::MatrixLens;
+using ::thicklens::testing::MatrixLenses;
+
+constexpr int kPictureSide = 4;
+constexpr int kViewSide = 3;
+
+Camera SmallCamera() {
+  Camera camera;
+  camera.lens = {12.5, 12.8, 3.0, 4.46};
+  camera.sensor.width_px = kPictureSide;
+  camera.sensor.height_px = kPictureSide;
+  camera.sensor.pixel_pitch_mm = 0.006;
+  camera.sensor.principal_point_px = {1.5, 1.5};
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(camera.lens, 640), 0};
+  camera.calibration->blur_ratio = Estimate{0.45, 0};
+  return camera;
+}
+
+// H, XY x STUV: each ray lands by (16) and gives its weight to the nearest pixel (the unit
+// impulse).
+Eigen::MatrixXd ProjectionMatrix(const Camera& camera, const LightFieldGrid& grid) {
+  Eigen::MatrixXd h = Eigen::MatrixXd::Zero(
+      static_cast<Eigen::Index>(camera.sensor.width_px) * camera.sensor.height_px,
+      static_cast<Eigen::Index>(grid.s_count) * grid.t_count * grid.u_count * grid.v_count);
+  Eigen::Index column = 0;
+  for (int l = 0; l < grid.v_count; ++l) {
+    for (int k = 0; k < grid.u_count; ++k) {
+      for (int j = 0; j < grid.t_count; ++j) {
+        for (int i = 0; i < grid.s_count; ++i, ++column) {
+          const Ray ray = grid.RayAt(i, j, k, l);
+          const double d1 = camera.image_distance_mm();
+          const Eigen::Vector2d picture_px =
+              PicturePositionPx(camera.sensor, LandingPointMm(camera.lens, d1, grid.planes, ray));
+          const double x = std::floor(picture_px.x() + 0.5);
+          const double y = std::floor(picture_px.y() + 0.5);
+          if (x < 0 || y < 0 || x >= kPictureSide || y >= kPictureSide) continue;
+          const double weight =
+              RelativeIrradiance(camera.lens, d1, grid.planes, ray) *
+              ApertureTransmission(camera.psf, camera.blur_ratio(), camera.lens.aperture_radius_mm,
+                                   ApertureCrossingMm(grid.planes, ray));
+          h(static_cast<Eigen::Index>(y) * kPictureSide + static_cast<Eigen::Index>(x), column) =
+              weight;
+        }
+      }
+    }
+  }
+  return h;
+}
+
+// Two grids: ST in the plane of focus (each view repeats the pixels), and ST 10 mm behind it (the
+// views land beside each other, and some rays beside the sensor).
+std::vector<Eigen::MatrixXd> ProjectionMatrices() {
+  const Camera camera = SmallCamera();
+  return {ProjectionMatrix(camera, DefaultGrid(camera, kViewSide, kViewSide)),
+          ProjectionMatrix(camera, GridOnPlanes(camera, {0, 650}, kViewSide, kViewSide))};
+}
+
+// Section 3: "H has linearly independent columns", so that H^T H is invertible. It cannot be: H has
+// fewer rows than columns.
+TEST(SourceErrors, ProjectionMatrixHasDependentColumns) {
+  const std::vector<Eigen::MatrixXd> matrices = ProjectionMatrices();
+  ASSERT_FALSE(matrices[0].isApprox(matrices[1]));
+  for (const Eigen::MatrixXd& h : matrices) {
+    const Eigen::Index pixels = Eigen::Index{kPictureSide} * kPictureSide;
+    const Eigen::Index rays = pixels * kViewSide * kViewSide;
+    ASSERT_EQ(h.rows(), pixels);
+    ASSERT_EQ(h.cols(), rays);
+    const Eigen::Index rank = Eigen::FullPivLU<Eigen::MatrixXd>(h).rank();
+    EXPECT_EQ(rank, pixels) << "every pixel is struck, so the rank is the most it can be";
+    EXPECT_LT(rank, rays);
+    const Eigen::MatrixXd normal = h.transpose() * h;
+    EXPECT_LE(Eigen::FullPivLU<Eigen::MatrixXd>(normal).rank(), pixels);
+
+    // A light field that is not 0 and gives a black picture: two rays of one pixel against each
+    // other.
+    std::vector<Eigen::Index> struck;
+    for (Eigen::Index column = 0; column < rays; ++column) {
+      if (h(0, column) > 0) struck.push_back(column);
+    }
+    ASSERT_GE(struck.size(), 2U);
+    Eigen::VectorXd light_field = Eigen::VectorXd::Zero(rays);
+    light_field(struck[0]) = 1 / h(0, struck[0]);
+    light_field(struck[1]) = -1 / h(0, struck[1]);
+    EXPECT_LT((h * light_field).norm(), 1e-13 * light_field.norm());
+  }
+}
+
+// Section 3: "each row of H is unique, so that the only vector solution to H x = 0 is 0".
+TEST(SourceErrors, DistinctRowsDoNotMakeIndependentColumns) {
+  Eigen::Matrix<double, 2, 3> counterexample;
+  counterexample << 1, 0, 1,  //
+      0, 1, 1;
+  ASSERT_NE(counterexample.row(0), counterexample.row(1));
+  EXPECT_TRUE((counterexample * Eigen::Vector3d(1, 1, -1)).isZero());
+
+  // Nor do they where there are enough rows.
+  Eigen::Matrix<double, 4, 3> tall;
+  tall << 1, 0, 1,  //
+      0, 1, 1,      //
+      1, 1, 2,      //
+      2, 1, 3;
+  EXPECT_TRUE((tall * Eigen::Vector3d(1, 1, -1)).isZero());
+
+  // The matrix of the camera itself: its rows all differ, its columns depend.
+  for (const Eigen::MatrixXd& h : ProjectionMatrices()) {
+    std::set<std::vector<double>> rows;
+    for (Eigen::Index y = 0; y < h.rows(); ++y) {
+      const Eigen::VectorXd row = h.row(y);
+      rows.insert(std::vector<double>(row.data(), row.data() + row.size()));
+    }
+    ASSERT_EQ(static_cast<Eigen::Index>(rows.size()), h.rows());
+    EXPECT_LT(Eigen::FullPivLU<Eigen::MatrixXd>(h).rank(), h.cols());
+  }
+}
+
+// (9) measures beta from Ap. A ray leaves the rear principal plane at the height where it met Ap,
+// so that its angle there needs D = d1 - rho.
+TEST(SourceErrors, AngleBehindTheLensIsMeasuredFromTheWrongPlane) {
+  const LightFieldPlanes planes{0, 640};
+  const Ray ray{150, 40, 2, -1};
+  const auto traced_cos_beta = [&](const MatrixLens& oracle) {
+    const double u_slope = oracle.TraceSlope(ray.u_mm, (ray.u_mm - ray.s_mm) / 640)(1);
+    const double v_slope = oracle.TraceSlope(ray.v_mm, (ray.v_mm - ray.t_mm) / 640)(1);
+    return 1 / std::sqrt(1 + u_slope * u_slope + v_slope * v_slope);
+  };
+  for (const MatrixLens& oracle : MatrixLenses()) {
+    SCOPED_TRACE(oracle.name());
+    const ThickLens lens = oracle.AsThickLens(3);
+    const double image_distance_mm = ImageDistanceMm(lens, 640);
+    const double by_9 = CosBeta(lens, image_distance_mm, planes, ray);
+    const double truth = traced_cos_beta(oracle);
+    EXPECT_GT(std::abs(by_9 - truth), 1e-4);
+    // Crossed planes make D longer than d1, so that (9) sees too steep a ray; else too flat a one.
+    EXPECT_EQ(by_9 < truth, lens.lens_thickness_mm < 0);
+    // The rear principal plane is what it lacks.
+    const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;
+    const Eigen::Vector2d across_mm =
+        LandingPointMm(lens, image_distance_mm, planes, ray) - ApertureCrossingMm(planes, ray);
+    EXPECT_NEAR(1 / std::sqrt(1 + across_mm.squaredNorm() / (rear_distance_mm * rear_distance_mm)),
+                truth, 1e-12);
+  }
+
+  // It vanishes at rho = 0: a ball has both principal planes in its centre.
+  const MatrixLens ball("ball", 1, {{10, 1.5, 20}, {-10, 1, 0}});
+  const ThickLens lens = ball.AsThickLens(3);
+  ASSERT_NEAR(lens.lens_thickness_mm, 0, 1e-12);
+  EXPECT_NEAR(CosBeta(lens, ImageDistanceMm(lens, 640), planes, ray), traced_cos_beta(ball), 1e-12);
+}
+
+// (23): C_{k+1}^-1 = C_k^-1 + mu C_k^-1 D_k C_k^-1 with mu = 1/(1 + tr(C_k^-1 D_k)). Sherman and
+// Morrison subtract.
+TEST(SourceErrors, InverseOfARankOneUpdateHasTheWrongSign) {
+  Eigen::Matrix3d c;
+  c << 4, 1, 0,   //
+      1, 3, 0.5,  //
+      0, 0.5, 2;
+  const Eigen::Matrix3d d = Eigen::Vector3d(1, -2, 0.5) * Eigen::RowVector3d(0.3, 1, 2);
+  const Eigen::Matrix3d c_inverse = c.inverse();
+  const double mu = 1 / (1 + (c_inverse * d).trace());
+  const Eigen::Matrix3d correction = mu * c_inverse * d * c_inverse;
+  EXPECT_TRUE(((c + d) * (c_inverse - correction)).isIdentity(1e-13));
+  EXPECT_FALSE(((c + d) * (c_inverse + correction)).isIdentity(0.05));
+
+  // By hand: 1 + 1 has the inverse 1 - 1/2, not 1 + 1/2.
+  const double by_23 = 1.0 + (1 / (1 + 1.0)) * 1.0;
+  EXPECT_EQ(by_23, 1.5);
+  EXPECT_EQ(1 / (1.0 + 1.0), 0.5);
+}
+
+// Section 7: "an average speed up factor of 1.23" at 7 x 7.
+TEST(SourceErrors, MeanSpeedUpOfTable1) {
+  const struct {
+    double gpu_cpu_s, cpu_s, printed;
+  } rows[] = {
+      {664.27, 855.35, 1.29}, {696.37, 856.86, 1.23}, {661.74, 856.85, 1.29},
+      {680.79, 855.50, 1.26}, {169.95, 182.25, 1.07}, {154.11, 181.97, 1.18},
+      {137.41, 182.51, 1.33}, {166.18, 182.17, 1.10},
+  };
+  double printed_mean = 0;
+  double ratio_mean = 0;
+  for (const auto& row : rows) {
+    EXPECT_NEAR(row.cpu_s / row.gpu_cpu_s, row.printed, 0.005) << "a row was copied wrongly";
+    printed_mean += row.printed / 8;
+    ratio_mean += row.cpu_s / row.gpu_cpu_s / 8;
+  }
+  EXPECT_NEAR(printed_mean, 1.22, 0.005);
+  EXPECT_NEAR(ratio_mean, 1.22, 0.005);
+  EXPECT_LT(printed_mean, 1.225);
+  EXPECT_LT(ratio_mean, 1.225);
+}
+
+}  // namespace
+}  // namespace thicklens::model
