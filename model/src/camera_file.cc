@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "thicklens/error.h"
@@ -24,7 +25,7 @@ YamlNode ValueNode(const YamlNode& node, Camera* camera) {
   if (const auto tolerance = node.Find("tolerance"))
     statement.tolerance = tolerance->NonNegativeNumber();
   if (const auto assumed = node.Find("assumed")) statement.assumed = assumed->Boolean();
-  camera->statements[node.path()] = statement;
+  if (statement.assumed || statement.tolerance > 0) camera->statements[node.path()] = statement;
   return node.At("value");
 }
 
@@ -35,7 +36,7 @@ void ReadLens(const YamlNode& node, Camera* camera) {
   lens.front_focal_length_mm = ValueNode(node.At("front_focal_length_mm"), camera).PositiveNumber();
   lens.rear_focal_length_mm = ValueNode(node.At("rear_focal_length_mm"), camera).PositiveNumber();
   lens.lens_thickness_mm = ValueNode(node.At("lens_thickness_mm"), camera).Number();
-  lens.aperture_radius_mm = ValueNode(node.At("aperture_radius_mm"), camera).NonNegativeNumber();
+  lens.aperture_radius_mm = ValueNode(node.At("aperture_radius_mm"), camera).PositiveNumber();
 }
 
 void ReadSensor(const YamlNode& node, Camera* camera) {
@@ -55,13 +56,17 @@ void ReadSensor(const YamlNode& node, Camera* camera) {
   }
 }
 
-std::optional<Estimate> ReadEstimate(const YamlNode& parent, const std::string& key) {
+using NumberOf = double (YamlNode::*)() const;
+
+// `number` is the check on the value: any, positive or not negative.
+std::optional<Estimate> ReadEstimate(const YamlNode& parent, const std::string& key,
+                                     NumberOf number) {
   const auto node = parent.Find(key);
   if (!node) return std::nullopt;
-  if (node->IsScalar()) return Estimate{node->Number(), 0};
+  if (!node->IsMap()) return Estimate{((*node).*number)(), 0};
   node->RequireKeys({"value", "sigma"});
   Estimate estimate;
-  estimate.value = node->At("value").Number();
+  estimate.value = (node->At("value").*number)();
   if (const auto sigma = node->Find("sigma")) estimate.sigma = sigma->NonNegativeNumber();
   return estimate;
 }
@@ -80,7 +85,7 @@ Evidence ReadEvidence(const YamlNode& node) {
   }
   if (const auto chi2 = node.Find("chi2_per_dof"))
     evidence.chi2_per_dof = chi2->NonNegativeNumber();
-  evidence.focus_depth_mm = ReadEstimate(node, "focus_depth_mm");
+  evidence.focus_depth_mm = ReadEstimate(node, "focus_depth_mm", &YamlNode::PositiveNumber);
   if (const auto hash = node.Find("data_sha256")) evidence.data_sha256 = hash->Text();
   if (const auto version = node.Find("version")) evidence.version = version->Text();
   if (const auto date = node.Find("date")) evidence.date = date->Text();
@@ -89,8 +94,14 @@ Evidence ReadEvidence(const YamlNode& node) {
 
 void ReadCovariance(const YamlNode& node, CameraCalibration* calibration) {
   node.RequireKeys({"order", "rows"});
-  for (const YamlNode& name : node.At("order").Elements())
-    calibration->covariance_order.push_back(name.Text());
+  for (const YamlNode& name : node.At("order").Elements()) {
+    std::vector<std::string>& order = calibration->covariance_order;
+    const std::string parameter =
+        name.OneOf({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"});
+    if (std::find(order.begin(), order.end(), parameter) != order.end())
+      throw name.ErrorHere(fmt::format("'{}' stands in this list twice", parameter));
+    order.push_back(parameter);
+  }
   const std::size_t n = calibration->covariance_order.size();
   const auto rows = node.At("rows").ElementsExactly(n);
   calibration->covariance.resize(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
@@ -111,10 +122,10 @@ CameraCalibration ReadCalibration(const YamlNode& node) {
   node.RequireKeys({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm",
                     "covariance", "evidence"});
   CameraCalibration calibration;
-  calibration.image_distance_mm = ReadEstimate(node, "image_distance_mm");
-  calibration.blur_ratio = ReadEstimate(node, "blur_ratio");
-  calibration.blur_floor_px = ReadEstimate(node, "blur_floor_px");
-  calibration.bench_offset_mm = ReadEstimate(node, "bench_offset_mm");
+  calibration.image_distance_mm = ReadEstimate(node, "image_distance_mm", &YamlNode::Number);
+  calibration.blur_ratio = ReadEstimate(node, "blur_ratio", &YamlNode::NonNegativeNumber);
+  calibration.blur_floor_px = ReadEstimate(node, "blur_floor_px", &YamlNode::NonNegativeNumber);
+  calibration.bench_offset_mm = ReadEstimate(node, "bench_offset_mm", &YamlNode::Number);
   if (const auto covariance = node.Find("covariance")) ReadCovariance(*covariance, &calibration);
   calibration.evidence = ReadEvidence(node.At("evidence"));
   return calibration;
@@ -254,8 +265,14 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
   }
   if (const auto calibration = root.Find("calibration"))
     camera.calibration = ReadCalibration(*calibration);
+  // Each number was checked where it stands. What is left is how the image distance goes with the
+  // lens, so an error belongs to the calibration if there is one.
   std::string why;
-  if (!camera.IsValid(&why)) throw root.ErrorHere(why);
+  if (!camera.IsValid(&why)) {
+    const auto place = camera.calibration ? root.At("calibration").Find("image_distance_mm")
+                                          : std::optional<YamlNode>();
+    throw place.value_or(root).ErrorHere(why);
+  }
   return camera;
 }
 

@@ -11,7 +11,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <system_error>
 
 #include "thicklens/error.h"
@@ -21,14 +20,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Opens (creating it by `create`) and locks the part file or folder of an output. Another run that
-// holds the lock ends in an Error; a part that a killed run left behind carries no lock.
-int OpenLocked(const std::string& part, const std::string& target, int flags) {
+Error CannotBeWritten(const std::string& target, int error) {
+  return Error(fmt::format("{}: cannot be written: {}", target, std::strerror(error)));
+}
+
+enum class PartKind { kFile, kFolder };
+
+// Creates, opens and locks the part file or folder of an output. If another run holds the lock,
+// that is an Error; a part that a killed run left behind carries no lock.
+int OpenLocked(const std::string& part, const std::string& target, PartKind kind) {
+  const int flags = kind == PartKind::kFile ? O_RDWR | O_CREAT : O_RDONLY | O_DIRECTORY;
   for (;;) {
+    if (kind == PartKind::kFolder && ::mkdir(part.c_str(), 0777) != 0 && errno != EEXIST)
+      throw CannotBeWritten(target, errno);
     const int fd = ::open(part.c_str(), flags | O_CLOEXEC, 0666);
-    if (fd < 0) throw Error(fmt::format("{}: cannot be written: {}", target, std::strerror(errno)));
+    if (fd < 0 && errno == ENOENT && kind == PartKind::kFolder) continue;  // its holder removed it
+    if (fd < 0) throw CannotBeWritten(target, errno);
     if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+      const int error = errno;
       ::close(fd);
+      if (error != EWOULDBLOCK) throw CannotBeWritten(target, error);
       throw Error(fmt::format(
           "{}: another run is writing this output; wait for it or choose another name", target));
     }
@@ -60,24 +71,55 @@ void WriteAll(int fd, const std::string& content, const std::string& target) {
   while (done < content.size()) {
     const ssize_t n = ::write(fd, content.data() + done, content.size() - done);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw Error(fmt::format("{}: cannot be written: {}", target, std::strerror(errno)));
+    if (n < 0) throw CannotBeWritten(target, errno);
     done += static_cast<std::size_t>(n);
   }
-  if (::fsync(fd) != 0 && errno != EINVAL) {
-    throw Error(fmt::format("{}: cannot be written: {}", target, std::strerror(errno)));
+  if (::fsync(fd) != 0 && errno != EINVAL) throw CannotBeWritten(target, errno);
+}
+
+// "a/b/", "a/b/." and "a/b" are the same folder; "." and ".." have no name of their own.
+fs::path WithoutTrailingSlash(const std::string& path) {
+  const fs::path result = fs::path(path).lexically_normal();
+  return result.has_filename() ? result : result.parent_path();
+}
+
+// What a symbolic link points at: renaming over the link itself would leave its target as it was.
+fs::path Followed(const fs::path& target) {
+  std::error_code failure;
+  if (!fs::is_symlink(target, failure)) return target;
+  const fs::path followed = fs::canonical(target, failure);
+  return failure ? target : followed;
+}
+
+// A folder that is there already is replaced only if that can lose nothing of anybody else's.
+void RequireReplaceable(const fs::path& folder, const std::string& marker_file) {
+  std::error_code ignored;
+  if (!fs::exists(folder, ignored)) return;
+  if (!fs::is_directory(folder, ignored))
+    throw Error(fmt::format("{}: is a file; a folder is expected", folder.string()));
+  if (!fs::is_empty(folder, ignored) && !fs::exists(folder / marker_file, ignored)) {
+    throw Error(
+        fmt::format("{}: this folder holds other files (no {} in it) and is not replaced; choose "
+                    "another name",
+                    folder.string(), marker_file));
   }
 }
 
-// "a/b/" and "a/b" are the same folder.
-fs::path WithoutTrailingSlash(const std::string& path) {
-  fs::path result(path);
-  return result.has_filename() ? result : result.parent_path();
+// A name beside the target that nothing has yet.
+fs::path NameToStepAside(const fs::path& target) {
+  std::error_code ignored;
+  for (int i = 1;; ++i) {
+    fs::path aside =
+        target.parent_path() / fmt::format(".{}.old-{}", target.filename().string(), i);
+    if (!fs::exists(fs::symlink_status(aside, ignored))) return aside;
+  }
 }
 
 }  // namespace
 
 struct OutputFile::Impl {
-  std::string path;
+  std::string path;    // as it was given, for messages
+  std::string target;  // the same, links followed
   std::string part;
   int fd = -1;
 
@@ -89,15 +131,21 @@ struct OutputFile::Impl {
 };
 
 OutputFile::OutputFile(const std::string& path) : impl_(std::make_unique<Impl>()) {
-  const fs::path target(path);
+  if (path.empty()) throw Error("the name of the output file is empty");
   std::error_code ignored;
-  if (!target.has_filename() || fs::is_directory(target, ignored)) {
+  const fs::file_status status = fs::status(path, ignored);
+  if (!fs::path(path).has_filename() || fs::is_directory(status)) {
     throw Error(fmt::format("{}: is a folder; the name of a file is expected", path));
   }
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    throw Error(fmt::format("{}: is a device or a pipe; the name of a file is expected", path));
+  }
+  const fs::path target = Followed(path);
   RequireParentFolder(target);
   impl_->path = path;
+  impl_->target = target.string();
   impl_->part = PartName(target);
-  impl_->fd = OpenLocked(impl_->part, path, O_RDWR | O_CREAT);
+  impl_->fd = OpenLocked(impl_->part, path, PartKind::kFile);
 }
 
 OutputFile::~OutputFile() = default;
@@ -106,12 +154,10 @@ OutputFile& OutputFile::operator=(OutputFile&&) noexcept = default;
 
 void OutputFile::Commit(const std::string& content) {
   Impl& impl = *impl_;
-  if (::ftruncate(impl.fd, 0) != 0)
-    throw Error(fmt::format("{}: cannot be written: {}", impl.path, std::strerror(errno)));
+  if (::ftruncate(impl.fd, 0) != 0) throw CannotBeWritten(impl.path, errno);
   WriteAll(impl.fd, content, impl.path);
-  if (::rename(impl.part.c_str(), impl.path.c_str()) != 0) {
-    throw Error(fmt::format("{}: cannot be written: {}", impl.path, std::strerror(errno)));
-  }
+  if (::rename(impl.part.c_str(), impl.target.c_str()) != 0)
+    throw CannotBeWritten(impl.path, errno);
   ::close(impl.fd);
   impl.fd = -1;
 }
@@ -121,6 +167,7 @@ const std::string& OutputFile::path() const { return impl_->path; }
 struct OutputFolder::Impl {
   std::string path;
   std::string part;
+  std::string marker_file;
   int fd = -1;
 
   ~Impl() {
@@ -133,25 +180,18 @@ struct OutputFolder::Impl {
 
 OutputFolder::OutputFolder(const std::string& path, const std::string& marker_file)
     : impl_(std::make_unique<Impl>()) {
-  const fs::path target = WithoutTrailingSlash(path);
-  std::error_code ignored;
-  if (fs::exists(target, ignored)) {
-    if (!fs::is_directory(target, ignored))
-      throw Error(fmt::format("{}: is a file; a folder is expected", path));
-    if (!fs::is_empty(target, ignored) && !fs::exists(target / marker_file, ignored)) {
-      throw Error(
-          fmt::format("{}: this folder holds other files (no {} in it) and is not replaced; choose "
-                      "another name",
-                      path, marker_file));
-    }
-  }
+  if (path.empty()) throw Error("the name of the output folder is empty");
+  const fs::path named = WithoutTrailingSlash(path);
+  if (!named.has_filename() || named.filename() == "." || named.filename() == "..")
+    throw Error(fmt::format("{}: a folder of its own is expected, by name", path));
+  const fs::path target = Followed(named);
+  RequireReplaceable(target, marker_file);
   RequireParentFolder(target);
   impl_->path = target.string();
   impl_->part = PartName(target);
-  if (::mkdir(impl_->part.c_str(), 0777) != 0 && errno != EEXIST) {
-    throw Error(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
-  }
-  impl_->fd = OpenLocked(impl_->part, path, O_RDONLY | O_DIRECTORY);
+  impl_->marker_file = marker_file;
+  impl_->fd = OpenLocked(impl_->part, path, PartKind::kFolder);
+  std::error_code ignored;
   for (const auto& left_over : fs::directory_iterator(impl_->part, ignored))
     fs::remove_all(left_over, ignored);
 }
@@ -170,27 +210,25 @@ void OutputFolder::Write(const std::string& name, const std::string& content) {
   fs::create_directories(file.parent_path(), failure);
   if (failure) throw Error(fmt::format("{}: cannot be written: {}", shown, failure.message()));
   const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (fd < 0) throw Error(fmt::format("{}: cannot be written: {}", shown, std::strerror(errno)));
+  if (fd < 0) throw CannotBeWritten(shown, errno);
   try {
     WriteAll(fd, content, shown);
   } catch (...) {
     ::close(fd);
     throw;
   }
-  if (::close(fd) != 0)
-    throw Error(fmt::format("{}: cannot be written: {}", shown, std::strerror(errno)));
+  if (::close(fd) != 0) throw CannotBeWritten(shown, errno);
 }
 
 void OutputFolder::Commit() {
   Impl& impl = *impl_;
+  RequireReplaceable(impl.path, impl.marker_file);  // work may have taken hours
   std::error_code failure;
   // renameat2 with RENAME_EXCHANGE would be one step, but not every file system has it. The old
   // folder steps aside first and comes back if the new one cannot take its place.
-  const fs::path aside =
-      fs::path(impl.path).parent_path() / ("." + fs::path(impl.path).filename().string() + ".old");
+  const fs::path aside = NameToStepAside(impl.path);
   const bool replaces = fs::exists(impl.path, failure);
   if (replaces) {
-    fs::remove_all(aside, failure);
     fs::rename(impl.path, aside, failure);
     if (failure)
       throw Error(fmt::format("{}: cannot be replaced: {}", impl.path, failure.message()));
@@ -219,10 +257,13 @@ std::string ReadWholeFile(const std::string& path) {
   if (!in)
     throw Error(
         fmt::format("{}: cannot be read: {}", path, std::strerror(errno != 0 ? errno : EIO)));
-  std::ostringstream content;
-  content << in.rdbuf();
+  // Not by `<< in.rdbuf()`, which takes a read error for the end of the file.
+  std::string content;
+  char block[1 << 16];
+  while (in.read(block, sizeof block) || in.gcount() > 0)
+    content.append(block, static_cast<std::size_t>(in.gcount()));
   if (in.bad()) throw Error(fmt::format("{}: cannot be read to its end", path));
-  return content.str();
+  return content;
 }
 
 }  // namespace thicklens::model

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -40,7 +41,11 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& work) {
   };
   const int workers = std::min(ResolveThreads(threads), count);
   std::vector<std::thread> pool;
-  for (int i = 1; i < workers; ++i) pool.emplace_back(run);
+  try {
+    for (int i = 1; i < workers; ++i) pool.emplace_back(run);
+  } catch (const std::system_error&) {
+    // The system gives no more threads: those there are do the work.
+  }
   run();
   for (std::thread& thread : pool) thread.join();
   if (failure) std::rethrow_exception(failure);

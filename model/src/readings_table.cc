@@ -41,7 +41,8 @@ char DelimiterOf(const std::string& text) {
 }
 
 std::optional<double> ToNumber(const std::string& cell) {
-  const char* begin = cell.data() + (cell.rfind('+', 0) == 0 ? 1 : 0);
+  const bool has_plus = cell.rfind('+', 0) == 0 && cell.rfind("+-", 0) != 0;
+  const char* begin = cell.data() + (has_plus ? 1 : 0);
   const char* end = cell.data() + cell.size();
   double value = 0;
   const auto [rest, status] = std::from_chars(begin, end, value);
@@ -55,14 +56,16 @@ std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
   std::string text = ReadWholeFile(path);
   if (text.rfind("\xEF\xBB\xBF", 0) == 0) text.erase(0, 3);  // a spreadsheet's byte order mark
   csv_parser parser;
-  if (csv_init(&parser, CSV_STRICT | CSV_APPEND_NULL) != 0)
+  if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL) != 0)
     throw Error(path + ": the CSV parser failed to start");
   csv_set_delim(&parser, static_cast<unsigned char>(DelimiterOf(text)));
   Table table;
   // Line by line, so that the parser's rows can be told by their line; a quoted line break keeps
   // its row open over several of them.
   bool well_formed = true;
-  for (std::size_t begin = 0; begin < text.size() && well_formed; ++table.line) {
+  table.line = 0;
+  for (std::size_t begin = 0; begin < text.size() && well_formed;) {
+    ++table.line;
     std::size_t end = text.find('\n', begin);
     end = end == std::string::npos ? text.size() : end + 1;
     well_formed = csv_parse(&parser, text.data() + begin, end - begin, TakeCell, TakeRow, &table) ==
@@ -70,11 +73,10 @@ std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
     begin = end;
   }
   well_formed = well_formed && csv_fini(&parser, TakeCell, TakeRow, &table) == 0;
-  const int bad_line = table.line - 1;
   csv_free(&parser);
   if (!well_formed)
     throw Error(
-        fmt::format("{}:{}: no valid CSV row (a quotation mark out of place?)", path, bad_line));
+        fmt::format("{}:{}: no valid CSV row (a quotation mark out of place?)", path, table.line));
 
   std::vector<ReadingRow> readings;
   std::map<std::string, int> line_of;

@@ -32,6 +32,9 @@ double MillimetresPer(const std::string& unit) {
   return 1;
 }
 
+// Half-written outputs and what some systems lay beside every file ("._frame.png").
+bool IsHidden(const fs::path& file) { return file.filename().string().rfind('.', 0) == 0; }
+
 bool IsPictureName(const fs::path& file) {
   static const std::set<std::string> kEndings = {".png", ".jpg", ".jpeg", ".tif", ".tiff",
                                                  ".bmp", ".pgm", ".ppm",  ".pnm"};
@@ -40,7 +43,19 @@ bool IsPictureName(const fs::path& file) {
   return kEndings.count(ending) > 0;
 }
 
-std::vector<std::string> FilesMatching(const std::string& pattern) {
+// The folder of the YAML file may have any name: only what stands in the file is a pattern.
+std::string EscapedForGlob(const std::string& folder) {
+  std::string escaped;
+  for (const char c : folder) {
+    if (c == '*' || c == '?' || c == '[' || c == '\\') escaped += '\\';
+    escaped += c;
+  }
+  return escaped;
+}
+
+std::vector<std::string> FilesMatching(const YamlNode& node) {
+  const std::string folder = EscapedForGlob(fs::path(node.source()).parent_path().string());
+  const std::string pattern = (fs::path(folder) / node.Text()).string();
   glob_t found{};
   std::vector<std::string> files;
   if (::glob(pattern.c_str(), 0, nullptr, &found) == 0) {
@@ -55,13 +70,16 @@ std::vector<std::string> FilesMatching(const std::string& pattern) {
 std::vector<std::string> PicturesIn(const std::string& folder) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) throw Error(fmt::format("{}: no such folder", folder));
+  fs::directory_iterator entries(folder, failure);
+  if (failure) throw Error(fmt::format("{}: cannot be read: {}", folder, failure.message()));
   std::vector<std::string> here, below;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file() && IsPictureName(entry.path()))
+  for (const auto& entry : entries) {
+    if (IsHidden(entry.path())) continue;
+    if (entry.is_regular_file(failure) && IsPictureName(entry.path()))
       here.push_back(entry.path().string());
-    if (!entry.is_directory()) continue;
+    if (!entry.is_directory(failure)) continue;
     for (const auto& inner : fs::directory_iterator(entry.path(), failure)) {
-      if (inner.is_regular_file() && IsPictureName(inner.path()))
+      if (!IsHidden(inner.path()) && inner.is_regular_file(failure) && IsPictureName(inner.path()))
         below.push_back(inner.path().string());
     }
   }
@@ -70,11 +88,13 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
   return files;
 }
 
-// Brings table rows and picture files together by name; each must have its partner.
+// Brings table rows and picture files together by name. Each row must have its file; files without
+// a row are told in `notices`.
 std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
                                          const std::string& table,
                                          const std::vector<std::string>& files,
-                                         const std::string& folder, double mm_per_unit) {
+                                         const std::string& folder, double mm_per_unit,
+                                         std::vector<std::string>* notices) {
   std::vector<SweepFrame> frames;
   std::set<std::string> used;
   for (const ReadingRow& row : rows) {
@@ -86,25 +106,35 @@ std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
       };
       const auto match = std::find_if(files.begin(), files.end(), same_name);
       if (match == files.end()) {
-        throw Error(
-            fmt::format("{}:{}: the file '{}' is not in {}", table, row.line, row.file, folder));
+        throw Error(fmt::format("{}:{}: the file '{}' is not in {}", table, row.line, row.file,
+                                folder.empty() ? "." : folder));
       }
-      path = *match;
+      const auto other = std::find_if(match + 1, files.end(), same_name);
+      if (other != files.end()) {
+        throw Error(fmt::format("{}:{}: '{}' may be {} or {}; name its folder too", table, row.line,
+                                row.file, *match, *other));
+      }
+      path = fs::path(*match).lexically_normal().string();
     }
-    used.insert(fs::path(path).lexically_normal().string());
+    if (!used.insert(path).second) {
+      throw Error(
+          fmt::format("{}:{}: the file '{}' has a reading already", table, row.line, row.file));
+    }
     frames.push_back({path, row.reading * mm_per_unit});
   }
   std::vector<std::string> without_row;
   for (const std::string& file : files) {
     if (used.count(fs::path(file).lexically_normal().string()) == 0) without_row.push_back(file);
   }
-  if (!without_row.empty()) {
-    throw Error(fmt::format(
-        "{}: has no row in {} ({} such file{}); add its reading or move it elsewhere",
-        without_row.front(), table, without_row.size(), without_row.size() == 1 ? "" : "s"));
+  if (!without_row.empty() && notices != nullptr) {
+    notices->push_back(fmt::format("{}: has no row in {} and is not used ({} such file{})",
+                                   without_row.front(), table, without_row.size(),
+                                   without_row.size() == 1 ? "" : "s"));
   }
   return frames;
 }
+
+bool IsUnknown(const YamlNode& node) { return node.IsScalar() && node.Text() == "unknown"; }
 
 void ReadOffset(const YamlNode& root, SweepFile* sweep) {
   const auto node = root.Find("offset_mm");
@@ -114,7 +144,7 @@ void ReadOffset(const YamlNode& root, SweepFile* sweep) {
     Estimate offset{node->At("value").Number(), 0};
     if (const auto sigma = node->Find("sigma")) offset.sigma = sigma->NonNegativeNumber();
     sweep->offset_mm = offset;
-  } else if (node->Text() != "unknown") {
+  } else if (!IsUnknown(*node)) {
     sweep->offset_mm = Estimate{node->Number(), 0};
   }
 }
@@ -132,13 +162,20 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   const auto node = root.Find("blur_floor_px");
   if (!node) return;
   if (!node->IsMap()) {
-    if (node->Text() != "unknown") sweep->floor.given_px = Estimate{node->NonNegativeNumber(), 0};
+    if (!IsUnknown(*node)) sweep->floor.given_px = Estimate{node->NonNegativeNumber(), 0};
     return;
   }
   node->RequireKeys({"value", "sigma", "from", "to", "from_calibration"});
-  if (const auto file = node->Find("from_calibration")) {
+  const bool is_interval = node->Has("from") || node->Has("to");
+  const bool is_value = node->Has("value") || node->Has("sigma");
+  const auto file = node->Find("from_calibration");
+  if (is_interval + is_value + file.has_value() != 1) {
+    throw node->ErrorHere(
+        "one of {value, sigma}, {from, to} and {from_calibration} is expected, not a mixture");
+  }
+  if (file) {
     sweep->floor.given_px = FloorOfCalibration(*file);
-  } else if (node->Has("from") || node->Has("to")) {
+  } else if (is_interval) {
     sweep->floor.from_px = node->At("from").NonNegativeNumber();
     sweep->floor.to_px = node->At("to").NonNegativeNumber();
     if (!(*sweep->floor.from_px <= *sweep->floor.to_px)) {
@@ -152,7 +189,8 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   }
 }
 
-void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep) {
+void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep,
+                std::vector<std::string>* notices) {
   if (root.Has("frames") == root.Has("frames_csv")) {
     throw root.ErrorHere(
         "either 'frames' (a list of image and reading_mm) or 'frames_csv' (a table) is expected");
@@ -163,14 +201,19 @@ void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep) {
     if (const auto dir = root.Find("frames_dir")) folder = dir->ResolvePath(dir->Text());
     std::vector<std::string> files;
     if (const auto pattern = root.Find("frames_glob")) {
-      files = FilesMatching(pattern->ResolvePath(pattern->Text()));
+      files = FilesMatching(*pattern);
       if (files.empty())
         throw pattern->ErrorHere(fmt::format("no file matches '{}'", pattern->Text()));
     } else {
       files = PicturesIn(folder.empty() ? "." : folder);
     }
-    sweep->frames = JoinRowsAndFiles(ReadReadingsTable(csv), csv, files, folder, mm_per_unit);
+    sweep->frames =
+        JoinRowsAndFiles(ReadReadingsTable(csv), csv, files, folder, mm_per_unit, notices);
     return;
+  }
+  for (const char* key : {"frames_dir", "frames_glob"}) {
+    if (const auto extra = root.Find(key))
+      throw extra->ErrorHere("goes with 'frames_csv'; the paths in 'frames' are complete");
   }
   std::set<std::string> images;
   for (const YamlNode& node : root.At("frames").Elements()) {
@@ -184,6 +227,7 @@ void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep) {
       throw image.ErrorHere(fmt::format("'{}' stands in this list twice", image.Text()));
     sweep->frames.push_back({path, node.At("reading_mm").Number()});
   }
+  if (sweep->frames.empty()) throw root.At("frames").ErrorHere("a frame at least is expected");
 }
 
 void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notices) {
@@ -266,7 +310,7 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
     sweep.roi = {numbers[0].Integer(0, kMax), numbers[1].Integer(0, kMax),
                  numbers[2].Integer(1, kMax), numbers[3].Integer(1, kMax)};
   }
-  ReadFrames(root, mm_per_unit, &sweep);
+  ReadFrames(root, mm_per_unit, &sweep, notices);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }
@@ -277,7 +321,7 @@ SweepFile SweepFromFolder(const std::string& folder, const std::string& readings
   sweep.source = folder;
   sweep.camera_path = camera_path;
   sweep.frames = JoinRowsAndFiles(ReadReadingsTable(readings_csv), readings_csv, PicturesIn(folder),
-                                  folder, 1);
+                                  folder, 1, notices);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }

@@ -183,12 +183,13 @@ double YamlNode::Number() const {
   const std::string expected = "a number is expected";
   if (!IsScalar()) throw ErrorHere(fmt::format("{}, found {}", expected, KindOf(impl_->node)));
   const std::string& text = impl_->node.Scalar();
-  const char* begin = text.data() + (text.rfind('+', 0) == 0 ? 1 : 0);
+  const bool has_plus = text.rfind('+', 0) == 0 && text.rfind("+-", 0) != 0;
+  const char* begin = text.data() + (has_plus ? 1 : 0);
   const char* end = text.data() + text.size();
   double value = 0;
   const auto [rest, status] = std::from_chars(begin, end, value);
-  if (status != std::errc() || rest != end || begin == end) {
-    const bool has_unit = status == std::errc() && rest != end;
+  if (status != std::errc() || rest != end) {
+    const bool has_unit = status == std::errc() && std::isfinite(value);
     throw ErrorHere(fmt::format(
         "{}, found '{}'{}", expected, text,
         has_unit ? "; the unit is in the key's name, the value is the bare number" : ""));

@@ -34,16 +34,16 @@ struct FrameMeasurement {
   double reading_mm = 0;
   double depth_mm = 0;
   FrameStatistics statistics;
-  std::string rejection;               // empty: used
-  double mean_edge_slope = 0;          // MES, linear grey per px
-  double normalised_edge_slope = 0;    // MES over the frame's mean grey, per px
+  std::string rejection;             // empty: used
+  double mean_edge_slope = 0;        // MES, linear grey per px
+  double normalised_edge_slope = 0;  // MES over the frame's mean grey, per px
   int edge_count = 0;
-  double source_blur_sigma_px = 0;     // Zhuo-Sim as the source has it
-  double blur_sigma_px = 0;            // lens and defocus, pixel box and operator removed
-  double blur_sigma_error_px = 0;      // its standard deviation
-  bool in_blur_fit = false;            // false: outside the meter's range, or rejected
-  double blur_fit_weight = 0;          // 0 to 1, of the robust loss
-  std::optional<double> image_scale;   // relative to the reference frame
+  double source_blur_sigma_px = 0;    // Zhuo-Sim as the source has it
+  double blur_sigma_px = 0;           // lens and defocus, pixel box and operator removed
+  double blur_sigma_error_px = 0;     // its standard deviation
+  bool in_blur_fit = false;           // false: outside the meter's range, or rejected
+  double blur_fit_weight = 0;         // 0 to 1, of the robust loss
+  std::optional<double> image_scale;  // relative to the reference frame
   bool in_scale_fit = false;
 };
 
@@ -55,8 +55,8 @@ struct SourceRecipe {
   int sharpest_frame = -1;  // index into frames
   double focus_depth_mm = 0;
   double image_distance_mm = 0;
-  double blur_ratio = 0;      // dominated by frames near focus (DESIGN 4.4)
-  int ratio_frames = 0;       // frames in the mean; the sharpest has r_defocus = 0 and is left out
+  double blur_ratio = 0;  // dominated by frames near focus (DESIGN 4.4)
+  int ratio_frames = 0;   // frames in the mean; the sharpest has r_defocus = 0 and is left out
 };
 
 // Normalised sharpness: a parabola through the logarithm over the top of the curve.

@@ -36,8 +36,11 @@ struct FocusSweep {
 // A FocusSweep from its description; `read_frame` is left to the caller.
 FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& camera);
 
-// The frame's region of interest as linear grey light in [0, 1], CV_32F (.2126 R + .7152 G +
-// .0722 B). Throws Error naming the frame if its size is not the sensor's or the roi leaves it.
+// The region of interest of a frame as stored. Throws Error naming the frame if its size is not the
+// sensor's, or its depth or channels are none of those above.
+cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
+
+// The same as linear grey light in [0, 1], CV_32F (.2126 R + .7152 G + .0722 B).
 cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
 
 }  // namespace thicklens::calib

@@ -5,24 +5,23 @@
 #include <optional>
 #include <string>
 
-
 namespace thicklens::calib {
 
 // What a frame is like before anything is normalised; levels in units of full scale.
 struct FrameStatistics {
-  double mean_stored = 0;           // mean of the stored grey values
-  double mean_linear = 0;           // mean of the linear grey
-  double contrast = 0;              // standard deviation over mean, linear, of the smoothed frame
-  double noise_sigma = 0;           // of a linear grey pixel, from the flattest parts
-  double top_gradient = 0;          // 99.5 percentile of the gradient magnitude, per px, linear
-  double saturated_fraction = 0;    // of all samples, at full scale or piled up on one value
-  double saturation_level = 0;      // stored value of the pile-up; 0 if none
+  double mean_stored = 0;         // mean of the stored grey values
+  double mean_linear = 0;         // mean of the linear grey
+  double contrast = 0;            // standard deviation over mean, linear, of the smoothed frame
+  double noise_sigma = 0;         // of a linear grey pixel, from the flattest parts
+  double top_gradient = 0;        // 99.5 percentile of the gradient magnitude, per px, linear
+  double saturated_fraction = 0;  // of all samples, at full scale or piled up on one value
+  double saturation_level = 0;    // stored value of the pile-up; 0 if none
 };
 
 struct GateOptions {
   double min_mean_stored = 4.0 / 255;    // below: dark
   double max_saturated_fraction = 0.05;  // above: saturated
-  double min_relative_contrast = 0.1;    // of the sweep's median contrast; below: blank
+  double min_relative_contrast = 0.25;   // of the sweep's median contrast; below: blank
   double min_gradient_to_noise = 4;      // top gradient over its standard deviation from noise
 };
 

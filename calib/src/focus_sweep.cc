@@ -1,0 +1,109 @@
+#include "thicklens/calib/focus_sweep.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "thicklens/error.h"
+
+namespace thicklens::calib {
+namespace {
+
+bool Fail(std::string* why, const std::string& message) {
+  if (why != nullptr) *why = message;
+  return false;
+}
+
+template <typename Value>
+void DecodeInto(const cv::Mat& stored, const std::vector<float>& decode, cv::Mat* grey) {
+  const int channels = stored.channels();
+  for (int y = 0; y < stored.rows; ++y) {
+    const auto* in = stored.ptr<Value>(y);
+    auto* out = grey->ptr<float>(y);
+    for (int x = 0; x < stored.cols; ++x, in += channels) {
+      out[x] = channels < 3
+                   ? decode[in[0]]
+                   : 0.2126F * decode[in[0]] + 0.7152F * decode[in[1]] + 0.0722F * decode[in[2]];
+    }
+  }
+}
+
+}  // namespace
+
+bool FocusSweep::IsValid(std::string* why) const {
+  std::string inner;
+  if (!camera.lens.IsValid(&inner)) return Fail(why, "camera: lens: " + inner);
+  if (!camera.sensor.IsValid(&inner)) return Fail(why, "camera: sensor: " + inner);
+  if (!read_frame) return Fail(why, "read_frame is not set");
+  if (!(reading_sigma_mm >= 0) || !std::isfinite(reading_sigma_mm)) {
+    return Fail(why, fmt::format("reading_sigma_mm must be >= 0, found {}", reading_sigma_mm));
+  }
+  if (offset_mm && !(std::isfinite(offset_mm->value) && offset_mm->sigma >= 0)) {
+    return Fail(why, fmt::format("offset_mm must be finite with sigma >= 0, found {} +- {}",
+                                 offset_mm->value, offset_mm->sigma));
+  }
+  for (const model::SweepFrame& frame : frames) {
+    if (!std::isfinite(frame.reading_mm)) {
+      return Fail(why, fmt::format("{}: reading_mm must be finite", frame.image));
+    }
+  }
+  if (roi.width > 0 && (roi.x < 0 || roi.y < 0 || roi.x + roi.width > camera.sensor.width_px ||
+                        roi.y + roi.height > camera.sensor.height_px || roi.height <= 0)) {
+    return Fail(
+        why, fmt::format("roi_px [{}, {}, {}, {}] leaves the sensor of {} x {} px", roi.x, roi.y,
+                         roi.width, roi.height, camera.sensor.width_px, camera.sensor.height_px));
+  }
+  return true;
+}
+
+FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& camera) {
+  FocusSweep sweep;
+  sweep.camera = camera;
+  sweep.frames = file.frames;
+  sweep.reading_sigma_mm = file.reading_sigma_mm;
+  sweep.offset_mm = file.offset_mm;
+  sweep.direction = file.direction;
+  sweep.target = file.target;
+  sweep.floor = file.floor;
+  sweep.roi = file.roi;
+  return sweep;
+}
+
+cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
+  const model::Sensor& sensor = sweep.camera.sensor;
+  const std::string& name = sweep.frames[index].image;
+  if (stored.cols != sensor.width_px || stored.rows != sensor.height_px) {
+    throw Error(fmt::format("{}: the picture is {} x {} px, the camera's sensor {} x {} px", name,
+                            stored.cols, stored.rows, sensor.width_px, sensor.height_px));
+  }
+  if (stored.depth() != CV_8U && stored.depth() != CV_16U) {
+    throw Error(fmt::format("{}: pictures of 8 or 16 bits a channel are expected", name));
+  }
+  if (stored.channels() != 1 && stored.channels() != 3 && stored.channels() != 4) {
+    throw Error(
+        fmt::format("{}: 1, 3 or 4 channels are expected, found {}", name, stored.channels()));
+  }
+  const model::RegionOfInterest& roi = sweep.roi;
+  return roi.width > 0 ? stored(cv::Rect(roi.x, roi.y, roi.width, roi.height)) : stored;
+}
+
+cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
+  const cv::Mat region = RegionOf(stored, sweep, index);
+  const std::size_t levels = region.depth() == CV_8U ? 256 : 65536;
+  std::vector<float> decode(levels);
+  for (std::size_t i = 0; i < levels; ++i) {
+    decode[i] = static_cast<float>(sweep.camera.sensor.transfer.Decode(
+        static_cast<double>(i) / static_cast<double>(levels - 1)));
+  }
+  cv::Mat grey(region.size(), CV_32F);
+  if (region.depth() == CV_8U) {
+    DecodeInto<std::uint8_t>(region, decode, &grey);
+  } else {
+    DecodeInto<std::uint16_t>(region, decode, &grey);
+  }
+  return grey;
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,23 @@
+#ifndef THICKLENS_TESTS_SUPPORT_ERROR_MESSAGE_H_
+#define THICKLENS_TESTS_SUPPORT_ERROR_MESSAGE_H_
+
+#include <string>
+
+#include "thicklens/error.h"
+
+namespace thicklens::testing {
+
+// What the Error that `call` throws says; "(no error)" if it throws none. Other exceptions pass.
+template <typename Call>
+std::string ErrorOf(const Call& call) {
+  try {
+    call();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "(no error)";
+}
+
+}  // namespace thicklens::testing
+
+#endif  // THICKLENS_TESTS_SUPPORT_ERROR_MESSAGE_H_

@@ -1,0 +1,143 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "explain_table.h"
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPitchMm = 0.005;
+
+// f1 = 50, f2 = 52, rho = 4 focused at 1000 mm: d1 = 4 + 52 * 1000/950.
+model::Camera ThickCamera() {
+  model::Camera camera;
+  camera.name = "thick";
+  camera.lens = {50, 52, 4, 10};
+  camera.sensor.width_px = 601;
+  camera.sensor.height_px = 801;
+  camera.sensor.pixel_pitch_mm = kPitchMm;
+  camera.sensor.principal_point_px = {300, 400};
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm = model::Estimate{4 + 52 * 1000 / 950.0, 0.001};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0.009};
+  camera.calibration->blur_floor_px = model::Estimate{0.5, 0};
+  return camera;
+}
+
+TEST(InverselySpacedDepths, HaveEqualStepsOfInverseDepthAndExactEnds) {
+  const auto depths = InverselySpacedDepthsMm({500, 2000}, 4);
+  ASSERT_EQ(depths.size(), 4U);
+  EXPECT_EQ(depths.front(), 500);
+  EXPECT_EQ(depths.back(), 2000);
+  EXPECT_NEAR(depths[1], 1 / 0.0015, 1e-9);
+  EXPECT_NEAR(depths[2], 1000, 1e-9);
+  const auto to_infinity = InverselySpacedDepthsMm({500, kInfinity}, 3);
+  EXPECT_NEAR(to_infinity[1], 1000, 1e-9);
+  EXPECT_EQ(to_infinity[2], kInfinity);
+}
+
+// The blur by hand: r K |1/z - 1/zf| with K = f1 zf/(zf - f1) = 50000/950.
+TEST(ExplainCamera, GivesTheBlurOfTheClosedForm) {
+  const Explanation known = ExplainCamera(ThickCamera(), {500, kInfinity}, 3);
+  EXPECT_NEAR(known.focus_depth_mm, 1000, 1e-8);
+  ASSERT_EQ(known.rows.size(), 3U);
+  const double step_mm = 10 * (50000 / 950.0) * (1 / 1000.0);
+  EXPECT_NEAR(known.rows[0].blur_radius_mm, step_mm, 1e-9);
+  EXPECT_NEAR(known.rows[1].blur_radius_mm, 0, 1e-9);
+  EXPECT_NEAR(known.rows[2].blur_radius_mm, step_mm, 1e-9);
+  EXPECT_NEAR(known.rows[0].defocus_sigma_px, 0.45 * step_mm / kPitchMm, 1e-7);
+  EXPECT_NEAR(known.rows[0].defocus_sigma_error_px, 0.009 * step_mm / kPitchMm, 1e-7);
+  EXPECT_NEAR(known.rows[1].sigma_px, 0.5, 1e-9);
+  EXPECT_NEAR(known.rows[0].magnification, 50000 / 950.0 / 500, 1e-9);
+  EXPECT_EQ(known.rows[2].magnification, 0);
+}
+
+// An infinite depth must be the limit of finite ones.
+TEST(ExplainCamera, InfinityIsTheLimitOfFarPoints) {
+  const Explanation far = ExplainCamera(ThickCamera(), {500, 1e12}, 2);
+  const Explanation infinite = ExplainCamera(ThickCamera(), {500, kInfinity}, 2);
+  EXPECT_NEAR(far.rows[1].blur_radius_mm, infinite.rows[1].blur_radius_mm, 1e-8);
+  EXPECT_NEAR(far.rows[1].thin_blur_radius_px, infinite.rows[1].thin_blur_radius_px, 1e-5);
+}
+
+TEST(ExplainCamera, DepthOfFieldEndsWhereTheBlurReachesItsLimit) {
+  const Explanation known = ExplainCamera(ThickCamera(), {500, 2000}, 2);
+  ASSERT_EQ(known.depth_of_field.size(), 2U);
+  for (const DepthOfFieldRow& field : known.depth_of_field) {
+    const Explanation ends = ExplainCamera(ThickCamera(), {field.near_mm, field.far_mm}, 2);
+    EXPECT_NEAR(ends.rows[0].blur_radius_px, field.blur_radius_px, 1e-6);
+    EXPECT_NEAR(ends.rows[1].blur_radius_px, field.blur_radius_px, 1e-6);
+  }
+}
+
+// The thin lens at the same d1: 1/zf' = 1/f1 - 1/d1, scale d1/z against f1 D/(f2 z).
+TEST(ExplainCamera, ComparesWithTheThinLensAtTheSameImageDistance) {
+  const Explanation known = ExplainCamera(ThickCamera(), {500, 2000}, 2);
+  const double d1_mm = 4 + 52 * 1000 / 950.0;
+  const double ratio = d1_mm / (50000 / 950.0);
+  EXPECT_FALSE(known.thin.same_lens);
+  ASSERT_TRUE(known.thin.focus_depth_mm);
+  EXPECT_NEAR(*known.thin.focus_depth_mm, 1 / (1 / 50.0 - 1 / d1_mm), 1e-7);
+  EXPECT_NEAR(known.thin.scale_ratio, ratio, 1e-12);
+  EXPECT_NEAR(known.thin.corner_shift_px, (ratio - 1) * 500, 1e-9);
+  EXPECT_NEAR(known.rows[0].thin_blur_radius_px,
+              10 * std::abs(d1_mm / 500 - (d1_mm / 50 - 1)) / kPitchMm, 1e-7);
+}
+
+TEST(ExplainCamera, SaysWhereTheThinLensHasNoPlaneOfFocus) {
+  model::Camera camera = ThickCamera();
+  camera.lens = {50, 50, -4, 10};  // d1 of infinity is 46, less than f1
+  camera.calibration->image_distance_mm->value = 46.5;
+  const Explanation known = ExplainCamera(camera, {500, 2000}, 2);
+  EXPECT_FALSE(known.thin.focus_depth_mm);
+  EXPECT_THAT(ExplanationText(known), HasSubstr("nowhere"));
+  EXPECT_TRUE(ExplanationJson(known)["thin_counterpart"]["focus_depth_mm"].is_null());
+}
+
+TEST(ExplainCamera, KnowsAThinLens) {
+  model::Camera camera = ThickCamera();
+  camera.lens = {50, 50, 0, 10};
+  const Explanation known = ExplainCamera(camera, {500, 2000}, 2);
+  EXPECT_TRUE(known.thin.same_lens);
+  EXPECT_EQ(known.thin.scale_ratio, 1);
+  EXPECT_EQ(known.rows[0].thin_blur_radius_px, known.rows[0].blur_radius_px);
+}
+
+TEST(ExplainCamera, NamesWhatIsMissing) {
+  model::Camera camera = ThickCamera();
+  camera.calibration->blur_ratio.reset();
+  try {
+    ExplainCamera(camera, {500, 2000}, 2);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("calibration.blur_ratio is missing"));
+  }
+}
+
+TEST(ExplanationText, ShowsErrorsOnlyWhereThereAreSome) {
+  model::Camera camera = ThickCamera();
+  EXPECT_THAT(ExplanationText(ExplainCamera(camera, {500, 2000}, 3)), HasSubstr("0.45 +- 0.009"));
+  camera.calibration->blur_ratio->sigma = 0;
+  camera.calibration->image_distance_mm->sigma = 0;
+  EXPECT_THAT(ExplanationText(ExplainCamera(camera, {500, 2000}, 3)),
+              ::testing::Not(HasSubstr("+-")));
+}
+
+TEST(ExplanationJson, HasNullForInfinity) {
+  const auto json = ExplanationJson(ExplainCamera(ThickCamera(), {500, kInfinity}, 3));
+  EXPECT_EQ(json["status"], "ok");
+  EXPECT_EQ(json["depths"].size(), 3U);
+  EXPECT_EQ(json["depths"][0]["depth_mm"], 500);
+  EXPECT_TRUE(json["depths"][2]["depth_mm"].is_null());
+  EXPECT_GT(json["depths"][2]["blur_radius_mm"], 0);
+}
+
+}  // namespace
+}  // namespace thicklens::tools

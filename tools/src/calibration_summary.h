@@ -1,0 +1,63 @@
+#ifndef THICKLENS_TOOLS_CALIBRATION_SUMMARY_H_
+#define THICKLENS_TOOLS_CALIBRATION_SUMMARY_H_
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/focus_sweep.h"
+#include "thicklens/model/sweep_file.h"
+
+namespace thicklens::tools {
+
+// One calibrated quantity by every method that gives it.
+struct ResultRow {
+  std::string key;    // as in files: "image_distance_mm"
+  std::string label;  // as read: "image distance d1"
+  std::string unit;   // "mm", "px"; empty for a ratio
+  std::optional<calib::Result> fit;
+  std::optional<double> source;       // the source's recipe; it has no error estimate
+  std::optional<calib::Result> peak;  // of the normalised sharpness
+  std::optional<double> truth;
+};
+// The rows d1, zf, kappa, floor and bench offset. `truth` may be null.
+std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
+                                  const model::SweepTruth* truth);
+
+// Neighbouring frames of the sweep that were rejected for the same kind of reason.
+struct RejectionRun {
+  int first = 0, last = 0;  // indices into the frames
+  std::string reason;       // of the first
+  bool identical = true;    // false: the others' reasons differ in their numbers
+};
+std::vector<RejectionRun> RejectionRuns(const std::vector<calib::FrameMeasurement>& frames);
+
+// The file's own name out of a path, printable.
+std::string FrameName(const std::string& image);
+
+// A number with the digits that its error leaves meaningful: two of the error's. With an error that
+// is 0, NaN or infinite: five significant digits.
+std::string RoundedTo(double value, double sigma);
+std::string RoundedSigma(double sigma);  // two digits; "-" if 0, NaN or infinite
+std::string SignedRoundedTo(double value, double sigma);
+
+// What is printed after a calibration. `truth` may be null. Ends with a newline.
+std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
+                            const model::SweepTruth* truth);
+
+// The machine-readable summary. `status`, `reason`, `method` and the results are always there;
+// a result that does not exist, and every number that is not finite, is null. `scale_law`,
+// `covariance` and the entries of `other_methods` are there with `done: false` or null numbers if
+// they were not reached; `truth` is left out where none is known.
+//
+// With `use_source_recipe` the results are the source's, their sigma null, status and reason its
+// own; the fit's are then in `other_methods.fit`.
+nlohmann::json CalibrationJson(const calib::FocusSweep& sweep,
+                               const calib::Calibration& calibration,
+                               const model::SweepTruth* truth, bool use_source_recipe);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_CALIBRATION_SUMMARY_H_

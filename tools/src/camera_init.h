@@ -1,0 +1,35 @@
+#ifndef THICKLENS_TOOLS_CAMERA_INIT_H_
+#define THICKLENS_TOOLS_CAMERA_INIT_H_
+
+#include <optional>
+#include <string>
+
+#include "exif.h"
+#include "thicklens/model/camera.h"
+
+namespace thicklens::tools {
+
+// A camera as a person describes it; absent: not given.
+struct CameraDescription {
+  std::optional<double> front_focal_length_mm;
+  std::optional<double> rear_focal_length_mm;
+  std::optional<double> lens_thickness_mm;
+  std::optional<double> f_number;
+  std::optional<double> pixel_pitch_um;
+  std::optional<Eigen::Vector2i> size_px;
+  std::optional<Eigen::Vector2d> principal_point_px;
+  std::string transfer = "srgb";
+  std::string psf = "gaussian";
+  std::string name;
+};
+
+// The camera file's content: what is given as it is; what comes from `photo` (of the size
+// `photo_size_px`) or by default is marked assumed. Throws Error that lists what is missing and how
+// to give it.
+model::Camera DescribedCamera(const CameraDescription& description,
+                              const std::optional<PhotoExif>& photo,
+                              const std::optional<Eigen::Vector2i>& photo_size_px);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_CAMERA_INIT_H_

@@ -1,0 +1,97 @@
+#include "commands.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/core/utility.hpp>
+#include <optional>
+#include <system_error>
+
+#include "interrupt.h"
+#include "option_values.h"
+#include "svg_plot.h"
+#include "thicklens/error.h"
+#include "thicklens/model/output_file.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMaxThreads = 1024;
+
+// File names may be any bytes, JSON may not: what is no UTF-8 is replaced.
+std::string JsonText(const nlohmann::json& summary) {
+  return summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+bool SameFile(const std::string& a, const std::string& b) {
+  if (a.empty() || b.empty()) return false;
+  std::error_code failure;
+  if (fs::equivalent(a, b, failure)) return true;
+  return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal();
+}
+
+}  // namespace
+
+void AddCommonOptions(CLI::App* command, CommonOptions* options) {
+  command->add_option("--json", options->json_path, "Write the results to this file, as JSON")
+      ->type_name("FILE");
+  CLI::Option* quiet = command->add_flag("--quiet", options->quiet, "Print no results");
+  command->add_flag("--verbose", options->verbose, "Tell what is done")->excludes(quiet);
+  command->add_option("--threads", options->threads, "Threads to use; 0: one per core")
+      ->check(CLI::Range(0, kMaxThreads))
+      ->type_name("N");
+}
+
+void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command) {
+  if (options.verbose) spdlog::set_level(spdlog::level::debug);
+  cv::setNumThreads(model::ResolveThreads(options.threads));
+  std::optional<model::OutputFile> json;
+  if (!options.json_path.empty()) json.emplace(options.json_path);
+  CommandResult result;
+  try {
+    result = command();
+    ThrowIfInterrupted();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    if (json) json->Commit(JsonText({{"status", "refused"}, {"reason", error.what()}}));
+    throw;
+  }
+  if (json) {
+    json->Commit(JsonText(result.summary));
+    spdlog::debug("{} written", options.json_path);
+  }
+  if (!result.refusal.empty()) throw Error(result.refusal);
+}
+
+void PrintResult(const CommonOptions& options, const std::string& text) {
+  if (!options.quiet) std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+void TellAssumedFields(const model::Camera& camera) {
+  const std::vector<std::string> fields = model::AssumedFields(camera);
+  if (fields.empty()) return;
+  spdlog::warn("camera '{}': assumed, neither published nor measured: {}",
+               PrintableUtf8(camera.name), fmt::join(fields, ", "));
+}
+
+void RequireDistinctFiles(const std::vector<std::string>& outputs,
+                          const std::vector<std::string>& inputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (SameFile(outputs[i], outputs[j]))
+        throw UsageError(fmt::format("{}: two outputs have this name", outputs[i]));
+    }
+    for (const std::string& input : inputs) {
+      if (SameFile(outputs[i], input))
+        throw UsageError(fmt::format("{}: this input would be overwritten", outputs[i]));
+    }
+  }
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,55 @@
+#ifndef THICKLENS_TOOLS_COMMANDS_H_
+#define THICKLENS_TOOLS_COMMANDS_H_
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/camera.h"
+
+namespace thicklens::tools {
+
+// What every command takes.
+struct CommonOptions {
+  std::string json_path;  // empty: none
+  bool quiet = false;
+  bool verbose = false;
+  int threads = 0;  // 0: one per core
+};
+void AddCommonOptions(CLI::App* command, CommonOptions* options);
+
+// What a command hands back. A refusal ends the program with exit code 1, after its summary has
+// been written.
+struct CommandResult {
+  nlohmann::json summary;
+  std::string refusal;  // one line; empty: none
+};
+
+// Runs a command with its --json file claimed before and written after it; an Error is written
+// there as `status: refused` with its reason. Throws what the command throws, and Error for a
+// refusal.
+void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command);
+
+// Results go to stdout, unless --quiet.
+void PrintResult(const CommonOptions& options, const std::string& text);
+
+// Names on stderr, in one line, which numbers of the camera are somebody's assumption.
+void TellAssumedFields(const model::Camera& camera);
+
+// Throws UsageError if two outputs, or an output and an input, are the same file. Empty paths are
+// left out.
+void RequireDistinctFiles(const std::vector<std::string>& outputs,
+                          const std::vector<std::string>& inputs);
+
+// Each adds its command to the program. When the command line asks for it, `action` is set.
+using CommandAction = std::function<void()>;
+void AddSimulateCommand(CLI::App* program, CommandAction* action);
+void AddCalibrateCommand(CLI::App* program, CommandAction* action);
+void AddExplainCommand(CLI::App* program, CommandAction* action);
+void AddCameraCommand(CLI::App* program, CommandAction* action);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_COMMANDS_H_

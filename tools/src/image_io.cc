@@ -1,0 +1,90 @@
+#include "image_io.h"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "thicklens/error.h"
+#include "thicklens/model/output_file.h"
+
+namespace thicklens::tools {
+namespace {
+
+// OpenCV keeps colours as BGR; the project as RGB.
+cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
+  if (picture.channels() == 1) return picture;
+  cv::Mat swapped;
+  cv::cvtColor(picture, swapped, picture.channels() == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
+  return swapped;
+}
+
+template <typename T>
+void CopyValues(const cv::Mat& picture, std::vector<std::uint16_t>* values) {
+  for (int y = 0; y < picture.rows; ++y) {
+    const T* row = picture.ptr<T>(y);
+    values->insert(values->end(), row,
+                   row + static_cast<std::ptrdiff_t>(picture.cols) * picture.channels());
+  }
+}
+
+}  // namespace
+
+cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
+  cv::Mat picture;
+  try {
+    // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
+    // pixels as the sensor gave them.
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
+                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
+    if (!bytes.empty()) picture = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception&) {
+    picture.release();
+  }
+  if (picture.empty()) {
+    throw Error(fmt::format("{}: cannot be decoded as a picture ({} bytes)", name, bytes.size()));
+  }
+  if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
+    throw Error(
+        fmt::format("{}: a picture of 8 or 16 bits a channel is expected, found one of {} bits{}",
+                    name, 8 * picture.elemSize1(), picture.depth() >= CV_32F ? ", float" : ""));
+  }
+  const int channels = picture.channels();
+  if (channels != 1 && channels != 3 && channels != 4) {
+    throw Error(fmt::format("{}: 1, 3 or 4 channels are expected, found {}", name, channels));
+  }
+  return SwapRedAndBlue(picture);
+}
+
+cv::Mat ReadPictureFile(const std::string& path) {
+  return DecodePicture(model::ReadWholeFile(path), path);
+}
+
+model::StoredPicture ToStoredPicture(const cv::Mat& picture) {
+  model::StoredPicture stored{
+      picture.cols, picture.rows, picture.channels(), picture.depth() == CV_8U ? 8 : 16, {}};
+  stored.values.reserve(picture.total() * static_cast<std::size_t>(picture.channels()));
+  if (stored.bits == 8) {
+    CopyValues<std::uint8_t>(picture, &stored.values);
+  } else {
+    CopyValues<std::uint16_t>(picture, &stored.values);
+  }
+  return stored;
+}
+
+std::string EncodePng(const model::StoredPicture& picture) {
+  const cv::Mat wide(picture.height_px, picture.width_px, CV_16UC(picture.channels),
+                     const_cast<std::uint16_t*>(picture.values.data()));  // NOLINT: only read
+  cv::Mat values = wide;
+  if (picture.bits == 8) wide.convertTo(values, CV_8U);
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".png", SwapRedAndBlue(values), bytes, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
+    throw Error("a picture could not be encoded as PNG");
+  }
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,24 @@
+#ifndef THICKLENS_TOOLS_IMAGE_IO_H_
+#define THICKLENS_TOOLS_IMAGE_IO_H_
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "thicklens/model/scene.h"
+
+namespace thicklens::tools {
+
+// The picture in the bytes of a file, exactly as stored: 8 or 16 bit; 1, 3 (RGB) or 4 (RGBA)
+// channels; never rotated. Throws Error that begins with `name`.
+cv::Mat DecodePicture(const std::string& bytes, const std::string& name);
+cv::Mat ReadPictureFile(const std::string& path);
+
+model::StoredPicture ToStoredPicture(const cv::Mat& picture);
+
+// A PNG file of 1 or 3 channels, 8 or 16 bit. Compressed lightly: the noise of a photograph hardly
+// gets smaller, but takes much longer, by trying harder.
+std::string EncodePng(const model::StoredPicture& picture);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_IMAGE_IO_H_

@@ -1,0 +1,34 @@
+#ifndef THICKLENS_TOOLS_OPTION_VALUES_H_
+#define THICKLENS_TOOLS_OPTION_VALUES_H_
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+
+// A command line that cannot be meant: exit code 2.
+class UsageError : public Error {
+ public:
+  using Error::Error;
+};
+
+// Checks of CLI11 for numbers; unlike CLI11's own they refuse NaN and infinities.
+CLI::Validator Finite();
+CLI::Validator NonNegative();
+// lo <= value <= hi, or lo < value <= hi for lo = 0; `hint` says what is meant.
+CLI::Validator Between(double lo, double hi, const std::string& hint);
+
+// The finite numbers of a text such as "3,4,640,480". Throws UsageError that names the option, what
+// was found and `form`, e.g. "x,y,width,height".
+std::vector<double> SplitNumbers(const std::string& option, const std::string& text, char separator,
+                                 const std::string& form);
+// The same for whole numbers from 0 to 100000.
+std::vector<int> SplitPixels(const std::string& option, const std::string& text, char separator,
+                             const std::string& form);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_OPTION_VALUES_H_

@@ -1,0 +1,164 @@
+// thicklens simulate: made-up bench photographs with their truth.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "commands.h"
+#include "image_io.h"
+#include "interrupt.h"
+#include "progress_line.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/output_file.h"
+#include "thicklens/model/parallel.h"
+#include "thicklens/model/sweep_simulator.h"
+
+namespace thicklens::tools {
+namespace {
+
+// Sign of a folder that this program wrote and may replace.
+constexpr char kMarkerFile[] = "truth.yaml";
+
+struct SimulateOptions {
+  CommonOptions common;
+  std::string config_path;
+  std::string output_folder;
+  std::optional<std::int64_t> seed;
+  bool unknown_offset = false;
+};
+
+// Picture files of unknown origin are taken as sRGB, as a screen would show them.
+model::LinearPicture ReadTargetPicture(const model::TargetOptions& target) {
+  if (target.kind != model::TargetKind::kPicture) return {};
+  const model::StoredPicture stored = ToStoredPicture(ReadPictureFile(target.picture_path));
+  return model::ToGrey(model::ToLinear(stored, model::TransferCurve::Srgb()));
+}
+
+model::SweepTarget SweepTargetOf(model::TargetKind kind) {
+  switch (kind) {
+    case model::TargetKind::kPrintedEdge:
+      return model::SweepTarget::kPrintedEdge;
+    case model::TargetKind::kKnifeEdge:
+      return model::SweepTarget::kKnifeEdge;
+    default:
+      return model::SweepTarget::kTexture;
+  }
+}
+
+// The sweep as the person at the bench would describe it; paths as seen from its own folder.
+model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
+                               const model::SweepTruth& truth, bool unknown_offset) {
+  model::SweepFile sweep;
+  sweep.camera_path = "camera.yaml";
+  sweep.reading_sigma_mm = simulation.reading_sigma_mm;
+  sweep.reading_sigma_stated = true;
+  if (!unknown_offset) sweep.offset_mm = model::Estimate{simulation.bench_offset_mm, 0};
+  sweep.direction = simulation.direction;
+  sweep.target = SweepTargetOf(simulation.target.kind);
+  for (const model::SweepTruth::Frame& frame : truth.frames)
+    sweep.frames.push_back({frame.image, frame.reading_mm});
+  return sweep;
+}
+
+void RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
+                  model::OutputFolder* folder) {
+  const auto& frames = simulator.truth().frames;
+  const int count = static_cast<int>(frames.size());
+  ProgressLine progress("rendering", common.quiet);
+  std::atomic<int> done{0};
+  model::ParallelFor(count, common.threads, [&](int i) {
+    ThrowIfInterrupted();
+    const std::string png = EncodePng(simulator.RenderFrame(i));
+    folder->Write(frames[static_cast<std::size_t>(i)].image, png);
+    progress.Show(++done, count);
+  });
+}
+
+nlohmann::json Summary(const SimulateOptions& options,
+                       const model::SweepSimulationOptions& simulation,
+                       const model::SweepTruth& truth, double seconds) {
+  const auto [near, far] =
+      std::minmax_element(truth.frames.begin(), truth.frames.end(),
+                          [](const auto& a, const auto& b) { return a.depth_mm < b.depth_mm; });
+  return {{"status", "ok"},
+          {"reason", ""},
+          {"output", options.output_folder},
+          {"frames", truth.frames.size()},
+          {"width_px", simulation.camera.sensor.width_px},
+          {"height_px", simulation.camera.sensor.height_px},
+          {"bits", simulation.bits},
+          {"target", model::TargetKindName(simulation.target.kind)},
+          {"seed", simulation.seed},
+          {"nearest_depth_mm", near->depth_mm},
+          {"farthest_depth_mm", far->depth_mm},
+          {"truth",
+           {{"image_distance_mm", truth.image_distance_mm},
+            {"focus_depth_mm", truth.focus_depth_mm},
+            {"blur_ratio", truth.blur_ratio},
+            {"blur_floor_px", truth.blur_floor_px},
+            {"bench_offset_mm", truth.bench_offset_mm}}},
+          {"seconds", seconds}};
+}
+
+CommandResult SimulateSweep(const SimulateOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
+  if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
+  model::OutputFolder folder(options.output_folder, kMarkerFile);
+
+  const model::SweepSimulator simulator(simulation, ReadTargetPicture(simulation.target));
+  RenderFrames(simulator, options.common, &folder);
+  model::Camera camera = simulation.camera;
+  camera.calibration.reset();  // what a calibration of this sweep has to find
+  folder.Write("camera.yaml", model::CameraToYaml(camera));
+  folder.Write("sweep.yaml", model::SweepToYaml(DescribeSweep(simulation, simulator.truth(),
+                                                              options.unknown_offset)));
+  folder.Write(kMarkerFile, model::SweepTruthToYaml(simulator.truth()));
+  ThrowIfInterrupted();
+  folder.Commit();
+
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  CommandResult result;
+  result.summary = Summary(options, simulation, simulator.truth(), seconds.count());
+  PrintResult(options.common,
+              fmt::format("{} frames of {} x {} px in {:.1f} s: {}\n", simulation.frame_count,
+                          camera.sensor.width_px, camera.sensor.height_px, seconds.count(),
+                          options.output_folder));
+  return result;
+}
+
+}  // namespace
+
+void AddSimulateCommand(CLI::App* program, CommandAction* action) {
+  CLI::App* simulate = program->add_subcommand("simulate", "Make photographs with their truth");
+  simulate->require_subcommand(1);
+  CLI::App* command = simulate->add_subcommand(
+      "sweep",
+      "A focus sweep: frames/, camera.yaml (without calibration), sweep.yaml and truth.yaml");
+  const auto options = std::make_shared<SimulateOptions>();
+  command->add_option("config", options->config_path, "What to simulate")
+      ->required()
+      ->type_name("CONFIG");
+  command->add_option("-o,--output", options->output_folder, "Folder to write")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--seed", options->seed, "Replaces the config's seed")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
+  command->add_flag("--unknown-offset", options->unknown_offset,
+                    "Leave the bench offset out of sweep.yaml, to be found by a calibration");
+  AddCommonOptions(command, &options->common);
+  command->callback([options, action] {
+    *action = [options] { RunCommand(options->common, [&] { return SimulateSweep(*options); }); };
+  });
+}
+
+}  // namespace thicklens::tools

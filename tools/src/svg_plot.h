@@ -1,0 +1,83 @@
+#ifndef THICKLENS_TOOLS_SVG_PLOT_H_
+#define THICKLENS_TOOLS_SVG_PLOT_H_
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace thicklens::tools {
+
+// Text made safe for XML content and attributes: markup characters escaped, everything that XML 1.0
+// cannot carry (broken UTF-8, control characters) replaced by U+FFFD.
+std::string EscapeXml(const std::string& text);
+
+// The same text with every broken UTF-8 sequence and every control character replaced by U+FFFD:
+// file names may hold any byte, terminals and JSON may not.
+std::string PrintableUtf8(const std::string& text);
+
+// Round positions within [lo, hi], a step of 1, 2 or 5 times a power of ten apart, the smallest
+// such step that gives at most `at_most` of them. Empty unless lo < hi, both finite, and at_most
+// >= 1.
+std::vector<double> NiceTicks(double lo, double hi, int at_most);
+
+// A tick's label with the digits that its step needs, and a true minus sign.
+std::string TickLabel(double value, double step);
+
+// Who speaks: a colour means the same in every figure of a page.
+enum class Ink { kFit, kSource, kPeak, kData, kMuted, kTruth };
+enum class Mark { kNone, kDot, kRing, kCross, kDiamond };
+enum class Stroke { kNone, kSolid, kDashed, kDotted };
+
+// Points that are not finite are left out and break the line. Points above or below the plotted
+// range are drawn as a triangle at its edge.
+struct PlotSeries {
+  std::string label;  // in the legend; empty: not there
+  Ink ink = Ink::kData;
+  Mark mark = Mark::kDot;
+  Stroke stroke = Stroke::kNone;
+  std::vector<double> x, y;
+  std::vector<double> y_error;     // half lengths of the error bars; empty: none
+  std::vector<std::string> names;  // of the points, shown when pointed at; empty: none
+};
+
+// A line across the whole plot. One far outside the data is left out, and the legend says so.
+struct PlotLine {
+  std::string label;
+  Ink ink = Ink::kFit;
+  Stroke stroke = Stroke::kSolid;
+  bool vertical = true;
+  double position = 0;
+};
+
+// A word below a point, kept inside the plot.
+struct PlotNote {
+  std::string text;
+  double x = 0, y = 0;
+};
+
+struct PlotAxis {
+  std::string label;                               // with its unit
+  std::optional<std::pair<double, double>> range;  // absent: from the data
+};
+
+struct Plot {
+  std::string id;     // unique on the page; letters, digits and '-'
+  std::string title;  // for readers who cannot see the figure
+  PlotAxis x_axis, y_axis;
+  std::vector<PlotSeries> series;
+  std::vector<PlotLine> lines;
+  std::vector<PlotNote> notes;
+  int width_px = 860;
+  int height_px = 320;
+};
+
+// An <svg> element to be put into an HTML page that has the style below.
+std::string SvgPlot(const Plot& plot);
+
+// The style rules of every plot, light and dark.
+std::string SvgPlotStyle();
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_SVG_PLOT_H_

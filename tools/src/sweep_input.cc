@@ -1,0 +1,153 @@
+#include "sweep_input.h"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "option_values.h"
+#include "thicklens/error.h"
+#include "thicklens/model/camera_file.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kSweepName[] = "sweep.yaml";
+constexpr char kTruthName[] = "truth.yaml";
+constexpr char kUnknown[] = "unknown";
+
+// The file that describes the sweep; empty for a folder with a table of readings.
+std::string SweepYamlOf(const SweepArguments& arguments) {
+  std::error_code failure;
+  if (!fs::is_directory(arguments.input, failure)) {
+    if (!arguments.readings_csv.empty()) {
+      throw UsageError(
+          fmt::format("--readings goes with a folder of frames; {} is none", arguments.input));
+    }
+    return arguments.input;
+  }
+  if (!arguments.readings_csv.empty()) return "";
+  const fs::path inside = fs::path(arguments.input) / kSweepName;
+  if (fs::exists(inside, failure)) return inside.string();
+  throw UsageError(fmt::format(
+      "{}: a folder without {} needs --readings (a table of file and reading) and --camera",
+      arguments.input, kSweepName));
+}
+
+model::SweepFile ReadFile(const SweepArguments& arguments, std::vector<std::string>* notices) {
+  const std::string yaml = SweepYamlOf(arguments);
+  if (!yaml.empty()) {
+    model::SweepFile file = model::ReadSweep(yaml, notices);
+    if (!arguments.camera_path.empty()) file.camera_path = arguments.camera_path;
+    return file;
+  }
+  if (arguments.camera_path.empty()) {
+    throw UsageError(
+        fmt::format("{}: a folder with --readings also needs --camera (see thicklens "
+                    "camera init)",
+                    arguments.input));
+  }
+  return model::SweepFromFolder(arguments.input, arguments.readings_csv, arguments.camera_path,
+                                notices);
+}
+
+void TakeOffset(const SweepArguments& arguments, model::SweepFile* file) {
+  if (arguments.offset_mm == kUnknown) {
+    if (arguments.offset_sigma_mm)
+      throw UsageError("--offset-sigma-mm: an unknown offset has no sigma");
+    file->offset_mm.reset();
+    return;
+  }
+  if (!arguments.offset_mm.empty()) {
+    const auto numbers =
+        SplitNumbers("--offset-mm", arguments.offset_mm, ':', "a number or 'unknown'");
+    if (numbers.size() != 1) {
+      throw UsageError(fmt::format("--offset-mm: a number or 'unknown' is expected, found '{}'",
+                                   arguments.offset_mm));
+    }
+    file->offset_mm = model::Estimate{numbers[0], 0};
+  }
+  if (!arguments.offset_sigma_mm) return;
+  if (!file->offset_mm)
+    throw UsageError("--offset-sigma-mm: the offset itself is missing, give --offset-mm");
+  file->offset_mm->sigma = *arguments.offset_sigma_mm;
+}
+
+void TakeFloor(const std::string& text, model::SweepFile* file) {
+  if (text.empty()) return;
+  file->floor = {};
+  if (text == kUnknown) return;
+  const std::string form = "VALUE, VALUE:SIGMA or 'unknown'";
+  const auto numbers = SplitNumbers("--floor-px", text, ':', form);
+  const bool in_range = numbers[0] >= 0 && (numbers.size() < 2 || numbers[1] >= 0);
+  if (numbers.size() > 2 || !in_range) {
+    throw UsageError(fmt::format("--floor-px: {} is expected, >= 0, found '{}'", form, text));
+  }
+  file->floor.given_px = model::Estimate{numbers[0], numbers.size() > 1 ? numbers[1] : 0};
+}
+
+void TakeRoi(const std::string& text, model::SweepFile* file) {
+  if (text.empty()) return;
+  const auto px = SplitPixels("--roi", text, ',', "x,y,width,height");
+  if (px.size() != 4 || px[2] < 1 || px[3] < 1) {
+    throw UsageError(fmt::format(
+        "--roi: x,y,width,height with width and height above 0 are expected, found '{}'", text));
+  }
+  file->roi = {px[0], px[1], px[2], px[3]};
+}
+
+// Direction and target have been checked to be one of the names when the command line was read.
+void TakeArguments(const SweepArguments& arguments, model::SweepFile* file) {
+  TakeOffset(arguments, file);
+  TakeFloor(arguments.floor_px, file);
+  TakeRoi(arguments.roi, file);
+  if (arguments.reading_sigma_mm) {
+    file->reading_sigma_mm = *arguments.reading_sigma_mm;
+    file->reading_sigma_stated = true;
+  }
+  for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
+    if (arguments.direction == model::BenchDirectionName(direction)) file->direction = direction;
+  }
+  for (const auto target : {model::SweepTarget::kAuto, model::SweepTarget::kTexture,
+                            model::SweepTarget::kPrintedEdge, model::SweepTarget::kKnifeEdge}) {
+    if (arguments.target == model::SweepTargetName(target)) file->target = target;
+  }
+}
+
+// A file that merely happens to be called truth.yaml shall not stop a calibration.
+std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
+                                           const std::string& sweep_yaml,
+                                           std::vector<std::string>* notices) {
+  if (!arguments.truth_path.empty()) return model::ReadSweepTruth(arguments.truth_path);
+  if (sweep_yaml.empty()) return std::nullopt;
+  const fs::path beside = fs::path(sweep_yaml).parent_path() / kTruthName;
+  std::error_code failure;
+  if (!fs::is_regular_file(beside, failure)) return std::nullopt;
+  try {
+    return model::ReadSweepTruth(beside.string());
+  } catch (const Error& error) {
+    notices->push_back(fmt::format("not used as the truth: {}", error.what()));
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> SweepArguments::Files() const { return {input, readings_csv, truth_path}; }
+
+SweepInput ReadSweepInput(const SweepArguments& arguments) {
+  SweepInput input;
+  input.file = ReadFile(arguments, &input.notices);
+  TakeArguments(arguments, &input.file);
+  input.truth = ReadTruth(arguments, SweepYamlOf(arguments), &input.notices);
+  input.sweep = calib::MakeFocusSweep(input.file, model::ReadCamera(input.file.camera_path));
+  input.frame_files = std::make_shared<FrameFiles>(input.file.frames);
+  input.sweep.read_frame = [files = input.frame_files](std::size_t i) { return files->Read(i); };
+  return input;
+}
+
+}  // namespace thicklens::tools

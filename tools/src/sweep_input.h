@@ -1,0 +1,47 @@
+#ifndef THICKLENS_TOOLS_SWEEP_INPUT_H_
+#define THICKLENS_TOOLS_SWEEP_INPUT_H_
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "frame_files.h"
+#include "thicklens/calib/focus_sweep.h"
+#include "thicklens/model/sweep_file.h"
+
+namespace thicklens::tools {
+
+// A sweep as the command line names it. Texts are as typed; empty: not given.
+struct SweepArguments {
+  std::string input;  // SWEEP.yaml, or a folder with `readings_csv`
+  std::string readings_csv;
+  std::string camera_path;
+  std::string truth_path;
+  std::string offset_mm;  // a number or "unknown"
+  std::optional<double> offset_sigma_mm;
+  std::string direction;
+  std::optional<double> reading_sigma_mm;
+  std::string floor_px;  // VALUE, VALUE:SIGMA or "unknown"
+  std::string target;
+  std::string roi;  // x,y,width,height
+
+  // Files that no output may replace.
+  std::vector<std::string> Files() const;
+};
+
+struct SweepInput {
+  model::SweepFile file;  // with what the command line says
+  calib::FocusSweep sweep;
+  std::shared_ptr<FrameFiles> frame_files;
+  std::optional<model::SweepTruth> truth;  // --truth, or truth.yaml beside the sweep's file
+  std::vector<std::string> notices;        // one line each
+};
+
+// Reads the sweep's and the camera's file; of the frames only whether they exist. Throws Error, and
+// UsageError for arguments that cannot be meant.
+SweepInput ReadSweepInput(const SweepArguments& arguments);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_SWEEP_INPUT_H_

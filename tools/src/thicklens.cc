@@ -1,0 +1,91 @@
+// The program: finds the command that is asked for, runs it, and tells a failure in one line.
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <string>
+
+#include "build_info.h"
+#include "commands.h"
+#include "interrupt.h"
+#include "option_values.h"
+#include "thicklens/error.h"
+
+namespace {
+
+using namespace thicklens;
+
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2 };
+
+void SetUpMessages() {
+  // Libraries keep still: what goes wrong is told by whoever asked them, with the file's name.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("thicklens"));
+  spdlog::set_pattern("thicklens: %l: %v");
+}
+
+int Fail(std::string message, ExitCode code) {
+  while (!message.empty() && message.back() == '\n') message.pop_back();
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  spdlog::error("{}", message);
+  return code;
+}
+
+int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc, char** argv) {
+  try {
+    program->parse(argc, argv);
+  } catch (const CLI::Success& asked_for) {  // --help, --version
+    return program->exit(asked_for);
+  } catch (const CLI::ParseError& error) {
+    return Fail(fmt::format("{} (see --help)", error.what()), kUsage);
+  }
+  (*action)();
+  // Results that did not reach their file are a failure; a reader who went away is none.
+  errno = 0;
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    if (errno != EPIPE) {
+      throw Error(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
+    }
+  }
+  return kDone;
+}
+
+int Main(int argc, char** argv) {
+  SetUpMessages();
+  tools::CatchSignals();
+  CLI::App program("Thick-lens camera calibration from focus sweeps", "thicklens");
+  program.set_version_flag("--version", tools::BuildInfo(), "Version, and what it was built with");
+  program.require_subcommand(1);
+  tools::CommandAction action;
+  tools::AddSimulateCommand(&program, &action);
+  tools::AddCalibrateCommand(&program, &action);
+  tools::AddExplainCommand(&program, &action);
+  tools::AddCameraCommand(&program, &action);
+  return ParseAndRun(&program, &action, argc, argv);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return Main(argc, argv);
+  } catch (const tools::UsageError& error) {
+    return Fail(error.what(), kUsage);
+  } catch (const std::bad_alloc&) {
+    return Fail("out of memory", kFailed);
+  } catch (const cv::Exception& error) {
+    // OpenCV says it this way, too, when memory is short.
+    return Fail(error.code == cv::Error::StsNoMem ? "out of memory" : error.what(), kFailed);
+  } catch (const std::exception& error) {
+    return Fail(error.what(), kFailed);
+  }
+}
