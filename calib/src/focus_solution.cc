@@ -18,6 +18,7 @@ constexpr double kAbsoluteRatioError = 0.015;
 constexpr double kRelativeRatioError = 0.05;
 // Weight of the robust loss below which a frame is told: six standard deviations off.
 constexpr double kOutlierWeight = 0.15;
+constexpr std::size_t kFewestOnASide = 8;
 constexpr double kSmallestRatio = 0.1, kLargestRatio = 1.0;
 
 // What may be assumed of the variance at focus: a value, or only an interval.
@@ -246,6 +247,7 @@ class Solution {
         ratio = {std::min(ratio.x(), fit.values[1]), std::max(ratio.y(), fit.values[1])};
       }
     }
+    IncludeSides(&focus, &ratio);
     const double meter = absolute_ ? kAbsoluteRatioError : kRelativeRatioError;
     result_.blur_ratio->systematic =
         Eigen::Vector2d(ratio.x() * (1 - meter), ratio.y() * (1 + meter));
@@ -254,6 +256,38 @@ class Solution {
     result_.image_distance_mm->systematic =
         Eigen::Vector2d(model::ImageDistanceMm(setup_.lens, focus.y()),
                         model::ImageDistanceMm(setup_.lens, focus.x()));
+  }
+
+  // Each side of focus alone. A real lens (spherical aberration, a target that fills the field on
+  // one side only) may follow two laws; where the sides disagree by more than their errors, both
+  // are inside the interval.
+  void IncludeSides(Eigen::Vector2d* focus, Eigen::Vector2d* ratio) {
+    const double zf = result_.focus_depth_mm->value;
+    std::vector<BlurSample> near, far;
+    for (const BlurSample& sample : samples_) {
+      const FrameMeasurement& frame = result_.frames[sample.frame];
+      if (frame.blur_fit_weight < kOutlierWeight) continue;
+      (frame.depth_mm < zf ? near : far).push_back(sample);
+    }
+    if (near.size() < kFewestOnASide || far.size() < kFewestOnASide) return;
+    BlurFitSetup held = setup_;
+    held.target_softness = false;  // one side alone cannot tell it from the floor
+    held.offset_mm.sigma = 0;      // moves both sides alike
+    const BlurFitResult nearer = FitBlur(near, held);
+    const BlurFitResult farther = FitBlur(far, held);
+    if (!nearer.done || !farther.done) return;
+    const double apart_mm = std::abs(nearer.values[0] - farther.values[0]);
+    const double sigma_mm = std::sqrt(nearer.covariance(0, 0) + farther.covariance(0, 0));
+    if (!(apart_mm > 3 * sigma_mm)) return;
+    result_.warnings.push_back(fmt::format(
+        "the two sides of focus disagree: the nearer frames alone give {:.2f} +- {:.2f} mm, "
+        "the farther ones {:.2f} +- {:.2f} mm",
+        nearer.values[0], std::sqrt(nearer.covariance(0, 0)), farther.values[0],
+        std::sqrt(farther.covariance(0, 0))));
+    for (const BlurFitResult* side : {&nearer, &farther}) {
+      *focus = {std::min(focus->x(), side->values[0]), std::max(focus->y(), side->values[0])};
+      *ratio = {std::min(ratio->x(), side->values[1]), std::max(ratio->y(), side->values[1])};
+    }
   }
 
   void FillFloor(const FloorChoice& choice, const BlurFitResult& fit) {

@@ -88,13 +88,11 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
   return files;
 }
 
-// Brings table rows and picture files together by name. Each row must have its file; files without
-// a row are told in `notices`.
+// Brings table rows and picture files together by name; each must have its partner.
 std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
                                          const std::string& table,
                                          const std::vector<std::string>& files,
-                                         const std::string& folder, double mm_per_unit,
-                                         std::vector<std::string>* notices) {
+                                         const std::string& folder, double mm_per_unit) {
   std::vector<SweepFrame> frames;
   std::set<std::string> used;
   for (const ReadingRow& row : rows) {
@@ -126,10 +124,12 @@ std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
   for (const std::string& file : files) {
     if (used.count(fs::path(file).lexically_normal().string()) == 0) without_row.push_back(file);
   }
-  if (!without_row.empty() && notices != nullptr) {
-    notices->push_back(fmt::format("{}: has no row in {} and is not used ({} such file{})",
-                                   without_row.front(), table, without_row.size(),
-                                   without_row.size() == 1 ? "" : "s"));
+  // A picture that was left out by mistake costs more than one that has to be moved away.
+  if (!without_row.empty()) {
+    throw Error(fmt::format(
+        "{}: has no row in {} ({} such file{}): add its reading, move it elsewhere, or "
+        "choose the files by frames_glob",
+        without_row.front(), table, without_row.size(), without_row.size() == 1 ? "" : "s"));
   }
   return frames;
 }
@@ -189,8 +189,7 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   }
 }
 
-void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep,
-                std::vector<std::string>* notices) {
+void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep) {
   if (root.Has("frames") == root.Has("frames_csv")) {
     throw root.ErrorHere(
         "either 'frames' (a list of image and reading_mm) or 'frames_csv' (a table) is expected");
@@ -207,8 +206,7 @@ void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep,
     } else {
       files = PicturesIn(folder.empty() ? "." : folder);
     }
-    sweep->frames =
-        JoinRowsAndFiles(ReadReadingsTable(csv), csv, files, folder, mm_per_unit, notices);
+    sweep->frames = JoinRowsAndFiles(ReadReadingsTable(csv), csv, files, folder, mm_per_unit);
     return;
   }
   for (const char* key : {"frames_dir", "frames_glob"}) {
@@ -243,7 +241,10 @@ void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notic
                                    readings.size() - distinct.size()));
   }
   if (!sweep.reading_sigma_stated) {
-    notices->push_back("reading_sigma_mm is not stated: the readings are taken as exact");
+    notices->push_back(
+        "reading_sigma_mm is not stated: the scatter about the law of image scale stands for it, "
+        "or 0 where "
+        "there is none");
   }
 }
 
@@ -310,7 +311,7 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
     sweep.roi = {numbers[0].Integer(0, kMax), numbers[1].Integer(0, kMax),
                  numbers[2].Integer(1, kMax), numbers[3].Integer(1, kMax)};
   }
-  ReadFrames(root, mm_per_unit, &sweep, notices);
+  ReadFrames(root, mm_per_unit, &sweep);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }
@@ -321,7 +322,7 @@ SweepFile SweepFromFolder(const std::string& folder, const std::string& readings
   sweep.source = folder;
   sweep.camera_path = camera_path;
   sweep.frames = JoinRowsAndFiles(ReadReadingsTable(readings_csv), readings_csv, PicturesIn(folder),
-                                  folder, 1, notices);
+                                  folder, 1);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }

@@ -115,11 +115,9 @@ TEST_F(SweepFolder, TableErrorsNameTheLine) {
   EXPECT_THAT(ErrorWith("frames_csv: none.csv\n"), HasSubstr("none.csv"));
 }
 
-TEST_F(SweepFolder, FilesWithoutARowAreTold) {
-  const SweepFile sweep = ReadTable("b.png,1\n", "reading_sigma_mm: 0\n");
-  EXPECT_THAT(sweep.frames, SizeIs(1));
-  EXPECT_THAT(notices_,
-              ElementsAre(AllOf(HasSubstr("a.png"), HasSubstr("no row"), HasSubstr("2 such"))));
+TEST_F(SweepFolder, FilesWithoutARowAreNamed) {
+  EXPECT_THAT(ErrorOfTable("b.png,1\n"),
+              AllOf(HasSubstr("a.png"), HasSubstr("no row"), HasSubstr("2 such")));
   // Neither hidden files nor files that are no pictures.
   folder_.Put("._a.png");
   folder_.Put("notes.txt");
@@ -158,7 +156,7 @@ TEST_F(SweepFolder, SameNameInTwoFoldersIsAskedBack) {
   folder_.Put("bench/r.csv", "x.png,2\n");
   EXPECT_THAT(ErrorWith("frames_csv: bench/r.csv\n"),
               AllOf(HasSubstr("r.csv:1: "), HasSubstr("one/x.png"), HasSubstr("two/x.png")));
-  folder_.Put("bench/r.csv", "two/x.png,2\n");
+  folder_.Put("bench/r.csv", "two/x.png,2\none/x.png,3\n");
   EXPECT_EQ(Read("frames_csv: bench/r.csv\n").frames.at(0).image, folder_ / "bench/two/x.png");
 }
 

@@ -351,17 +351,10 @@ TEST_F(ProgramTest, NamesARowWithoutFile) {
   EXPECT_THAT(FolderFailure(), AllOf(HasSubstr("positions.csv:8"), HasSubstr("frame_006.png")));
 }
 
-// A photograph more is no reason to stop, but to be told.
-TEST_F(ProgramTest, TellsAFileWithoutRow) {
-  const std::string table = CopyAsFolderWithTable();
-  const std::string sweep = folder_ / "sweep";
+TEST_F(ProgramTest, NamesAFileWithoutRow) {
+  CopyAsFolderWithTable();
   folder_.Put("sweep/frames/more.png", GreyPng(160, 160));
-  const ProgramResult result = Run(
-      {"calibrate", sweep, "--readings", table, "--camera", sweep + "/camera.yaml", "--dry-run"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(LinesOf(result.err), Contains(AllOf(StartsWith("thicklens: warning: "),
-                                                  HasSubstr("more.png"), HasSubstr("no row"))));
-  EXPECT_THAT(result.out, HasSubstr("11, the first"));
+  EXPECT_THAT(FolderFailure(), AllOf(HasSubstr("more.png"), HasSubstr("no row")));
 }
 
 TEST_F(ProgramTest, NamesADuplicateRow) {
