@@ -16,6 +16,9 @@ namespace {
 constexpr int kFewestSamples = 5;
 constexpr double kMaxAnisotropy = 0.015;
 constexpr double kMinCorrelation = 0.6;
+// What a registration may be wrong by from one end of a sweep to the other and still look straight:
+// measured on simulated sweeps, whose scales are known.
+constexpr double kScaleBias = 3e-4;
 
 struct Law {
   double offset_mm = 0;
@@ -207,8 +210,9 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
   }
   result.reading_rms_mm = std::sqrt(sum / std::max(1, result.frames_used));
   result.offset_mm.value = law.offset_mm;
-  result.offset_mm.sigma =
-      std::max(std::sqrt(covariance(0, 0)), JackknifeSigma(samples, sign, sigma_mm, law));
+  result.offset_mm.sigma = std::hypot(
+      std::max(std::sqrt(covariance(0, 0)), JackknifeSigma(samples, sign, sigma_mm, law)),
+      law.reference_depth_mm * kScaleBias / std::abs(change));
   result.reference_depth_mm = law.reference_depth_mm;
   result.done = true;
   result.message = "converged";

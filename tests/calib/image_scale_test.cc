@@ -1,0 +1,155 @@
+#include "thicklens/calib/image_scale.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "simulated_sweep.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::HasSubstr;
+using model::BenchDirection;
+using thicklens::testing::SweepCase;
+
+cv::Mat Frame(std::uint64_t seed, double depth_mm, double drift_sigma_px) {
+  model::SweepSimulationOptions options = SweepCase("iii", 256, seed);
+  options.drift_sigma_px = drift_sigma_px;
+  options.frame_count = 1;
+  options.first_depth_mm = depth_mm;
+  const auto one = thicklens::testing::Simulate(options);
+  return LinearGrey((*one.stored)[0], one.sweep, 0);
+}
+
+TEST(RegisterScale, FindsTheScaleOfARenderedFrame) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const cv::Mat reference = Frame(seed, 400, 0);
+    for (const double depth_mm : {360.0, 380.0, 396.0, 404.0, 425.0, 450.0}) {
+      const double truth = 400 / depth_mm;
+      // Started 1 % off, and with the target moved sideways.
+      const auto scale = RegisterScale(reference, Frame(seed, depth_mm, 1.5), truth * 1.01);
+      ASSERT_TRUE(scale) << depth_mm;
+      EXPECT_NEAR(*scale, truth, 1e-3) << depth_mm << " mm";
+    }
+  }
+}
+
+TEST(RegisterScale, ALampThatChangesDoesNotMatter) {
+  const cv::Mat reference = Frame(3, 400, 0);
+  const auto scale = RegisterScale(reference, 0.4 * Frame(3, 420, 0) + 0.05, 400.0 / 420);
+  ASSERT_TRUE(scale);
+  EXPECT_NEAR(*scale, 400.0 / 420, 1e-3);
+}
+
+TEST(RegisterScale, RejectsAnUnrelatedPicture) {
+  for (std::uint64_t seed = 10; seed < 16; ++seed)
+    EXPECT_FALSE(RegisterScale(Frame(seed, 400, 0), Frame(seed + 100, 410, 0), 0.98)) << seed;
+}
+
+TEST(RegisterScale, RejectsAPictureStretchedOneWay) {
+  const cv::Mat reference = Frame(4, 400, 0);
+  cv::Mat stretched;
+  cv::warpAffine(reference, stretched, cv::Matx23d(1.04, 0, -5, 0, 1, 0), reference.size(),
+                 cv::INTER_CUBIC, cv::BORDER_REFLECT);
+  EXPECT_FALSE(RegisterScale(reference, stretched, 1.02));
+}
+
+// 1/scale = (offset + sign reading)/z_reference, with errors of the readings.
+std::vector<ScaleSample> Samples(double offset_mm, BenchDirection direction, int count,
+                                 double reading_sigma_mm, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 1);
+  const double sign = model::DirectionSign(direction);
+  std::vector<ScaleSample> samples;
+  for (int i = 0; i < count; ++i) {
+    const double depth_mm = 340 + 120.0 * i / (count - 1);
+    const double reading_mm = sign * (depth_mm - offset_mm);
+    samples.push_back(
+        {static_cast<std::size_t>(i), reading_mm + reading_sigma_mm * noise(random), 400 / depth_mm});
+  }
+  return samples;
+}
+
+TEST(FitScaleLaw, IsExactOnExactSamplesInBothDirections) {
+  for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
+    for (const double offset_mm : {-37.5, 0.0, 106.5}) {
+      const ScaleLaw law = FitScaleLaw(Samples(offset_mm, direction, 21, 0, 1), 10, 0, direction);
+      ASSERT_TRUE(law.done) << law.message;
+      EXPECT_NEAR(law.offset_mm.value, offset_mm, 1e-9);
+      EXPECT_NEAR(law.reference_depth_mm, 400, 1e-9);
+      EXPECT_EQ(law.frames_used, 21);
+      EXPECT_LT(law.reading_rms_mm, 1e-9);
+    }
+  }
+}
+
+TEST(FitScaleLaw, SigmaCoversTheScatter) {
+  constexpr int kRuns = 200;
+  double sum = 0, squares = 0, stated = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const ScaleLaw law =
+        FitScaleLaw(Samples(20, BenchDirection::kAway, 31, 0.07, 50U + static_cast<unsigned>(run)),
+                    15, 0.07, BenchDirection::kAway);
+    ASSERT_TRUE(law.done);
+    sum += (law.offset_mm.value - 20) / kRuns;
+    squares += std::pow(law.offset_mm.value - 20, 2) / kRuns;
+    stated += law.offset_mm.sigma / kRuns;
+  }
+  const double scatter_mm = std::sqrt(squares - sum * sum);
+  if (std::getenv("MEASURE")) printf("SCALE scatter %.4f stated %.4f mean %.4f\n", scatter_mm, stated, sum);
+  EXPECT_LT(std::abs(sum), 3 * scatter_mm / std::sqrt(kRuns));
+  EXPECT_GT(stated, 0.8 * scatter_mm);
+  EXPECT_LT(stated, 2 * scatter_mm);
+}
+
+TEST(FitScaleLaw, AFewWrongReadingsDoNotMoveIt) {
+  auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 9);
+  const ScaleLaw clean = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+  samples[3].reading_mm += 10;
+  samples[27].reading_mm -= 15;
+  std::swap(samples[10].reading_mm, samples[14].reading_mm);
+  const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+  ASSERT_TRUE(law.done);
+  if (std::getenv("MEASURE")) printf("SCALE outl %.4f clean %.4f sig %.4f\n", law.offset_mm.value, clean.offset_mm.value, clean.offset_mm.sigma);
+  EXPECT_NEAR(law.offset_mm.value, clean.offset_mm.value, clean.offset_mm.sigma);
+  EXPECT_EQ(law.frames_used, 27);
+}
+
+TEST(FitScaleLaw, RefusesAConstantScale) {
+  auto samples = Samples(0, BenchDirection::kAway, 21, 0, 1);
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise(1, 2e-5);
+  for (ScaleSample& s : samples) s.scale = noise(random);
+  const ScaleLaw law = FitScaleLaw(samples, 10, 0.05, BenchDirection::kAway);
+  EXPECT_FALSE(law.done);
+  EXPECT_THAT(law.message, HasSubstr("does not change with the reading"));
+}
+
+TEST(FitScaleLaw, RefusesAReversedScaleAndNamesTheDirection) {
+  const ScaleLaw away =
+      FitScaleLaw(Samples(700, BenchDirection::kToward, 21, 0.05, 1), 10, 0.05, BenchDirection::kAway);
+  EXPECT_FALSE(away.done);
+  EXPECT_THAT(away.message, HasSubstr("direction must be 'toward', not 'away'"));
+  const ScaleLaw toward =
+      FitScaleLaw(Samples(0, BenchDirection::kAway, 21, 0.05, 1), 10, 0.05, BenchDirection::kToward);
+  EXPECT_FALSE(toward.done);
+  EXPECT_THAT(toward.message, HasSubstr("direction must be 'away', not 'toward'"));
+}
+
+TEST(FitScaleLaw, RefusesFewerThanFive) {
+  const ScaleLaw law =
+      FitScaleLaw(Samples(0, BenchDirection::kAway, 4, 0, 1), 2, 0.05, BenchDirection::kAway);
+  EXPECT_FALSE(law.done);
+  EXPECT_THAT(law.message, HasSubstr("measured on 4 frames, 5 are needed"));
+  EXPECT_TRUE(
+      FitScaleLaw(Samples(0, BenchDirection::kAway, 5, 0, 1), 2, 0.05, BenchDirection::kAway).done);
+}
+
+}  // namespace
+}  // namespace thicklens::calib
