@@ -1,0 +1,75 @@
+// Where a calibration's time goes: one frame of 512 x 512 px through each of its steps.
+#include <benchmark/benchmark.h>
+
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "thicklens/calib/edge_blur.h"
+#include "thicklens/calib/image_scale.h"
+#include "thicklens/calib/sharpness.h"
+#include "thicklens/model/sweep_simulator.h"
+
+namespace thicklens {
+namespace {
+
+// A macro sweep of dead leaves: frame 0 defocused by 8 px, frame 15 in focus.
+const model::SweepSimulator& Bench() {
+  static const model::SweepSimulator simulator = [] {
+    model::SweepSimulationOptions options = model::ReadSweepSimulation(
+        std::string(THICKLENS_SOURCE_DIR) + "/configs/sweeps/case-ii.yaml");
+    options.camera.sensor.width_px = 512;
+    options.camera.sensor.height_px = 512;
+    options.camera.sensor.principal_point_px = {255.5, 255.5};
+    return model::SweepSimulator(options, {});
+  }();
+  return simulator;
+}
+
+cv::Mat Frame(int index) {
+  const model::LinearPicture picture = Bench().RenderNoiseless(index);
+  return cv::Mat(picture.height_px, picture.width_px, CV_32F,
+                 const_cast<float*>(picture.values.data()))
+      .clone();
+}
+
+void RenderFrame(benchmark::State& state) {
+  Bench();
+  for (auto _ : state) benchmark::DoNotOptimize(Bench().RenderFrame(0));
+}
+BENCHMARK(RenderFrame)->Unit(benchmark::kMillisecond);
+
+void SharpnessIndex(benchmark::State& state) {
+  const cv::Mat frame = Frame(15);
+  calib::SharpnessOptions options;
+  options.edge_threshold = 0.01;
+  for (auto _ : state) benchmark::DoNotOptimize(calib::MeanEdgeSlope(frame, options));
+}
+BENCHMARK(SharpnessIndex)->Unit(benchmark::kMillisecond);
+
+void EdgeBlurAlone(benchmark::State& state) {
+  const cv::Mat frame = Frame(15);
+  for (auto _ : state) benchmark::DoNotOptimize(calib::MeasureEdgeVariance(frame));
+}
+BENCHMARK(EdgeBlurAlone)->Unit(benchmark::kMillisecond);
+
+void EdgeBlurAgainstReference(benchmark::State& state) {
+  const cv::Mat reference = Frame(15);
+  const cv::Mat frame = Frame(static_cast<int>(state.range(0)));
+  const double scale = Bench().truth().frames[15].depth_mm /
+                       Bench().truth().frames[static_cast<std::size_t>(state.range(0))].depth_mm;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(calib::MeasureAddedVariance(reference, frame, scale, {255.5, 255.5},
+                                                         0.005, model::Psf::kGaussian));
+  }
+}
+BENCHMARK(EdgeBlurAgainstReference)->Arg(5)->Arg(13)->Unit(benchmark::kMillisecond);
+
+void RegisterFrame(benchmark::State& state) {
+  const cv::Mat reference = Frame(15);
+  const cv::Mat frame = Frame(10);
+  for (auto _ : state) benchmark::DoNotOptimize(calib::RegisterScale(reference, frame, 1.01));
+}
+BENCHMARK(RegisterFrame)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace thicklens
