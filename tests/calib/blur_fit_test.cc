@@ -13,8 +13,8 @@
 namespace thicklens::calib {
 namespace {
 
-using ::testing::HasSubstr;
 using model::BenchDirection;
+using ::testing::HasSubstr;
 
 constexpr double kFocusMm = 400, kRatio = 0.45, kFloorPx2 = 0.25, kPitchMm = 0.006;
 constexpr double kPixelBoxPx2 = 1.0 / 12;
@@ -64,15 +64,14 @@ std::vector<BlurSample> Samples(const Bench& bench, unsigned seed) {
   return samples;
 }
 
-BlurFitSetup Setup(const Bench& bench) {
+BlurFitSetup SetupFor(const Bench& bench) {
   BlurFitSetup setup;
   setup.lens = Lens();
   setup.pixel_pitch_mm = kPitchMm;
   setup.offset_mm = {kOffsetMm, 0};
   setup.direction = bench.direction;
   setup.reading_sigma_mm = bench.reading_sigma_mm;
-  setup.reference_reading_mm =
-      model::DirectionSign(bench.direction) * (kReferenceMm - kOffsetMm);
+  setup.reference_reading_mm = model::DirectionSign(bench.direction) * (kReferenceMm - kOffsetMm);
   setup.start_focus_depth_mm = 385;
   return setup;
 }
@@ -94,7 +93,7 @@ TEST(BlurFit, ExactAbsoluteSamplesGiveTheTruth) {
   for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
     Bench bench;
     bench.direction = direction;
-    const BlurFitResult fit = FitBlur(Samples(bench, 1), Setup(bench));
+    const BlurFitResult fit = FitBlur(Samples(bench, 1), SetupFor(bench));
     ExpectTruth(fit);
     EXPECT_LT(fit.chi2_per_dof, 1e-8);
     for (const double weight : fit.weights) EXPECT_NEAR(weight, 1, 1e-6);
@@ -104,7 +103,7 @@ TEST(BlurFit, ExactAbsoluteSamplesGiveTheTruth) {
 TEST(BlurFit, ExactRelativeSamplesGiveTheTruthWithTheFloor) {
   Bench bench;
   bench.relative = true;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), WithFloor(Setup(bench), 0));
+  const BlurFitResult fit = FitBlur(Samples(bench, 1), WithFloor(SetupFor(bench), 0));
   ExpectTruth(fit);
   // What was relative comes back absolute.
   for (std::size_t i = 0; i < fit.variances_px2.size(); ++i)
@@ -114,7 +113,7 @@ TEST(BlurFit, ExactRelativeSamplesGiveTheTruthWithTheFloor) {
 TEST(BlurFit, ExactSamplesOfASoftTargetGiveItsSoftness) {
   Bench bench;
   bench.softness_px2 = 0.6;
-  BlurFitSetup setup = WithFloor(Setup(bench), 0);
+  BlurFitSetup setup = WithFloor(SetupFor(bench), 0);
   setup.target_softness = true;
   const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
   ExpectTruth(fit);
@@ -126,7 +125,7 @@ TEST(BlurFit, AWrongFloorShiftsTheFocusAsDerived) {
   // dkappa/kappa = dS0/(2 A uf^2), to first order.
   Bench bench;
   bench.relative = true;
-  BlurFitSetup setup = WithFloor(Setup(bench), 0);
+  BlurFitSetup setup = WithFloor(SetupFor(bench), 0);
   const double step_px2 = 0.02;
   setup.floor_variance_px2->value += step_px2;
   const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
@@ -142,7 +141,7 @@ TEST(BlurFit, AWrongFloorShiftsTheFocusAsDerived) {
 
 TEST(BlurFit, AHeldFloorStaysAndHasNoRow) {
   const Bench bench;
-  BlurFitSetup setup = WithFloor(Setup(bench), 0);
+  BlurFitSetup setup = WithFloor(SetupFor(bench), 0);
   setup.floor_variance_px2->value = 0.31;
   const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
   ASSERT_TRUE(fit.done);
@@ -181,7 +180,14 @@ Spread Scatter(const Bench& bench, const BlurFitSetup& setup, int runs) {
   spread.scatter = covariance.diagonal().cwiseSqrt();
   spread.stated = spread.stated.cwiseSqrt();
   spread.correlation = covariance(0, 1) / (spread.scatter[0] * spread.scatter[1]);
-  if (std::getenv("MEASURE")) printf("FIT ratio %.3f %.3f %.3f mean/se %.2f %.2f %.2f corr %.2f %.2f\n", spread.stated[0]/spread.scatter[0], spread.stated[1]/spread.scatter[1], spread.stated[2]/spread.scatter[2], spread.mean[0]/spread.scatter[0]*std::sqrt(runs), spread.mean[1]/spread.scatter[1]*std::sqrt(runs), spread.mean[2]/spread.scatter[2]*std::sqrt(runs), spread.correlation, spread.stated_correlation);
+  if (std::getenv("MEASURE"))
+    printf("FIT ratio %.3f %.3f %.3f mean/se %.2f %.2f %.2f corr %.2f %.2f\n",
+           spread.stated[0] / spread.scatter[0], spread.stated[1] / spread.scatter[1],
+           spread.stated[2] / spread.scatter[2],
+           spread.mean[0] / spread.scatter[0] * std::sqrt(runs),
+           spread.mean[1] / spread.scatter[1] * std::sqrt(runs),
+           spread.mean[2] / spread.scatter[2] * std::sqrt(runs), spread.correlation,
+           spread.stated_correlation);
   return spread;
 }
 
@@ -199,14 +205,14 @@ void ExpectCovers(const Spread& spread, int parameters) {
 TEST(BlurFit, CovarianceIsTheScatterOfAbsoluteFits) {
   Bench bench;
   bench.noise = 1;
-  ExpectCovers(Scatter(bench, Setup(bench), kRuns), 3);
+  ExpectCovers(Scatter(bench, SetupFor(bench), kRuns), 3);
 }
 
 TEST(BlurFit, CovarianceIsTheScatterOfRelativeFitsWithAFloorOfKnownError) {
   Bench bench;
   bench.noise = 1;
   bench.relative = true;
-  ExpectCovers(Scatter(bench, WithFloor(Setup(bench), 0.03), kRuns), 3);
+  ExpectCovers(Scatter(bench, WithFloor(SetupFor(bench), 0.03), kRuns), 3);
 }
 
 TEST(BlurFit, CovarianceIncludesTheReadingsErrors) {
@@ -214,17 +220,17 @@ TEST(BlurFit, CovarianceIncludesTheReadingsErrors) {
   bench.noise = 1;
   bench.error_px2 = 0.005;
   bench.reading_sigma_mm = 0.5;
-  const Spread with = Scatter(bench, Setup(bench), kRuns);
+  const Spread with = Scatter(bench, SetupFor(bench), kRuns);
   ExpectCovers(with, 3);
   // They are the larger part here.
   bench.reading_sigma_mm = 0;
-  EXPECT_GT(with.stated[0], 1.5 * Scatter(bench, Setup(bench), 20).stated[0]);
+  EXPECT_GT(with.stated[0], 1.5 * Scatter(bench, SetupFor(bench), 20).stated[0]);
 }
 
 TEST(BlurFit, CovarianceGrowsWhereTheScatterIsLargerThanStated) {
   Bench bench;
   bench.noise = 2;  // errors twice as large as they are said to be
-  const Spread spread = Scatter(bench, Setup(bench), kRuns);
+  const Spread spread = Scatter(bench, SetupFor(bench), kRuns);
   for (int i = 0; i < 3; ++i)
     EXPECT_NEAR(spread.stated[i] / spread.scatter[i], 1, 0.25) << "parameter " << i;
 }
@@ -232,7 +238,7 @@ TEST(BlurFit, CovarianceGrowsWhereTheScatterIsLargerThanStated) {
 TEST(BlurFit, TheOffsetsErrorIsCarriedIntoTheResults) {
   Bench bench;
   bench.error_px2 = 1e-4;
-  BlurFitSetup setup = Setup(bench);
+  BlurFitSetup setup = SetupFor(bench);
   const double offset_sigma_mm = 1.5;
   setup.offset_mm.sigma = offset_sigma_mm;
   const auto samples = Samples(bench, 1);
@@ -253,7 +259,9 @@ TEST(BlurFit, TheOffsetsErrorIsCarriedIntoTheResults) {
     squares += error * error.transpose() / kRuns;
   }
   const Eigen::Matrix2d scatter = squares - mean * mean.transpose();
-  if (std::getenv("MEASURE")) printf("OFF %.3f %.3f\n", std::sqrt(fit.covariance(0, 0) / scatter(0, 0)), std::sqrt(fit.covariance(1, 1) / scatter(1, 1)));
+  if (std::getenv("MEASURE"))
+    printf("OFF %.3f %.3f\n", std::sqrt(fit.covariance(0, 0) / scatter(0, 0)),
+           std::sqrt(fit.covariance(1, 1) / scatter(1, 1)));
   EXPECT_NEAR(std::sqrt(fit.covariance(0, 0) / scatter(0, 0)), 1, 0.15);
   EXPECT_NEAR(std::sqrt(fit.covariance(1, 1) / scatter(1, 1)), 1, 0.15);
   // A zero error goes about one to one into the plane of focus.
@@ -264,11 +272,11 @@ TEST(BlurFit, OutliersAreWeightedDown) {
   Bench bench;
   bench.noise = 1;
   auto samples = Samples(bench, 3);
-  const BlurFitResult clean = FitBlur(samples, Setup(bench));
+  const BlurFitResult clean = FitBlur(samples, SetupFor(bench));
   samples[4].variance_px2 += 3;
   samples[20].variance_px2 -= 2;
   samples[26].variance_px2 *= 3;
-  const BlurFitResult fit = FitBlur(samples, Setup(bench));
+  const BlurFitResult fit = FitBlur(samples, SetupFor(bench));
   ASSERT_TRUE(fit.done);
   for (const std::size_t i : {4U, 20U, 26U}) EXPECT_LT(fit.weights[i], 0.01) << i;
   EXPECT_NEAR(fit.values[0], clean.values[0], std::sqrt(clean.covariance(0, 0)));
@@ -278,7 +286,7 @@ TEST(BlurFit, OutliersAreWeightedDown) {
 TEST(BlurFit, TheFloorOfATextureIsNamedAsUndetermined) {
   Bench bench;
   bench.relative = true;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), Setup(bench));
+  const BlurFitResult fit = FitBlur(Samples(bench, 1), SetupFor(bench));
   EXPECT_FALSE(fit.done);
   EXPECT_THAT(fit.message, HasSubstr("the data do not tell apart"));
   EXPECT_THAT(fit.weak_direction, HasSubstr("blur_floor_px"));
@@ -287,7 +295,7 @@ TEST(BlurFit, TheFloorOfATextureIsNamedAsUndetermined) {
 TEST(BlurFit, FloorAndSoftnessTogetherAreNamedAsUndetermined) {
   Bench bench;
   bench.softness_px2 = 0.4;
-  BlurFitSetup setup = Setup(bench);
+  BlurFitSetup setup = SetupFor(bench);
   setup.target_softness = true;
   const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
   EXPECT_FALSE(fit.done);
@@ -306,7 +314,7 @@ TEST(BlurFit, TwoDepthsDoNotFixThreeParameters) {
     s.error_px2 = 0.02;
     samples.push_back(s);
   }
-  const BlurFitResult fit = FitBlur(samples, Setup(bench));
+  const BlurFitResult fit = FitBlur(samples, SetupFor(bench));
   EXPECT_FALSE(fit.done);
   EXPECT_NE(fit.weak_direction, "") << fit.message;
   EXPECT_THAT(fit.message, HasSubstr("tell apart"));
@@ -315,7 +323,7 @@ TEST(BlurFit, TwoDepthsDoNotFixThreeParameters) {
 TEST(BlurFit, FewerThanFourSamplesAreRefused) {
   Bench bench;
   bench.count = 3;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), Setup(bench));
+  const BlurFitResult fit = FitBlur(Samples(bench, 1), SetupFor(bench));
   EXPECT_FALSE(fit.done);
   EXPECT_THAT(fit.message, HasSubstr("3 frames, at least 4"));
 }

@@ -97,8 +97,7 @@ TEST(FrameGates, SixteenBitsSaturateAtTheirOwnFullScale) {
 TEST(FrameGates, ABrightPlateauWithNoiseIsNoSaturation) {
   // Half of the frame is a white wall at 200 of 255, with noise of 2 grey values.
   for (const double noise_levels : {1.5, 2.0, 4.0}) {
-    const cv::Mat plateau =
-        StoredBytes(DrawnEdge(192, 5, 0.8, 0.2, 200.0 / 255), noise_levels, 7);
+    const cv::Mat plateau = StoredBytes(DrawnEdge(192, 5, 0.8, 0.2, 200.0 / 255), noise_levels, 7);
     EXPECT_EQ(ReasonFor(plateau), "(none)") << noise_levels;
     EXPECT_LT(Measure(plateau).saturated_fraction, 0.05) << noise_levels;
   }
@@ -110,16 +109,14 @@ TEST(FrameGates, AKnifeEdgeWithABlackHalfPasses) {
 
 TEST(FrameGates, NoiseAloneIsNoTexture) {
   for (const double noise_levels : {1.0, 3.0, 10.0}) {
-    const cv::Mat noise =
-        StoredBytes(cv::Mat(192, 192, CV_32F, cv::Scalar(0.4)), noise_levels, 11);
+    const cv::Mat noise = StoredBytes(cv::Mat(192, 192, CV_32F, cv::Scalar(0.4)), noise_levels, 11);
     EXPECT_THAT(ReasonFor(noise), StartsWith("no texture above the noise")) << noise_levels;
   }
 }
 
 TEST(FrameGates, NoiseIsMeasuredAsItIs) {
   for (const double noise_levels : {2.0, 5.0}) {
-    const cv::Mat noise =
-        StoredBytes(cv::Mat(192, 192, CV_32F, cv::Scalar(0.4)), noise_levels, 12);
+    const cv::Mat noise = StoredBytes(cv::Mat(192, 192, CV_32F, cv::Scalar(0.4)), noise_levels, 12);
     // The 25th percentile of blocks lies a little below their mean; rounding adds 1/12.
     EXPECT_NEAR(Measure(noise).noise_sigma * 255, std::sqrt(noise_levels * noise_levels + 1.0 / 12),
                 0.06 * noise_levels);

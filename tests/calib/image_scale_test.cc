@@ -14,46 +14,59 @@
 namespace thicklens::calib {
 namespace {
 
-using ::testing::HasSubstr;
 using model::BenchDirection;
+using ::testing::HasSubstr;
 using thicklens::testing::SweepCase;
 
-cv::Mat Frame(std::uint64_t seed, double depth_mm, double drift_sigma_px) {
+// 360 to 440 mm in steps of 10 mm, 400 mm in the middle, without drift or with some.
+std::vector<cv::Mat> Frames(std::uint64_t seed, double drift_sigma_px) {
   model::SweepSimulationOptions options = SweepCase("iii", 256, seed);
   options.drift_sigma_px = drift_sigma_px;
-  options.frame_count = 1;
-  options.first_depth_mm = depth_mm;
-  const auto one = thicklens::testing::Simulate(options);
-  return LinearGrey((*one.stored)[0], one.sweep, 0);
+  options.first_depth_mm = 360;
+  options.step_mm = 10;
+  options.frame_count = 9;
+  const auto rendered = thicklens::testing::Simulate(options);
+  std::vector<cv::Mat> frames;
+  for (std::size_t i = 0; i < rendered.stored->size(); ++i)
+    frames.push_back(LinearGrey((*rendered.stored)[i], rendered.sweep, i));
+  return frames;
 }
+constexpr std::size_t kMiddle = 4;
+double TrueScale(std::size_t frame) { return 400 / (360 + 10 * static_cast<double>(frame)); }
 
 TEST(RegisterScale, FindsTheScaleOfARenderedFrame) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    const cv::Mat reference = Frame(seed, 400, 0);
-    for (const double depth_mm : {360.0, 380.0, 396.0, 404.0, 425.0, 450.0}) {
-      const double truth = 400 / depth_mm;
-      // Started 1 % off, and with the target moved sideways.
-      const auto scale = RegisterScale(reference, Frame(seed, depth_mm, 1.5), truth * 1.01);
-      ASSERT_TRUE(scale) << depth_mm;
-      EXPECT_NEAR(*scale, truth, 1e-3) << depth_mm << " mm";
+    const auto frames = Frames(seed, 1.5);  // the target moves sideways
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (i == kMiddle) continue;
+      // Started 1 % off.
+      const auto scale = RegisterScale(frames[kMiddle], frames[i], TrueScale(i) * 1.01);
+      ASSERT_TRUE(scale) << i;
+      if (std::getenv("MEASURE")) printf("REG %zu %.5f\n", i, *scale - TrueScale(i));
+      EXPECT_NEAR(*scale, TrueScale(i), 1e-3) << "frame " << i;
     }
   }
 }
 
 TEST(RegisterScale, ALampThatChangesDoesNotMatter) {
-  const cv::Mat reference = Frame(3, 400, 0);
-  const auto scale = RegisterScale(reference, 0.4 * Frame(3, 420, 0) + 0.05, 400.0 / 420);
+  const auto frames = Frames(3, 0);
+  const auto scale = RegisterScale(frames[kMiddle], 0.4 * frames[6] + 0.05, TrueScale(6));
   ASSERT_TRUE(scale);
-  EXPECT_NEAR(*scale, 400.0 / 420, 1e-3);
+  EXPECT_NEAR(*scale, TrueScale(6), 1e-3);
 }
 
 TEST(RegisterScale, RejectsAnUnrelatedPicture) {
-  for (std::uint64_t seed = 10; seed < 16; ++seed)
-    EXPECT_FALSE(RegisterScale(Frame(seed, 400, 0), Frame(seed + 100, 410, 0), 0.98)) << seed;
+  std::vector<cv::Mat> pictures;
+  for (std::uint64_t seed = 10; seed < 15; ++seed) pictures.push_back(Frames(seed, 0)[kMiddle]);
+  for (const cv::Mat& reference : pictures) {
+    for (const cv::Mat& frame : pictures) {
+      EXPECT_EQ(RegisterScale(reference, frame, 1).has_value(), reference.data == frame.data);
+    }
+  }
 }
 
 TEST(RegisterScale, RejectsAPictureStretchedOneWay) {
-  const cv::Mat reference = Frame(4, 400, 0);
+  const cv::Mat reference = Frames(4, 0)[kMiddle];
   cv::Mat stretched;
   cv::warpAffine(reference, stretched, cv::Matx23d(1.04, 0, -5, 0, 1, 0), reference.size(),
                  cv::INTER_CUBIC, cv::BORDER_REFLECT);
@@ -70,8 +83,8 @@ std::vector<ScaleSample> Samples(double offset_mm, BenchDirection direction, int
   for (int i = 0; i < count; ++i) {
     const double depth_mm = 340 + 120.0 * i / (count - 1);
     const double reading_mm = sign * (depth_mm - offset_mm);
-    samples.push_back(
-        {static_cast<std::size_t>(i), reading_mm + reading_sigma_mm * noise(random), 400 / depth_mm});
+    samples.push_back({static_cast<std::size_t>(i), reading_mm + reading_sigma_mm * noise(random),
+                       400 / depth_mm});
   }
   return samples;
 }
@@ -102,7 +115,8 @@ TEST(FitScaleLaw, SigmaCoversTheScatter) {
     stated += law.offset_mm.sigma / kRuns;
   }
   const double scatter_mm = std::sqrt(squares - sum * sum);
-  if (std::getenv("MEASURE")) printf("SCALE scatter %.4f stated %.4f mean %.4f\n", scatter_mm, stated, sum);
+  if (std::getenv("MEASURE"))
+    printf("SCALE scatter %.4f stated %.4f mean %.4f\n", scatter_mm, stated, sum);
   EXPECT_LT(std::abs(sum), 3 * scatter_mm / std::sqrt(kRuns));
   EXPECT_GT(stated, 0.8 * scatter_mm);
   EXPECT_LT(stated, 2 * scatter_mm);
@@ -116,7 +130,9 @@ TEST(FitScaleLaw, AFewWrongReadingsDoNotMoveIt) {
   std::swap(samples[10].reading_mm, samples[14].reading_mm);
   const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
   ASSERT_TRUE(law.done);
-  if (std::getenv("MEASURE")) printf("SCALE outl %.4f clean %.4f sig %.4f\n", law.offset_mm.value, clean.offset_mm.value, clean.offset_mm.sigma);
+  if (std::getenv("MEASURE"))
+    printf("SCALE outl %.4f clean %.4f sig %.4f\n", law.offset_mm.value, clean.offset_mm.value,
+           clean.offset_mm.sigma);
   EXPECT_NEAR(law.offset_mm.value, clean.offset_mm.value, clean.offset_mm.sigma);
   EXPECT_EQ(law.frames_used, 27);
 }
@@ -132,12 +148,12 @@ TEST(FitScaleLaw, RefusesAConstantScale) {
 }
 
 TEST(FitScaleLaw, RefusesAReversedScaleAndNamesTheDirection) {
-  const ScaleLaw away =
-      FitScaleLaw(Samples(700, BenchDirection::kToward, 21, 0.05, 1), 10, 0.05, BenchDirection::kAway);
+  const ScaleLaw away = FitScaleLaw(Samples(700, BenchDirection::kToward, 21, 0.05, 1), 10, 0.05,
+                                    BenchDirection::kAway);
   EXPECT_FALSE(away.done);
   EXPECT_THAT(away.message, HasSubstr("direction must be 'toward', not 'away'"));
-  const ScaleLaw toward =
-      FitScaleLaw(Samples(0, BenchDirection::kAway, 21, 0.05, 1), 10, 0.05, BenchDirection::kToward);
+  const ScaleLaw toward = FitScaleLaw(Samples(0, BenchDirection::kAway, 21, 0.05, 1), 10, 0.05,
+                                      BenchDirection::kToward);
   EXPECT_FALSE(toward.done);
   EXPECT_THAT(toward.message, HasSubstr("direction must be 'away', not 'toward'"));
 }

@@ -46,10 +46,8 @@ TEST(MeanEdgeSlope, OfARampIsItsHeightOverTheWidthThatSmoothingLeaves) {
 
 TEST(MeanEdgeSlope, FollowsTheGradientAcrossASlantedEdge) {
   // The same edge upright and at 30 degrees: the distance is taken along the normal.
-  const double upright =
-      MeanEdgeSlope(DrawnEdge(96, 0, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
-  const double slanted =
-      MeanEdgeSlope(DrawnEdge(96, 30, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
+  const double upright = MeanEdgeSlope(DrawnEdge(96, 0, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
+  const double slanted = MeanEdgeSlope(DrawnEdge(96, 30, 2, 0.2, 0.7), Above(0.02)).mean_edge_slope;
   EXPECT_NEAR(slanted / upright, 1, 0.1);
 }
 

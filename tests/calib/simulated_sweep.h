@@ -18,9 +18,9 @@ inline cv::Mat StoredMat(const model::StoredPicture& picture) {
   cv::Mat stored(picture.height_px, picture.width_px, picture.bits == 8 ? CV_8U : CV_16U);
   for (int y = 0; y < stored.rows; ++y) {
     for (int x = 0; x < stored.cols; ++x) {
-      const auto value = picture.values[static_cast<std::size_t>(y) *
-                                            static_cast<std::size_t>(stored.cols) +
-                                        static_cast<std::size_t>(x)];
+      const auto value =
+          picture.values[static_cast<std::size_t>(y) * static_cast<std::size_t>(stored.cols) +
+                         static_cast<std::size_t>(x)];
       if (picture.bits == 8) {
         stored.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(value);
       } else {

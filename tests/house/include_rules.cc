@@ -34,7 +34,7 @@ const std::vector<Room>& Rooms() {
       {"tools",
        {"model", "kernels", "calib", "estimator"},
        {},
-       {"Eigen/", "fmt/", "CLI/", "nlohmann/", "spdlog/", "exiv2/", "openssl/", "opencv2/core",
+       {"Eigen/", "fmt/", "CLI/", "nlohmann/", "spdlog/", "exiv2/", "openssl/", "glog/", "opencv2/core",
         "opencv2/imgcodecs", "opencv2/imgproc"}},
   };
   return rooms;

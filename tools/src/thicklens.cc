@@ -1,5 +1,6 @@
 // The program: finds the command that is asked for, runs it, and tells a failure in one line.
 #include <fmt/format.h>
+#include <glog/logging.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -29,6 +30,8 @@ enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2 };
 void SetUpMessages() {
   // Libraries keep still: what goes wrong is told by whoever asked them, with the file's name.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  FLAGS_minloglevel = google::GLOG_FATAL;  // Ceres logs through glog
+  google::InitGoogleLogging("thicklens");
   spdlog::set_default_logger(spdlog::stderr_logger_mt("thicklens"));
   spdlog::set_pattern("thicklens: %l: %v");
 }

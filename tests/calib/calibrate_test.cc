@@ -1,0 +1,286 @@
+#include "thicklens/calib/calibrate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "simulated_sweep.h"
+#include "support/error_message.h"
+#include "thicklens/model/camera_file.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using thicklens::testing::ErrorOf;
+using thicklens::testing::GiveFloor;
+using thicklens::testing::Simulate;
+using thicklens::testing::SimulatedSweep;
+using thicklens::testing::SweepCase;
+
+constexpr int kSizePx = 160;
+
+// A copy of a sweep whose frames may be damaged.
+SimulatedSweep CopyOf(const SimulatedSweep& original) {
+  SimulatedSweep copy = original;
+  copy.stored = std::make_shared<std::vector<cv::Mat>>();
+  for (const cv::Mat& frame : *original.stored) copy.stored->push_back(frame.clone());
+  copy.sweep.read_frame = [stored = copy.stored](std::size_t i) { return (*stored)[i]; };
+  return copy;
+}
+
+// Case iii on a small field, dead leaves, floor and bench zero given.
+SimulatedSweep Good() {
+  static const SimulatedSweep rendered = [] {
+    SimulatedSweep sweep = Simulate(SweepCase("iii", kSizePx, 1));
+    GiveFloor(&sweep);
+    return sweep;
+  }();
+  return CopyOf(rendered);
+}
+
+void Keep(SimulatedSweep* simulated, std::size_t first, std::size_t count) {
+  auto& frames = simulated->sweep.frames;
+  frames = {frames.begin() + static_cast<std::ptrdiff_t>(first),
+            frames.begin() + static_cast<std::ptrdiff_t>(first + count)};
+  auto& stored = *simulated->stored;
+  stored = {stored.begin() + static_cast<std::ptrdiff_t>(first),
+            stored.begin() + static_cast<std::ptrdiff_t>(first + count)};
+}
+
+Calibration Run(const SimulatedSweep& simulated) {
+  Calibration c = Calibrate(simulated.sweep, {});
+  if (std::getenv("MEASURE")) {
+    printf("C %s | %s | zf %.3f +- %.3f kappa %.4f +- %.4f (%.2f s)\n", OutcomeName(c.outcome).c_str(),
+           c.reason.c_str(), c.focus_depth_mm ? c.focus_depth_mm->value - simulated.truth.focus_depth_mm : NAN,
+           c.focus_depth_mm ? c.focus_depth_mm->sigma : NAN, c.blur_ratio ? c.blur_ratio->value : NAN,
+           c.blur_ratio ? c.blur_ratio->sigma : NAN, c.seconds);
+    for (const auto& w : c.warnings) printf("  W %s\n", w.c_str());
+  }
+  return c;
+}
+
+void ExpectRefused(const Calibration& c, const std::string& why) {
+  EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
+  EXPECT_THAT(c.reason, HasSubstr(why));
+  EXPECT_FALSE(c.image_distance_mm);
+  EXPECT_FALSE(c.focus_depth_mm);
+  EXPECT_FALSE(c.blur_ratio);
+}
+
+// Right within its own errors, and those are small.
+void ExpectRight(const Calibration& c, const model::SweepTruth& truth) {
+  ASSERT_TRUE(c.focus_depth_mm) << c.reason;
+  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+  EXPECT_LT(std::abs(c.focus_depth_mm->value - truth.focus_depth_mm), 3 * c.focus_depth_mm->sigma);
+  EXPECT_LT(c.focus_depth_mm->sigma, 1);
+  EXPECT_NEAR(c.blur_ratio->value / truth.blur_ratio, 1, 0.03);
+  EXPECT_NEAR(c.image_distance_mm->value, truth.image_distance_mm,
+              3 * c.image_distance_mm->sigma);
+}
+
+TEST(Calibrate, AGoodSweepIsRight) { ExpectRight(Run(Good()), Good().truth); }
+
+TEST(Calibrate, OneAndTwoThreadsGiveTheSameBits) {
+  const SimulatedSweep good = Good();
+  CalibrationOptions options;
+  options.threads = 1;
+  const Calibration one = Calibrate(good.sweep, options);
+  options.threads = 2;
+  const Calibration two = Calibrate(good.sweep, options);
+  ASSERT_TRUE(one.focus_depth_mm && two.focus_depth_mm);
+  EXPECT_EQ(one.focus_depth_mm->value, two.focus_depth_mm->value);
+  EXPECT_EQ(one.focus_depth_mm->sigma, two.focus_depth_mm->sigma);
+  EXPECT_EQ(one.blur_ratio->value, two.blur_ratio->value);
+  EXPECT_EQ(one.scale.offset_mm.value, two.scale.offset_mm.value);
+  EXPECT_EQ(one.source.blur_ratio, two.source.blur_ratio);
+  EXPECT_TRUE(one.covariance == two.covariance);
+}
+
+TEST(Calibrate, ThreeFramesAreTooFew) {
+  SimulatedSweep s = Good();
+  Keep(&s, 18, 3);
+  ExpectRefused(Run(s), "at least 5 frames, this one has 3");
+}
+
+TEST(Calibrate, EqualReadingsAreNamed) {
+  SimulatedSweep s = Good();
+  for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm = 412;
+  ExpectRefused(Run(s), "different readings, this one has 1 (all are 412 mm)");
+}
+
+TEST(Calibrate, ABlankTargetShowsNoTexture) {
+  SimulatedSweep s = Good();
+  cv::RNG random(4);
+  for (cv::Mat& frame : *s.stored) {
+    cv::Mat noise(frame.size(), CV_32F);
+    random.fill(noise, cv::RNG::NORMAL, 110, 3);
+    noise.convertTo(frame, CV_8U);
+  }
+  ExpectRefused(Run(s), "no texture above the noise");
+}
+
+TEST(Calibrate, ADarkSweepIsNamedDark) {
+  SimulatedSweep s = Good();
+  for (cv::Mat& frame : *s.stored) frame.setTo(1);
+  ExpectRefused(Run(s), "dark: mean");
+}
+
+TEST(Calibrate, AFrameOfAnotherSizeIsAnErrorThatNamesIt) {
+  SimulatedSweep s = Good();
+  s.frame(7) = cv::Mat(kSizePx, kSizePx + 1, CV_8U, cv::Scalar(100));
+  EXPECT_THAT(ErrorOf([&] { Run(s); }), HasSubstr("frame-7: the picture is 161 x 160 px"));
+}
+
+TEST(Calibrate, AReversedDirectionIsRefusedByItsName) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  s.sweep.direction = model::BenchDirection::kToward;
+  ExpectRefused(Run(s), "direction must be 'away'");
+}
+
+TEST(Calibrate, AnUnknownBenchZeroIsFound) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm -= 45;
+  const Calibration c = Run(s);
+  ASSERT_TRUE(c.bench_offset_mm) << c.reason;
+  EXPECT_NEAR(c.bench_offset_mm->value, 45, 3 * c.bench_offset_mm->sigma + 1.2);
+  ASSERT_TRUE(c.focus_depth_mm);
+  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma + 1.2);
+  // The bench zero's error is in the focus' error.
+  EXPECT_GE(c.focus_depth_mm->sigma, 0.8 * c.bench_offset_mm->sigma);
+}
+
+TEST(Calibrate, OnePictureRepeatedIsRefused) {
+  SimulatedSweep s = Good();
+  for (cv::Mat& frame : *s.stored) frame = s.frame(16).clone();
+  {
+    SCOPED_TRACE("bench zero given");
+    const Calibration c = Run(s);
+    EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
+    EXPECT_FALSE(c.blur_ratio);
+  }
+  s.sweep.offset_mm.reset();
+  ExpectRefused(Run(s), "does not change with the reading");
+}
+
+TEST(Calibrate, AFocusBeyondTheSweepIsSaidToBeBeyondIt) {
+  for (const bool nearer : {false, true}) {
+    SCOPED_TRACE(nearer);
+    // The focus at 400 mm lies 20 steps into the sweep; 11 frames that stay 25 mm clear of it.
+    SimulatedSweep s = Good();
+    Keep(&s, nearer ? 27 : 2, 11);
+    const Calibration c = Run(s);
+    if (c.outcome == Outcome::kRefused) {
+      EXPECT_THAT(c.reason, HasSubstr(nearer ? "lies nearer" : "lies farther"));
+    } else {
+      EXPECT_THAT(c.warnings, Contains(HasSubstr("is extrapolated")));
+      EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
+    }
+  }
+}
+
+TEST(Calibrate, AWrongFocalLengthIsRefusedAsUnphysical) {
+  SimulatedSweep s = Simulate(SweepCase("ii", kSizePx, 1));
+  GiveFloor(&s);
+  s.sweep.camera.lens.front_focal_length_mm = s.sweep.camera.lens.rear_focal_length_mm = 35;
+  // The aperture's radius follows from the f-number.
+  s.sweep.camera.lens.aperture_radius_mm *= 35.0 / 50;
+  ExpectRefused(Run(s), "which no lens has");
+}
+
+TEST(Calibrate, StopsWhenProgressSaysSo) {
+  const SimulatedSweep s = Good();
+  CalibrationOptions options;
+  int calls = 0, last = 0;
+  options.progress = [&](int done, int total) {
+    EXPECT_GT(done, last);
+    EXPECT_LE(done, total);
+    last = done;
+    return ++calls < 10;
+  };
+  EXPECT_THROW(Calibrate(s.sweep, options), Interrupted);
+  EXPECT_LT(calls, 14);  // other threads may finish a frame meanwhile
+}
+
+TEST(Calibrate, ABlackAndAnOverexposedFrameAreRejectedByName) {
+  SimulatedSweep s = Good();
+  s.frame(5).setTo(0);
+  s.frame(30).convertTo(s.frame(30), CV_8U, 4);
+  const Calibration c = Run(s);
+  ExpectRight(c, s.truth);
+  EXPECT_THAT(c.frames[5].rejection, HasSubstr("dark"));
+  EXPECT_THAT(c.frames[30].rejection, HasSubstr("saturated"));
+  EXPECT_EQ(c.frames_used, 39);
+}
+
+TEST(Calibrate, SwappedReadingsAreNamedAndDoNoHarm) {
+  SimulatedSweep s = Good();
+  std::swap(s.sweep.frames[4].reading_mm, s.sweep.frames[12].reading_mm);
+  const Calibration c = Run(s);
+  ExpectRight(c, s.truth);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("frame-4")));
+  EXPECT_LT(c.frames[4].blur_fit_weight, 0.3);
+}
+
+TEST(Calibrate, AnUnknownFloorLeavesItUnwrittenAndTheTruthInsideTheInterval) {
+  SimulatedSweep s = Good();
+  s.sweep.floor = {};
+  const Calibration c = Run(s);
+  EXPECT_EQ(c.outcome, Outcome::kPartial);
+  EXPECT_THAT(c.reason, HasSubstr("blur_floor_px"));
+  ASSERT_TRUE(c.focus_depth_mm && c.focus_depth_mm->systematic);
+  const Eigen::Vector2d interval = *c.focus_depth_mm->systematic;
+  EXPECT_GT(s.truth.focus_depth_mm, interval.x() - 3 * c.focus_depth_mm->sigma);
+  EXPECT_LT(s.truth.focus_depth_mm, interval.y() + 3 * c.focus_depth_mm->sigma);
+  EXPECT_GT(interval.y() - interval.x(), 0.5);
+}
+
+TEST(CalibratedCamera, KeepsTheMakersValuesAndSurvivesItsFile) {
+  SimulatedSweep s = Good();
+  const Calibration c = Run(s);
+  model::Camera typed_in = s.sweep.camera;
+  typed_in.statements["lens.aperture_radius_mm"] = {0.1, true};
+  const model::Camera camera = CalibratedCamera(typed_in, c, false);
+  EXPECT_EQ(camera.lens.front_focal_length_mm, typed_in.lens.front_focal_length_mm);
+  EXPECT_EQ(camera.lens.rear_focal_length_mm, typed_in.lens.rear_focal_length_mm);
+  EXPECT_EQ(camera.lens.lens_thickness_mm, typed_in.lens.lens_thickness_mm);
+  EXPECT_EQ(camera.lens.aperture_radius_mm, typed_in.lens.aperture_radius_mm);
+  EXPECT_EQ(camera.sensor.pixel_pitch_mm, typed_in.sensor.pixel_pitch_mm);
+  EXPECT_EQ(camera.statements.size(), 1U);
+
+  const model::Camera read = model::ParseCamera(model::CameraToYaml(camera), "written");
+  ASSERT_TRUE(read.calibration);
+  EXPECT_EQ(read.image_distance_mm(), c.image_distance_mm->value);
+  EXPECT_EQ(read.blur_ratio(), c.blur_ratio->value);
+  EXPECT_EQ(read.calibration->covariance_order, c.covariance_order);
+  EXPECT_TRUE(read.calibration->covariance == c.covariance);
+  EXPECT_EQ(read.calibration->blur_floor_px->value, c.blur_floor_px->value);
+  EXPECT_EQ(read.calibration->bench_offset_mm->value, c.bench_offset_mm->value);
+  EXPECT_NEAR(std::sqrt(c.covariance(0, 0)), c.image_distance_mm->sigma,
+              1e-9 * c.image_distance_mm->sigma);
+}
+
+TEST(CalibratedCamera, DoesNotWriteWhatTheDataDidNotFix) {
+  SimulatedSweep s = Good();
+  s.sweep.floor = {};
+  const model::Camera camera = CalibratedCamera(s.sweep.camera, Run(s), false);
+  ASSERT_TRUE(camera.calibration);
+  EXPECT_FALSE(camera.calibration->blur_floor_px);
+  EXPECT_TRUE(camera.calibration->image_distance_mm);
+  EXPECT_THAT(camera.calibration->covariance_order, Not(Contains("blur_floor_px")));
+  EXPECT_EQ(camera.calibration->covariance.rows(), 3);
+  EXPECT_EQ(model::CameraToYaml(camera).find("blur_floor_px"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace thicklens::calib
