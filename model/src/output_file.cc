@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -92,7 +93,8 @@ fs::path Followed(const fs::path& target) {
 }
 
 // A folder that is there already is replaced only if that can lose nothing of anybody else's.
-void RequireReplaceable(const fs::path& folder, const std::string& marker_file) {
+void RequireReplaceable(const fs::path& folder, const std::string& marker_file,
+                        const std::vector<std::string>& own_entries) {
   std::error_code ignored;
   if (!fs::exists(folder, ignored)) return;
   if (!fs::is_directory(folder, ignored))
@@ -102,6 +104,15 @@ void RequireReplaceable(const fs::path& folder, const std::string& marker_file) 
         fmt::format("{}: this folder holds other files (no {} in it) and is not replaced; choose "
                     "another name",
                     folder.string(), marker_file));
+  }
+  if (own_entries.empty()) return;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (std::find(own_entries.begin(), own_entries.end(), name) != own_entries.end()) continue;
+    throw Error(
+        fmt::format("{}: this folder also holds '{}', which would be lost; move it away or "
+                    "choose another name",
+                    folder.string(), name));
   }
 }
 
@@ -168,6 +179,7 @@ struct OutputFolder::Impl {
   std::string path;
   std::string part;
   std::string marker_file;
+  std::vector<std::string> own_entries;
   int fd = -1;
 
   ~Impl() {
@@ -178,18 +190,20 @@ struct OutputFolder::Impl {
   }
 };
 
-OutputFolder::OutputFolder(const std::string& path, const std::string& marker_file)
+OutputFolder::OutputFolder(const std::string& path, const std::string& marker_file,
+                           const std::vector<std::string>& own_entries)
     : impl_(std::make_unique<Impl>()) {
   if (path.empty()) throw Error("the name of the output folder is empty");
   const fs::path named = WithoutTrailingSlash(path);
   if (!named.has_filename() || named.filename() == "." || named.filename() == "..")
     throw Error(fmt::format("{}: a folder of its own is expected, by name", path));
   const fs::path target = Followed(named);
-  RequireReplaceable(target, marker_file);
+  RequireReplaceable(target, marker_file, own_entries);
   RequireParentFolder(target);
   impl_->path = target.string();
   impl_->part = PartName(target);
   impl_->marker_file = marker_file;
+  impl_->own_entries = own_entries;
   impl_->fd = OpenLocked(impl_->part, path, PartKind::kFolder);
   std::error_code ignored;
   for (const auto& left_over : fs::directory_iterator(impl_->part, ignored))
@@ -222,7 +236,7 @@ void OutputFolder::Write(const std::string& name, const std::string& content) {
 
 void OutputFolder::Commit() {
   Impl& impl = *impl_;
-  RequireReplaceable(impl.path, impl.marker_file);  // work may have taken hours
+  RequireReplaceable(impl.path, impl.marker_file, impl.own_entries);  // work may have taken hours
   std::error_code failure;
   // renameat2 with RENAME_EXCHANGE would be one step, but not every file system has it. The old
   // folder steps aside first and comes back if the new one cannot take its place.

@@ -247,6 +247,19 @@ TEST(OutputFolder, ReplacesOnlyItsOwn) {
   EXPECT_THAT(folder.Entries(), ElementsAre("empty", "file", "own", "thesis"));
 }
 
+// A folder of ours into which somebody has put something.
+TEST(OutputFolder, NamesWhatWouldBeLost) {
+  TemporaryFolder folder;
+  const std::vector<std::string> own = {kMarker, "frames"};
+  folder.Put("out/" + std::string(kMarker));
+  folder.Put("out/frames/a.png");
+  { OutputFolder fine(folder / "out", kMarker, own); }
+  OutputFolder claimed(folder / "out", kMarker, own);
+  folder.Put("out/notes.txt");
+  EXPECT_THAT(ErrorOf([&] { claimed.Commit(); }), HasSubstr("'notes.txt'"));
+  EXPECT_TRUE(fs::exists(folder / "out/notes.txt"));
+}
+
 TEST(OutputFolder, LooksAgainBeforeItReplaces) {
   const TemporaryFolder folder;
   {

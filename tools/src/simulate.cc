@@ -112,7 +112,8 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
-  model::OutputFolder folder(options.output_folder, kMarkerFile);
+  model::OutputFolder folder(options.output_folder, kMarkerFile,
+                             {"frames", "sweep.yaml", "camera.yaml", kMarkerFile});
 
   const model::SweepSimulator simulator(simulation, ReadTargetPicture(simulation.target));
   RenderFrames(simulator, options.common, &folder);

@@ -53,7 +53,7 @@ Eigen::Vector2d PicturePositionPx(const Sensor& sensor, const Eigen::Vector2d& l
 double CosAlpha(const LightFieldPlanes& planes, const Ray& ray);
 
 // cos(beta) of (9), beta the angle behind the lens, with d1 measured from Ap. Erratum of the
-// source, kept: for rho != 0 the rear principal plane would be the right one (DESIGN 4.5).
+// source, kept: for rho != 0 the rear principal plane would be the right one.
 double CosBeta(const ThickLens& lens, double image_distance_mm, const LightFieldPlanes& planes,
                const Ray& ray);
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace thicklens::model {
 
@@ -28,11 +29,13 @@ class OutputFile {
 };
 
 // The same for a folder: files are written into staging_path(), and Commit puts the folder in
-// place, replacing an older one. A folder at the target is replaced only if it is empty or contains
-// `marker_file` (the sign that this program wrote it); else the constructor throws Error.
+// place, replacing an older one. A folder at the target is replaced only if it is empty, or
+// contains `marker_file` (the sign that this program wrote it) and nothing but `own_entries`, where
+// these are given; else the constructor and Commit throw Error that names what would be lost.
 class OutputFolder {
  public:
-  OutputFolder(const std::string& path, const std::string& marker_file);
+  OutputFolder(const std::string& path, const std::string& marker_file,
+               const std::vector<std::string>& own_entries = {});
   ~OutputFolder();
   OutputFolder(OutputFolder&&) noexcept;
   OutputFolder& operator=(OutputFolder&&) noexcept;
