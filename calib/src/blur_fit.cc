@@ -106,10 +106,9 @@ Normal NormalMatrix(ceres::Problem* problem, std::size_t samples, const std::vec
           jacobian.values[static_cast<std::size_t>(k)];
     }
     normal.matrix += weight * derivative * derivative.transpose();
-    if (is_sample) {
-      normal.chi2 += weight * r * r;
-      normal.weight += weight;
-    }
+    // A prior is a measurement too: it counts in chi^2 and in the degrees of freedom.
+    normal.chi2 += weight * r * r;
+    normal.weight += weight;
   }
   return normal;
 }
@@ -220,10 +219,7 @@ class Fit {
       if (std::find(held.begin(), held.end(), i) == held.end()) free.push_back(i);
     }
     const Normal normal = NormalMatrix(problem, samples_.size(), free);
-    const double priors =
-        (setup_.floor_variance_px2 && setup_.floor_variance_px2->sigma > 0 ? 1.0 : 0.0) +
-        (setup_.offset_mm.sigma > 0 ? 1.0 : 0.0);
-    const double dof = normal.weight + priors - static_cast<double>(free.size());
+    const double dof = normal.weight - static_cast<double>(free.size());
     if (!(dof > 0)) return Fail("too few frames fit the blur law to tell its errors");
     result_.chi2_per_dof = normal.chi2 / dof;
 

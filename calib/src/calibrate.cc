@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <map>
 #include <mutex>
 #include <numeric>
 #include <set>
@@ -30,9 +32,15 @@ constexpr int kFewestEdges = 12;
 constexpr double kFaintContrast = 0.5;
 // |d reading/d variance - 1| below this: the target's edges stand alone, readings are absolute.
 constexpr double kIsolatedEdges = 0.08;
+constexpr double kStatedEdges = 0.2;  // the same where the target is stated to be an edge
 // What the meter itself is good for, relative to the variance it measures.
 constexpr double kAbsoluteMeterError = 0.01;
 constexpr double kRelativeMeterError = 0.03;
+
+// Files are named as the table of readings names them, not by where they lie on this machine.
+std::string FileName(const std::string& image) {
+  return std::filesystem::path(image).filename().string();
+}
 
 class Calibrator {
  public:
@@ -55,7 +63,8 @@ class Calibrator {
       MeasureBlur();
       SolveFocus(sweep_, blur_samples_, absolute_, reference_, &result_);
     }
-    result_.frames_used = static_cast<int>(used_.size());
+    result_.frames_used =
+        result_.blur.done ? result_.blur.frames_used : static_cast<int>(used_.size());
     result_.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return std::move(result_);
@@ -89,18 +98,8 @@ class Calibrator {
 
   // Absolute gates on every frame, then the blank gate against the median of those that passed.
   bool MeasureAndGate() {
-    std::set<double> distinct;
-    for (const model::SweepFrame& frame : sweep_.frames) distinct.insert(frame.reading_mm);
-    if (sweep_.frames.size() < kFewestFrames) {
-      return Refuse(fmt::format("a sweep needs at least {} frames, this one has {}", kFewestFrames,
-                                sweep_.frames.size()));
-    }
-    if (distinct.size() < kFewestFrames) {
-      return Refuse(fmt::format(
-          "a sweep needs at least {} different readings, this one has {}{}", kFewestFrames,
-          distinct.size(),
-          distinct.size() == 1 ? fmt::format(" (all are {} mm)", *distinct.begin()) : ""));
-    }
+    std::string why;
+    if (!HasEnoughFrames(sweep_, &why)) return Refuse(why);
     model::ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
       const auto index = static_cast<std::size_t>(i);
       const cv::Mat stored = sweep_.read_frame(index);
@@ -175,23 +174,36 @@ class Calibrator {
   bool KeepOnly(const Passes& passes, const Reason& reason) {
     std::set<double> distinct;
     std::vector<std::size_t> kept;
-    std::string first_reason;
     for (const std::size_t i : used_) {
       if (passes(i)) {
         kept.push_back(i);
         distinct.insert(result_.frames[i].reading_mm);
-        continue;
+      } else {
+        result_.frames[i].rejection = reason(i);
       }
-      result_.frames[i].rejection = reason(i);
-      if (first_reason.empty())
-        first_reason = result_.frames[i].image + ": " + result_.frames[i].rejection;
     }
     used_ = kept;
     if (distinct.size() >= kFewestFrames) return true;
-    return Refuse(fmt::format(
-        "{} of {} frames are usable at {} different readings, {} are needed; the first rejected: "
-        "{}",
-        used_.size(), sweep_.frames.size(), distinct.size(), kFewestFrames, first_reason));
+    return Refuse(TooFewUsable(distinct.size()));
+  }
+
+  // "3 of 35 frames are usable, 5 at different readings are needed: 30 dark, 2 blank
+  // (frame_000.png: ...)".
+  std::string TooFewUsable(std::size_t distinct_readings) const {
+    std::map<std::string, int> counts;
+    std::string first;
+    for (const FrameMeasurement& frame : result_.frames) {
+      if (frame.rejection.empty()) continue;
+      ++counts[frame.rejection.substr(0, frame.rejection.find_first_of(":,0123456789"))];
+      if (first.empty()) first = FileName(frame.image) + ": " + frame.rejection;
+    }
+    std::string reasons;
+    for (const auto& [name, count] : counts) {
+      reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", count, name);
+    }
+    return fmt::format(
+        "{} of {} frames are usable, at {} different readings; {} are needed: {} ({})",
+        used_.size(), sweep_.frames.size(), distinct_readings, kFewestFrames, reasons, first);
   }
 
   // The bench zero, given or from the image scale; then every frame's depth.
@@ -297,11 +309,31 @@ class Calibrator {
     return noises[noises.size() / 10];
   }
 
+  // A stated target decides; what the meter says of it may contradict, and is told.
+  bool ReadingsAreAbsolute(const std::optional<double>& slope) {
+    const double off = slope ? std::abs(*slope - 1) : 1;
+    switch (sweep_.target) {
+      case model::SweepTarget::kTexture:
+        return false;
+      case model::SweepTarget::kPrintedEdge:
+      case model::SweepTarget::kKnifeEdge:
+        if (off < kStatedEdges) return true;
+        result_.warnings.push_back(
+            fmt::format("the target is stated as {}, but the blur meter does not find isolated "
+                        "edges with a Gaussian blur in the sharpest "
+                        "frame: it is treated as a texture",
+                        model::SweepTargetName(sweep_.target)));
+        return false;
+      default:
+        return off < kIsolatedEdges;
+    }
+  }
+
   void MeasureBlur() {
     const cv::Mat reference = Grey(reference_);
     const double noise = SweepNoise();
     const std::optional<double> slope = EdgeMeterSlope(reference, noise, sweep_.camera.psf);
-    absolute_ = slope && std::abs(*slope - 1) < kIsolatedEdges;
+    absolute_ = ReadingsAreAbsolute(slope);
     const cv::Point2d centre(sweep_.camera.sensor.principal_point_px.x() - sweep_.roi.x,
                              sweep_.camera.sensor.principal_point_px.y() - sweep_.roi.y);
     std::mutex mutex;
@@ -345,6 +377,24 @@ class Calibrator {
 
 }  // namespace
 
+bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
+  std::set<double> distinct;
+  for (const model::SweepFrame& frame : sweep.frames) distinct.insert(frame.reading_mm);
+  if (sweep.frames.size() < kFewestFrames) {
+    *why = fmt::format("a sweep needs at least {} frames, this one has {}", kFewestFrames,
+                       sweep.frames.size());
+    return false;
+  }
+  if (distinct.size() < kFewestFrames) {
+    *why =
+        fmt::format("a sweep needs at least {} different readings, this one has {}{}",
+                    kFewestFrames, distinct.size(),
+                    distinct.size() == 1 ? fmt::format(" (all are {} mm)", *distinct.begin()) : "");
+    return false;
+  }
+  return true;
+}
+
 bool CalibrationOptions::IsValid(std::string* why) const {
   const auto fail = [why](const std::string& message) {
     if (why != nullptr) *why = message;
@@ -383,7 +433,7 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
   found.evidence.frames_used = calibration.frames_used;
   for (const FrameMeasurement& frame : calibration.frames) {
     if (!frame.rejection.empty())
-      found.evidence.frames_rejected.push_back({frame.image, frame.rejection});
+      found.evidence.frames_rejected.push_back({FileName(frame.image), frame.rejection});
   }
   const auto estimate = [](const std::optional<Result>& r) -> std::optional<model::Estimate> {
     if (!r) return std::nullopt;

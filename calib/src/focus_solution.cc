@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <limits>
 
 #include "edge_pixels.h"
 
@@ -19,7 +21,7 @@ constexpr double kRelativeRatioError = 0.05;
 // Weight of the robust loss below which a frame is told: six standard deviations off.
 constexpr double kOutlierWeight = 0.15;
 constexpr std::size_t kFewestOnASide = 8;
-constexpr double kSmallestRatio = 0.1, kLargestRatio = 1.0;
+constexpr double kSmallestRatio = 0.1, kLargestRatio = 0.8;
 
 // What may be assumed of the variance at focus: a value, or only an interval.
 struct FloorChoice {
@@ -175,7 +177,8 @@ class Solution {
     for (std::size_t i = 0; i < std::min<std::size_t>(outliers.size(), 3); ++i) {
       const FrameMeasurement& frame = result_.frames[outliers[i]];
       names +=
-          fmt::format("{}{} (reading {} mm)", i == 0 ? "" : ", ", frame.image, frame.reading_mm);
+          fmt::format("{}{} (reading {} mm)", i == 0 ? "" : ", ",
+                      std::filesystem::path(frame.image).filename().string(), frame.reading_mm);
     }
     if (outliers.size() > 3) names += fmt::format(" and {} more", outliers.size() - 3);
     result_.warnings.push_back(fmt::format(
@@ -207,6 +210,13 @@ class Solution {
                       "{:.3f} +- {:.3f}): "
                       "move the target farther from focus on both sides",
                       kappa, kappa_sigma));
+      return false;
+    }
+    if (!(zf_sigma < 0.5 * (Farthest() - Nearest()))) {
+      Refuse(
+          fmt::format("the depth of focus is not fixed by the blur: {:.1f} +- {:.1f} mm in a sweep "
+                      "from {:.1f} to {:.1f} mm",
+                      zf, zf_sigma, Nearest(), Farthest()));
       return false;
     }
     if (outside_mm > 0 && !(zf_sigma < StepMm())) {
@@ -248,14 +258,62 @@ class Solution {
       }
     }
     IncludeSides(&focus, &ratio);
+    const Tolerances open = OpenByTolerances();
+    focus += Eigen::Vector2d(-open.focus_depth_mm, open.focus_depth_mm);
+    ratio += Eigen::Vector2d(-open.blur_ratio, open.blur_ratio);
     const double meter = absolute_ ? kAbsoluteRatioError : kRelativeRatioError;
     result_.blur_ratio->systematic =
         Eigen::Vector2d(ratio.x() * (1 - meter), ratio.y() * (1 + meter));
     result_.focus_depth_mm->systematic = focus;
     // d1 falls as zf grows.
     result_.image_distance_mm->systematic =
-        Eigen::Vector2d(model::ImageDistanceMm(setup_.lens, focus.y()),
-                        model::ImageDistanceMm(setup_.lens, focus.x()));
+        Eigen::Vector2d(model::ImageDistanceMm(setup_.lens, focus.y()) - open.image_distance_mm,
+                        model::ImageDistanceMm(setup_.lens, focus.x()) + open.image_distance_mm);
+  }
+
+  // What the tolerances stated in the camera file leave open, in quadrature. d1 follows the focal
+  // length directly; what comes to it through zf is in the interval of zf.
+  struct Tolerances {
+    double focus_depth_mm = 0, image_distance_mm = 0, blur_ratio = 0;
+  };
+  Tolerances OpenByTolerances() const {
+    Tolerances open;
+    for (const auto& [field, statement] : sweep_.camera.statements) {
+      if (!(statement.tolerance > 0)) continue;
+      Tolerances largest;
+      for (const double change : {-statement.tolerance, statement.tolerance}) {
+        BlurFitSetup changed = setup_;
+        if (!Change(field, change, &changed)) continue;
+        const BlurFitResult fit = FitBlur(samples_, changed);
+        if (!fit.done) continue;
+        const double zf = result_.focus_depth_mm->value;
+        largest.focus_depth_mm = std::max(largest.focus_depth_mm, std::abs(fit.values[0] - zf));
+        largest.blur_ratio =
+            std::max(largest.blur_ratio, std::abs(fit.values[1] - result_.blur_ratio->value));
+        largest.image_distance_mm =
+            std::max(largest.image_distance_mm, std::abs(model::ImageDistanceMm(changed.lens, zf) -
+                                                         model::ImageDistanceMm(setup_.lens, zf)));
+      }
+      open.focus_depth_mm = std::hypot(open.focus_depth_mm, largest.focus_depth_mm);
+      open.image_distance_mm = std::hypot(open.image_distance_mm, largest.image_distance_mm);
+      open.blur_ratio = std::hypot(open.blur_ratio, largest.blur_ratio);
+    }
+    return open;
+  }
+
+  // Moves a number of the camera file; false for those that the fit does not use, or an impossible
+  // value.
+  static bool Change(const std::string& field, double change, BlurFitSetup* setup) {
+    double* number = field == "lens.front_focal_length_mm"  ? &setup->lens.front_focal_length_mm
+                     : field == "lens.rear_focal_length_mm" ? &setup->lens.rear_focal_length_mm
+                     : field == "lens.lens_thickness_mm"    ? &setup->lens.lens_thickness_mm
+                     : field == "lens.aperture_radius_mm"   ? &setup->lens.aperture_radius_mm
+                     : field == "sensor.pixel_pitch_mm"     ? &setup->pixel_pitch_mm
+                                                            : nullptr;
+    if (number == nullptr) return false;
+    *number += change;
+    return setup->lens.IsValid(nullptr) && setup->pixel_pitch_mm > 0 &&
+           setup->lens.front_focal_length_mm < setup->start_focus_depth_mm;
   }
 
   // Each side of focus alone. A real lens (spherical aberration, a target that fills the field on
@@ -294,8 +352,10 @@ class Solution {
     const double floor_px2 = fit.values[2];
     const double error_px2 = std::sqrt(fit.covariance(2, 2));
     if (choice.interval_px2) {
+      // Only the interval is known; any value in it would be made up.
+      constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
       result_.blur_floor_px =
-          Result{std::sqrt(floor_px2), 0, Eigen::Vector2d(choice.interval_px2->cwiseSqrt())};
+          Result{kUnknown, kUnknown, Eigen::Vector2d(choice.interval_px2->cwiseSqrt())};
       result_.blur.undetermined.emplace_back("blur_floor_px");
     } else if (floor_px2 > error_px2 || !choice.is_measured) {
       const double floor_px = std::sqrt(std::max(0.0, floor_px2));

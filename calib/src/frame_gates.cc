@@ -36,8 +36,19 @@ PileUp BrightPileUp(const std::vector<double>& histogram, double total) {
   };
   const double bright = sum(end - width, end);
   const double below = sum(end - 4 * width, end - width) / 3;
-  // A plateau of the target broadened by noise has a flank as wide as itself; clipping has none.
   if (!(bright > 4 * below)) return {};
+  // A plateau of the target is spread by noise to both sides of its middle; clipping cuts the upper
+  // side off.
+  const auto value_at = [&](double fraction) {
+    double count = 0;
+    std::size_t value = end - width;
+    while (value + 1 < end && count + histogram[value] < fraction * bright)
+      count += histogram[value++];
+    return static_cast<double>(value);
+  };
+  const double upper = value_at(0.95) - value_at(0.5);
+  const double lower = value_at(0.5) - value_at(0.05);
+  if (upper > 0 && upper > 0.5 * lower) return {};
   return {bright / total, static_cast<double>(end - 1) / static_cast<double>(top)};
 }
 
@@ -55,9 +66,9 @@ PileUp Saturation(const cv::Mat& stored, double noise_sigma) {
       }
     }
     PileUp found = BrightPileUp(histogram, static_cast<double>(stored.total()));
-    // A frame without noise (a drawing) piles up on every value it has; only full scale counts
-    // there.
-    if (found.level < 1 && !(noise_sigma > 0)) found = {};
+    // Where the noise is below the steps of the file, every plateau piles up on one value: only
+    // full scale counts there.
+    if (found.level < 1 && !(noise_sigma * static_cast<double>(levels - 1) > 0.5)) found = {};
     if (found.fraction > worst.fraction) worst = found;
   }
   return worst;

@@ -9,8 +9,8 @@
 namespace thicklens::calib {
 namespace {
 
-// Scales need no more than this: .02 px over 256 px is below the error of any reading.
-constexpr int kRegistrationSizePx = 256;
+// More pixels than this would cost time and tell nothing more about the scale.
+constexpr int kRegistrationSizePx = 1024;
 
 cv::Mat ForRegistration(const FocusSweep& sweep, std::size_t index) {
   const cv::Mat grey = LinearGrey(sweep.read_frame(index), sweep, index);

@@ -8,7 +8,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestFrames = 5;
-constexpr double kTopFraction = 0.6;
+constexpr double kTopFraction = 0.8;
 
 }  // namespace
 

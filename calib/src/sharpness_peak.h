@@ -14,7 +14,7 @@ struct SharpnessSample {
 };
 
 // A parabola through the logarithm of the index against 1/z, over the contiguous frames around the
-// largest that reach 60 % of it (at least five). sigma is from the scatter about the parabola.
+// largest that reach 80 % of it (at least five). sigma is from the scatter about the parabola.
 SharpnessPeak FitSharpnessPeak(std::vector<SharpnessSample> samples);
 
 }  // namespace thicklens::calib

@@ -55,7 +55,7 @@ struct SourceRecipe {
   int sharpest_frame = -1;  // index into frames
   double focus_depth_mm = 0;
   double image_distance_mm = 0;
-  double blur_ratio = 0;  // dominated by frames near focus (DESIGN 4.4)
+  double blur_ratio = 0;  // dominated by frames near focus (the ratio diverges there)
   int ratio_frames = 0;   // frames in the mean; the sharpest has r_defocus = 0 and is left out
 };
 
@@ -114,9 +114,13 @@ struct Calibration {
   ScaleLaw scale;
   BlurFit blur;
   std::vector<FrameMeasurement> frames;  // in the sweep's order
-  int frames_used = 0;
+  int frames_used = 0;  // in the blur fit; before there is one, those that passed the gates
   double seconds = 0;
 };
+
+// Whether a calibration can be attempted at all: frames and different readings, without opening
+// any.
+bool HasEnoughFrames(const FocusSweep& sweep, std::string* why);
 
 // Runs the gates, the meters and both methods. Bad data end in a Calibration whose outcome is
 // kRefused or kPartial with the reason; a wrong file or setting throws Error.

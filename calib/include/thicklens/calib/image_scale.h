@@ -28,7 +28,7 @@ struct ScaleSample {
 // Fits 1/scale = (offset + direction reading)/z_reference, the size on the sensor going as 1/z
 // along the chief rays. Robust (Ceres, Cauchy loss on the readings). sigma is the larger of the
 // formal one and a delete-a-block jackknife over eight runs of neighbouring readings, because the
-// law's errors are not independent from frame to frame; a bias of the registration (3e-4 of scale
+// law's errors are not independent from frame to frame; a bias of the registration (2e-4 of scale
 // from end to end) is added in quadrature. `done` is false, with the reason, where the samples are
 // too few, or the scale does not follow 1/z (constant: telecentric, sensor moved, or one picture
 // repeated; reversed: the direction is wrong).
