@@ -157,7 +157,9 @@ CommandResult RunCalibration(const CalibrateOptions& options, const SweepInput& 
     for (const std::string& warning : calibration.warnings)
       spdlog::warn("{}", PrintableUtf8(warning));
   }
-  PrintResult(options.common, CalibrationText(input.sweep, calibration, TruthOf(input)));
+  // A refusal before anything was measured is one line, on stderr.
+  if (refusal.empty() || calibration.source.done)
+    PrintResult(options.common, CalibrationText(input.sweep, calibration, TruthOf(input)));
   CommandResult result;
   result.summary =
       CalibrationJson(input.sweep, calibration, TruthOf(input), options.use_source_recipe());
@@ -186,7 +188,8 @@ double Median(std::vector<double> values) {
 Understanding Understand(const SweepInput& input) {
   std::string why;
   if (!input.sweep.IsValid(&why)) throw Error(fmt::format("{}: {}", input.file.source, why));
-  if (input.sweep.frames.empty()) throw Error(fmt::format("{}: has no frames", input.file.source));
+  if (!calib::HasEnoughFrames(input.sweep, &why))
+    throw Error(fmt::format("{}: {}", input.file.source, why));
   const cv::Mat first = input.sweep.read_frame(0);
   calib::LinearGrey(first, input.sweep, 0);
   std::set<double> readings;

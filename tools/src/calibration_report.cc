@@ -475,8 +475,10 @@ std::string Cell(const std::string& content, const std::string& css_class = "num
                      EscapeXml(is_number ? TrueMinus(content) : content));
 }
 
-// With no-break spaces.
+// With no-break spaces. Without a sigma it was not fitted: given, or taken for granted.
 std::string WithSigma(const calib::Result& result) {
+  if (!std::isfinite(result.value)) return "not determined";
+  if (!(result.sigma > 0)) return RoundedTo(result.value, 0) + "\u00A0(held)";
   return fmt::format("{}\u00A0±\u00A0{}", RoundedTo(result.value, result.sigma),
                      RoundedSigma(result.sigma));
 }
@@ -506,8 +508,9 @@ std::string ResultsTable(const std::vector<ResultRow>& rows) {
   html += "</tbody></table></div>\n";
   html +=
       "<p class=\"soft\">Statistical: one standard deviation from noise and readings. Systematic: "
-      "the interval that the unknown floor, the method, the side of focus and stated tolerances "
-      "leave open. The source's recipe has no error estimate.</p>\n";
+      "the interval that the lens floor where it is not known, the two sides of focus where they "
+      "disagree, the blur meter and the stated tolerances leave open. The source's recipe has no "
+      "error estimate.</p>\n";
   return html;
 }
 

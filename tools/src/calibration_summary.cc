@@ -37,8 +37,8 @@ json Number(const std::optional<double>& value) { return value ? Number(*value) 
 json Measured(double value) { return value == 0 ? json(nullptr) : Number(value); }
 
 json ResultJson(const std::optional<calib::Result>& result) {
-  if (!result || !std::isfinite(result->value)) return nullptr;
-  json out = {{"value", result->value}, {"sigma", Number(result->sigma)}};
+  if (!result || (!std::isfinite(result->value) && !result->systematic)) return nullptr;
+  json out = {{"value", Number(result->value)}, {"sigma", Number(result->sigma)}};
   out["systematic"] = nullptr;
   if (result->systematic && result->systematic->allFinite())
     out["systematic"] = json::array({result->systematic->x(), result->systematic->y()});
@@ -185,7 +185,11 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
         result.unit.empty() ? result.label : fmt::format("{} [{}]", result.label, result.unit),
         rounded(result.source), "-", "-"};
     if (result.fit) {
-      row[2] = fmt::format("{} +- {}", RoundedTo(result.fit->value, sigma), RoundedSigma(sigma));
+      // Without a sigma it was not fitted: given, or taken for granted within the interval.
+      row[2] = !std::isfinite(result.fit->value) ? std::string("not determined")
+               : UsableSigma(sigma) ? fmt::format("{} +- {}", RoundedTo(result.fit->value, sigma),
+                                                  RoundedSigma(sigma))
+                                    : fmt::format("{} (held)", RoundedTo(result.fit->value, sigma));
       if (result.fit->systematic)
         row[3] = fmt::format("{} .. {}", RoundedTo(result.fit->systematic->x(), sigma),
                              RoundedTo(result.fit->systematic->y(), sigma));
@@ -193,7 +197,7 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
     if (has_truth) {
       row.push_back(rounded(result.truth));
       std::string error = "-";
-      if (result.truth && result.fit) {
+      if (result.truth && result.fit && std::isfinite(result.fit->value)) {
         error = SignedRoundedTo(result.fit->value - *result.truth, sigma);
         if (UsableSigma(sigma))
           error += fmt::format(" ({:+.1f} sigma)", (result.fit->value - *result.truth) / sigma);

@@ -29,6 +29,28 @@ double Magnification(const model::ThickLens& lens, double image_distance_mm, dou
   return std::abs(model::ChiefRayMagnification(lens, image_distance_mm, depth_mm));
 }
 
+// Standard deviation of kappa r |c(z)|/p from those of kappa and d1: where c(z) is small, at focus,
+// it is the plane of focus that counts. With the covariance of the two where the camera file has
+// it.
+double DefocusErrorPx(const model::Camera& camera, const Explanation& known, const DepthRow& row,
+                      double depth_mm) {
+  const double by_ratio_px = row.blur_radius_px;
+  const double step_mm = 1e-6 * known.image_distance_mm;
+  const double moved_mm = RadiusMm(camera.lens, known.image_distance_mm + step_mm, depth_mm);
+  const double by_distance_px_per_mm =
+      known.blur_ratio * (moved_mm - row.blur_radius_mm) / step_mm / camera.sensor.pixel_pitch_mm;
+  double covariance = 0;
+  const auto& order = camera.calibration->covariance_order;
+  const auto distance = std::find(order.begin(), order.end(), "image_distance_mm");
+  const auto ratio = std::find(order.begin(), order.end(), "blur_ratio");
+  if (distance != order.end() && ratio != order.end())
+    covariance = camera.calibration->covariance(distance - order.begin(), ratio - order.begin());
+  const double variance = std::pow(by_ratio_px * known.blur_ratio_sigma, 2) +
+                          std::pow(by_distance_px_per_mm * known.image_distance_sigma_mm, 2) +
+                          2 * by_ratio_px * by_distance_px_per_mm * covariance;
+  return std::sqrt(std::max(0.0, variance));
+}
+
 DepthRow RowAt(const model::Camera& camera, const Explanation& known, double depth_mm) {
   const double pitch_mm = camera.sensor.pixel_pitch_mm;
   const model::ThickLens thin = model::ThinCounterpart(camera.lens);
@@ -37,7 +59,7 @@ DepthRow RowAt(const model::Camera& camera, const Explanation& known, double dep
   row.blur_radius_mm = RadiusMm(camera.lens, known.image_distance_mm, depth_mm);
   row.blur_radius_px = row.blur_radius_mm / pitch_mm;
   row.defocus_sigma_px = known.blur_ratio * row.blur_radius_px;
-  row.defocus_sigma_error_px = known.blur_ratio_sigma * row.blur_radius_px;
+  row.defocus_sigma_error_px = DefocusErrorPx(camera, known, row, depth_mm);
   row.sigma_px = std::hypot(row.defocus_sigma_px, known.blur_floor_px.value_or(0));
   row.magnification = Magnification(camera.lens, known.image_distance_mm, depth_mm);
   row.thin_blur_radius_px = RadiusMm(thin, known.image_distance_mm, depth_mm) / pitch_mm;

@@ -22,7 +22,7 @@ struct DepthRow {
   double blur_radius_mm = 0;
   double blur_radius_px = 0;
   double defocus_sigma_px = 0;        // kappa r_defocus/p
-  double defocus_sigma_error_px = 0;  // its standard deviation from that of kappa
+  double defocus_sigma_error_px = 0;  // its standard deviation from those of kappa and d1
   double sigma_px = 0;                // with the lens floor; without the pixel box
   double magnification = 0;           // of the chief ray, absolute value
   double thin_blur_radius_px = 0;     // of the thin lens at the same image distance
