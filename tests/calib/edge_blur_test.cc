@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 #include "drawn_edges.h"
@@ -55,8 +54,6 @@ TEST(MeasureEdgeVariance, IsTrueAtDrawnEdgesOfAnyDirection) {
     for (const double sigma_px : {0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0}) {
       const auto blur = MeasureEdgeVariance(DrawnEdge(128, angle_deg, sigma_px, 0.2, 0.8));
       ASSERT_TRUE(blur) << angle_deg << " " << sigma_px;
-      if (std::getenv("MEASURE"))
-        printf("E %g %g %.4f\n", angle_deg, sigma_px, std::sqrt(blur->variance_px2) - sigma_px);
       EXPECT_NEAR(std::sqrt(blur->variance_px2), sigma_px, MeterBoundPx(sigma_px))
           << angle_deg << " degrees";
     }
@@ -70,11 +67,6 @@ TEST(MeasureEdgeVariance, HoldsWithNoiseAndEightBits) {
       const cv::Mat edge = DrawnEdge(192, angle_deg, sigma_px, 0.2, 0.8);
       const auto blur = MeasureEdgeVariance(Stored(edge, 1, 256, ++seed));
       ASSERT_TRUE(blur) << angle_deg << " " << sigma_px;
-      const double error_px2 = blur->variance_px2 - sigma_px * sigma_px;
-      if (std::getenv("MEASURE"))
-        printf("N %g %g %.4f rel %.4f err %.4f pull %.2f\n", angle_deg, sigma_px,
-               std::sqrt(blur->variance_px2) - sigma_px, error_px2 / sigma_px / sigma_px,
-               blur->error_px2, error_px2 / blur->error_px2);
       EXPECT_NEAR(std::sqrt(blur->variance_px2), sigma_px,
                   MeterBoundPx(sigma_px) + 0.006 + 0.003 * sigma_px)
           << angle_deg << " degrees";
@@ -94,8 +86,6 @@ TEST(MeasureEdgeVariance, ErrorIsTheScatterOverNoise) {
     stated += blur->error_px2 / kRuns;
   }
   const double scatter = std::sqrt(squares - mean * mean);
-  if (std::getenv("MEASURE"))
-    printf("S scatter %.4f stated %.4f mean err %.4f\n", scatter, stated, mean - 1.44);
   EXPECT_GT(stated, 0.6 * scatter);
   EXPECT_LT(stated, 2 * scatter);
 }
@@ -109,7 +99,6 @@ TEST(MeasureSourceEdgeBlur, IsNearlyFlatBelowSevenTenthsOfAPixel) {
   // What a study of the source's meter found on slanted edges.
   const auto measure = [](double sigma_px) {
     const auto blur = MeasureSourceEdgeBlur(DrawnEdge(128, 5, sigma_px, 0.2, 0.8));
-    if (std::getenv("MEASURE")) printf("Z %g %.4f\n", sigma_px, blur ? blur->sigma_px : -1);
     return blur ? blur->sigma_px : -1;
   };
   EXPECT_NEAR(measure(0.3), 0.83, 0.06);
@@ -127,7 +116,6 @@ TEST(EdgeMeterSlope, IsOneAtEdgesAndLessInTextures) {
     options.target.kind = kind;
     const Textures textures = Render(options, 300.2, 1, 1);
     const auto slope = EdgeMeterSlope(textures.grey[0], 0.004, textures.psf);
-    if (std::getenv("MEASURE")) printf("M %d %.4f\n", static_cast<int>(kind), slope.value_or(-1));
     return slope.value_or(-1);
   };
   EXPECT_NEAR(slope_on(model::TargetKind::kKnifeEdge), 1, 0.04);
@@ -153,10 +141,6 @@ TEST(MeasureAddedVariance, IsTrueOnATextureAtEveryScale) {
       const auto added =
           MeasureAddedVariance(t.grey[kReference], t.grey[i], scale, t.centre, 0.005, t.psf);
       ASSERT_TRUE(added) << depth_mm;
-      if (std::getenv("MEASURE"))
-        printf("A z %g scale %.3f truth %.4f got %.4f +- %.4f rel %.3f\n", depth_mm, scale,
-               truth_px2, added->variance_px2, added->error_px2,
-               added->variance_px2 / truth_px2 - 1);
       EXPECT_NEAR(added->variance_px2, truth_px2, 0.02 + 0.04 * truth_px2) << depth_mm << " mm";
     }
   }
@@ -170,7 +154,6 @@ TEST(MeasureAddedVariance, IsNegativeWhereTheFrameIsTheSharperOne) {
   ASSERT_LT(truth_px2, -0.1);
   const auto added = MeasureAddedVariance(t.grey[1], t.grey[0], scale, t.centre, 0.005, t.psf);
   ASSERT_TRUE(added);
-  if (std::getenv("MEASURE")) printf("NEG truth %.4f got %.4f\n", truth_px2, added->variance_px2);
   EXPECT_NEAR(added->variance_px2, truth_px2, 0.3 * std::abs(truth_px2));
 }
 

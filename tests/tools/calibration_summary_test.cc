@@ -203,7 +203,7 @@ TEST(CalibrationJson, SurvivesNanAndBrokenFileNames) {
   const json out = CalibrationJson(made.sweep, c, &made.truth, false);
   const json back = json::parse(out.dump());
   EXPECT_EQ(back, out) << "a NaN compares unequal to itself or came back as null";
-  EXPECT_TRUE(out["image_distance_mm"].is_null());
+  EXPECT_TRUE(out["image_distance_mm"]["value"].is_null());
   EXPECT_TRUE(out["focus_depth_mm"]["sigma"].is_null());
   EXPECT_TRUE(out["blur_ratio"]["systematic"].is_null());
   EXPECT_TRUE(out["frames"][0]["blur_sigma_px"].is_null());

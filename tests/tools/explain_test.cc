@@ -53,7 +53,16 @@ TEST(ExplainCamera, GivesTheBlurOfTheClosedForm) {
   EXPECT_NEAR(known.rows[1].blur_radius_mm, 0, 1e-9);
   EXPECT_NEAR(known.rows[2].blur_radius_mm, step_mm, 1e-9);
   EXPECT_NEAR(known.rows[0].defocus_sigma_px, 0.45 * step_mm / kPitchMm, 1e-7);
-  EXPECT_NEAR(known.rows[0].defocus_sigma_error_px, 0.009 * step_mm / kPitchMm, 1e-7);
+  // c = [f1 D - (D - f2) z]/(f2 z), so dc/dD = (f1 - z)/(f2 z); at focus it is all there is.
+  const model::Camera camera = ThickCamera();
+  const double distance_sigma_mm = camera.calibration->image_distance_mm->sigma;
+  const auto by_distance_px = [&](double depth_mm) {
+    return 0.45 * 10 * std::abs(camera.lens.front_focal_length_mm - depth_mm) /
+           (camera.lens.rear_focal_length_mm * depth_mm) * distance_sigma_mm / kPitchMm;
+  };
+  EXPECT_NEAR(known.rows[0].defocus_sigma_error_px,
+              std::hypot(0.009 * step_mm / kPitchMm, by_distance_px(500)), 1e-5);
+  EXPECT_NEAR(known.rows[1].defocus_sigma_error_px, by_distance_px(1000), 1e-5);
   EXPECT_NEAR(known.rows[1].sigma_px, 0.5, 1e-9);
   EXPECT_NEAR(known.rows[0].magnification, 50000 / 950.0 / 500, 1e-9);
   EXPECT_EQ(known.rows[2].magnification, 0);
