@@ -164,6 +164,7 @@ std::optional<EdgeVariance> MeasureEdgeVariance(const cv::Mat& grey, const EdgeS
   result.edge_count = static_cast<int>(variances.size());
   result.variance_px2 = Median(variances);
   std::vector<double> deviations;
+  deviations.reserve(variances.size());
   for (const double v : variances) deviations.push_back(std::abs(v - result.variance_px2));
   // 1.4826 MAD estimates the standard deviation, sqrt(pi/2) that of a median; neighbours along an
   // edge share their smoothing, so about one pixel in 2 sigma counts as independent.

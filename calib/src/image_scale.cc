@@ -217,6 +217,7 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
   // The scatter of the readings about the law sets the scale of the loss; three rounds settle it.
   for (int round = 0; round < 3; ++round) {
     std::vector<double> errors;
+    errors.reserve(samples.size());
     for (const ScaleSample& s : samples) errors.push_back(std::abs(ReadingError(s, law, sign)));
     sigma_mm = std::max({1.4826 * Median(errors), reading_sigma_mm, 1e-6});
     const std::optional<Law> solved = SolveLaw(samples, sign, sigma_mm, law, &covariance);
