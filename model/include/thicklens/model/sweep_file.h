@@ -48,8 +48,8 @@ struct SweepFile {
 };
 
 // Reads the YAML and, with `frames_csv`, the table. Throws Error with file:line:column, also for a
-// row without a file, a picture in `frames_dir` (or of `frames_glob`) without a row, duplicate rows and
-// rows that are no numbers. What was taken for granted is told in `notices`.
+// row without a file, a picture in `frames_dir` (or of `frames_glob`) without a row, duplicate rows
+// and rows that are no numbers. What was taken for granted is told in `notices`.
 SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
 
 // A sweep out of a folder and a table, all else at its default: `thicklens calibrate DIR
