@@ -198,13 +198,14 @@ OutputFolder::OutputFolder(const std::string& path, const std::string& marker_fi
   if (!named.has_filename() || named.filename() == "." || named.filename() == "..")
     throw Error(fmt::format("{}: a folder of its own is expected, by name", path));
   const fs::path target = Followed(named);
-  RequireReplaceable(target, marker_file, own_entries);
   RequireParentFolder(target);
   impl_->path = target.string();
   impl_->part = PartName(target);
   impl_->marker_file = marker_file;
   impl_->own_entries = own_entries;
   impl_->fd = OpenLocked(impl_->part, path, PartKind::kFolder);
+  // Under the lock: another run's Commit would be seen half-way else.
+  RequireReplaceable(target, marker_file, own_entries);
   std::error_code ignored;
   for (const auto& left_over : fs::directory_iterator(impl_->part, ignored))
     fs::remove_all(left_over, ignored);
