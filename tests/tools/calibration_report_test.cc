@@ -111,6 +111,21 @@ TEST(CalibrationReport, PartialResultKeepsTheFiguresItHas) {
   EXPECT_THAT(html, HasSubstr("is taken from the points"));
 }
 
+// A floor of which only an interval is known has no value; the law is drawn all the same.
+TEST(CalibrationReport, AnIntervalForTheFloorKeepsTheFittedCurve) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  made.calibration.blur_floor_px.reset();
+  const std::string without = Page(made, false);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  made.calibration.blur_floor_px = calib::Result{kNan, kNan, Eigen::Vector2d(0, 0.7)};
+  const std::string html = Page(made, false);
+  ASSERT_EQ(ParseXml(html).error, "");
+  EXPECT_THAT(html, HasSubstr("is taken from the points"));
+  EXPECT_THAT(html, HasSubstr("not determined"));
+  EXPECT_EQ(ParseXml(html).Named("path").size(), ParseXml(without).Named("path").size());
+  EXPECT_EQ(ParseXml(html).Named("polyline").size(), ParseXml(without).Named("polyline").size());
+}
+
 TEST(CalibrationReport, SurvivesNumbersThatAreNone) {
   MadeUpCalibration made = MakeUpCalibration(9, 340, 15);
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -153,7 +153,7 @@ class BlurLaw {
     const double d_mm = law.image_distance_mm_ - lens.lens_thickness_mm;
     if (!std::isfinite(law.blur_ratio_) || !(d_mm >= lens.rear_focal_length_mm))
       return std::nullopt;
-    if (calibration.blur_floor_px) {
+    if (calibration.blur_floor_px && std::isfinite(calibration.blur_floor_px->value)) {
       law.floor_squared_px2_ = std::pow(calibration.blur_floor_px->value, 2);
     } else {
       law.floor_squared_px2_ = law.FloorSquaredFromFrames(calibration);
