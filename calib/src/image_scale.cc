@@ -17,6 +17,8 @@ constexpr int kFewestSamples = 5;
 constexpr int kCoarseSizePx = 256;  // where a registration starts
 constexpr double kLargestRefinement = 1e-3;
 constexpr double kMaxAnisotropy = 0.015;
+// Readings that scatter by more of their range than this come from registrations that failed.
+constexpr double kLargestScatter = 0.03;
 constexpr double kMinCorrelation = 0.6;
 // What a registration may be wrong by from one end of a sweep to the other and still look straight:
 // measured on simulated sweeps, whose scales are known.
@@ -235,6 +237,15 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
     ++result.frames_used;
   }
   result.reading_rms_mm = std::sqrt(sum / std::max(1, result.frames_used));
+  const double range_mm = farthest->reading_mm - nearest->reading_mm;
+  if (!(result.reading_rms_mm < kLargestScatter * range_mm)) {
+    result.message = fmt::format(
+        "the image scale is not found reliably on this target (the readings scatter by {:.2g} mm "
+        "about "
+        "1/z): state offset_mm",
+        result.reading_rms_mm);
+    return result;
+  }
   result.offset_mm.value = law.offset_mm;
   result.offset_mm.sigma = std::hypot(
       std::max(std::sqrt(covariance(0, 0)), JackknifeSigma(samples, sign, sigma_mm, law)),

@@ -151,6 +151,20 @@ TEST(FitScaleLaw, RefusesAReversedScaleAndNamesTheDirection) {
   EXPECT_THAT(toward.message, HasSubstr("direction must be 'away', not 'toward'"));
 }
 
+// Registrations on a lone edge can give any scale along it.
+TEST(FitScaleLaw, RefusesScalesThatScatterWithoutALaw) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> wrong(0, 0.15);
+  std::vector<ScaleSample> samples;
+  for (std::size_t i = 0; i < 41; ++i) {
+    const double reading_mm = 320 + 4.0 * static_cast<double>(i);
+    samples.push_back({i, reading_mm, 400 / reading_mm * std::exp(wrong(random))});
+  }
+  const ScaleLaw law = FitScaleLaw(samples, 20, 0.07, model::BenchDirection::kAway);
+  EXPECT_FALSE(law.done);
+  EXPECT_THAT(law.message, HasSubstr("not found reliably"));
+}
+
 TEST(FitScaleLaw, RefusesFewerThanFive) {
   const ScaleLaw law =
       FitScaleLaw(Samples(0, BenchDirection::kAway, 4, 0, 1), 2, 0.05, BenchDirection::kAway);
