@@ -83,7 +83,8 @@ struct ScaleLaw {
   int frames_used = 0;
 };
 
-// sigma^2 = S0 + A (1/z - 1/zf)^2, fitted by Ceres in (zf, kappa, floor, offset).
+// sigma^2 = S0 + A (1/z - 1/zf)^2, fitted by Ceres in (zf, kappa, floor); the bench zero is held
+// and its error carried into the results.
 struct BlurFit {
   bool done = false;
   std::string message = "not run";
@@ -127,7 +128,8 @@ bool HasEnoughFrames(const FocusSweep& sweep, std::string* why);
 Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options);
 
 // The camera with what was found, as it is written. Manufacturer's values stay as they are. With
-// `use_source_recipe` its d1 and kappa are taken instead, without sigmas' meaning (they are 0).
+// `use_source_recipe` its d1 and kappa are taken instead; their sigmas are 0, because
+// the recipe has no error estimate, not because they are exact.
 model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& calibration,
                                bool use_source_recipe);
 
