@@ -158,11 +158,50 @@ double ApertureTransmission(Psf psf, double blur_ratio, double aperture_radius_m
   return std::exp(-deviations * deviations / 2);
 }
 
-ApertureSamples SampleAperture(Psf psf, double blur_ratio, double aperture_radius_mm, int u_count,
-                               int v_count) {
+ApertureShape ApertureShapeFromName(const std::string& name) {
+  if (name == "uniform") return ApertureShape::kUniform;
+  if (name == "gaussian") return ApertureShape::kGaussian;
+  if (name == "disc") return ApertureShape::kDisc;
+  throw Error(
+      fmt::format("aperture shape \"{}\" is unknown: it must be uniform, gaussian or disc", name));
+}
+
+std::string ApertureShapeName(ApertureShape shape) {
+  switch (shape) {
+    case ApertureShape::kUniform:
+      return "uniform";
+    case ApertureShape::kGaussian:
+      return "gaussian";
+    case ApertureShape::kDisc:
+      break;
+  }
+  return "disc";
+}
+
+ApertureShape ApertureShapeOf(Psf psf) {
+  return psf == Psf::kDisc ? ApertureShape::kDisc : ApertureShape::kGaussian;
+}
+
+Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count) {
   if (u_count < 1 || v_count < 1) {
     throw Error(fmt::format("views are {}x{}: both counts must be >= 1", u_count, v_count));
   }
+  Eigen::ArrayXXd weights(v_count, u_count);
+  for (int j = 0; j < v_count; ++j) {
+    for (int i = 0; i < u_count; ++i) {
+      const double a = i - (u_count - 1) / 2.0;
+      const double b = j - (v_count - 1) / 2.0;
+      weights(j, i) = shape == ApertureShape::kUniform ? 1.0
+                      : shape == ApertureShape::kDisc
+                          ? (IsInsideDisc(a, u_count, b, v_count) ? 1.0 : 0.0)
+                          : GaussianWeight(a, u_count) * GaussianWeight(b, v_count);
+    }
+  }
+  return weights / weights.sum();
+}
+
+ApertureSamples SampleAperture(const Eigen::ArrayXXd& weights, double blur_ratio,
+                               double aperture_radius_mm) {
   if (!(blur_ratio >= 0) || !std::isfinite(blur_ratio)) {
     throw Error(fmt::format("blur_ratio is {}: it must be finite and >= 0", blur_ratio));
   }
@@ -170,36 +209,35 @@ ApertureSamples SampleAperture(Psf psf, double blur_ratio, double aperture_radiu
     throw Error(
         fmt::format("aperture_radius_mm is {}: it must be finite and >= 0", aperture_radius_mm));
   }
+  if (weights.size() == 0 || !(weights >= 0).all() || !(std::abs(weights.sum() - 1) < 1e-9)) {
+    throw Error(fmt::format("aperture weights: their sum is {}: they must be >= 0 with sum 1",
+                            weights.size() == 0 ? 0.0 : weights.sum()));
+  }
 
   ApertureSamples samples;
-  samples.u_count = u_count;
-  samples.v_count = v_count;
-  samples.weights.resize(v_count, u_count);
-  for (int j = 0; j < v_count; ++j) {
-    for (int i = 0; i < u_count; ++i) {
-      const double a = samples.u_offset(i);
-      const double b = samples.v_offset(j);
-      samples.weights(j, i) = psf == Psf::kDisc
-                                  ? (IsInsideDisc(a, u_count, b, v_count) ? 1.0 : 0.0)
-                                  : GaussianWeight(a, u_count) * GaussianWeight(b, v_count);
-    }
-  }
-  samples.weights /= samples.weights.sum();
-
+  samples.u_count = static_cast<int>(weights.cols());
+  samples.v_count = static_cast<int>(weights.rows());
+  samples.weights = weights;
   double u_moment = 0;
   double v_moment = 0;
-  for (int j = 0; j < v_count; ++j) {
-    for (int i = 0; i < u_count; ++i) {
+  for (int j = 0; j < samples.v_count; ++j) {
+    for (int i = 0; i < samples.u_count; ++i) {
       const double a = samples.u_offset(i);
       const double b = samples.v_offset(j);
-      u_moment += samples.weights(j, i) * a * a;
-      v_moment += samples.weights(j, i) * b * b;
+      u_moment += weights(j, i) * a * a;
+      v_moment += weights(j, i) * b * b;
     }
   }
   const double sigma_mm = blur_ratio * aperture_radius_mm;
   samples.u_step_mm = StepMm(sigma_mm, u_moment);
   samples.v_step_mm = StepMm(sigma_mm, v_moment);
   return samples;
+}
+
+ApertureSamples SampleAperture(Psf psf, double blur_ratio, double aperture_radius_mm, int u_count,
+                               int v_count) {
+  return SampleAperture(ApertureWeights(ApertureShapeOf(psf), u_count, v_count), blur_ratio,
+                        aperture_radius_mm);
 }
 
 bool LightFieldGrid::IsValid(std::string* why) const {
@@ -264,6 +302,13 @@ LightFieldGrid DefaultGrid(const Camera& camera, int u_count, int v_count) {
 
 LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes, int u_count,
                             int v_count) {
+  return GridOnPlanes(camera, planes,
+                      SampleAperture(camera.psf, camera.blur_ratio(),
+                                     camera.lens.aperture_radius_mm, u_count, v_count));
+}
+
+LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes,
+                            const ApertureSamples& samples) {
   CheckPlanes(planes);
   const double image_distance_mm = camera.image_distance_mm();
   const double focus_depth_mm = FocusDepthMm(camera.lens, image_distance_mm);
@@ -280,8 +325,6 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
         st_depth_mm, planes.uv_depth_mm, planes.plane_spacing_mm));
   }
 
-  const ApertureSamples samples = SampleAperture(camera.psf, camera.blur_ratio(),
-                                                 camera.lens.aperture_radius_mm, u_count, v_count);
   const double p = ProjectionOf(camera.lens, image_distance_mm, planes).p;
   // From (10) at fixed s: da = (zl + d0)/d0 du.
   const double uv_per_aperture = planes.plane_spacing_mm / st_depth_mm;
@@ -289,8 +332,8 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
   LightFieldGrid grid;
   grid.s_count = camera.sensor.width_px;
   grid.t_count = camera.sensor.height_px;
-  grid.u_count = u_count;
-  grid.v_count = v_count;
+  grid.u_count = samples.u_count;
+  grid.v_count = samples.v_count;
   grid.planes = planes;
   grid.s_step_mm = grid.t_step_mm = camera.sensor.pixel_pitch_mm / std::abs(p);
   grid.u_step_mm = samples.u_step_mm * uv_per_aperture;

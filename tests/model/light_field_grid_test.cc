@@ -483,6 +483,41 @@ TEST(Disparity, IsTheShiftBetweenViews) {
   EXPECT_THROW(DisparityPx(camera, step_mm, kNan), Error);
 }
 
+TEST(ApertureWeights, AreThoseOfTheNamedShape) {
+  for (const ApertureShape shape :
+       {ApertureShape::kUniform, ApertureShape::kGaussian, ApertureShape::kDisc}) {
+    EXPECT_EQ(ApertureShapeFromName(ApertureShapeName(shape)), shape);
+    const Eigen::ArrayXXd weights = ApertureWeights(shape, 5, 4);
+    EXPECT_EQ(weights.rows(), 4);
+    EXPECT_EQ(weights.cols(), 5);
+    EXPECT_NEAR(weights.sum(), 1, 1e-15);
+    EXPECT_NEAR((weights - weights.rowwise().reverse()).abs().maxCoeff(), 0, 1e-16);
+  }
+  EXPECT_NEAR(ApertureWeights(ApertureShape::kUniform, 3, 3)(0, 1), 1.0 / 9, 1e-15);
+  const Eigen::ArrayXXd gaussian = ApertureWeights(ApertureShape::kGaussian, 7, 1);
+  EXPECT_NEAR(gaussian(0, 0) / gaussian(0, 3), std::exp(-std::pow(12.0 / 7, 2) / 2), 1e-15);
+  EXPECT_EQ(ApertureWeights(ApertureShape::kDisc, 7, 7)(0, 0), 0);
+  EXPECT_THROW(ApertureWeights(ApertureShape::kDisc, 0, 7), Error);
+  EXPECT_THROW(ApertureShapeFromName("square"), Error);
+}
+
+TEST(SampleAperture, AnyWeightsCarryTheCalibratedBlur) {
+  Eigen::ArrayXXd weights = ApertureWeights(ApertureShape::kUniform, 5, 3);
+  weights(0, 0) = 0;  // a view that the photograph did not see
+  weights /= weights.sum();
+  const ApertureSamples samples = SampleAperture(weights, 0.45, 4);
+  double moment = 0;
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 5; ++i) {
+      moment += weights(j, i) * std::pow(samples.u_offset(i) * samples.u_step_mm, 2);
+    }
+  }
+  EXPECT_NEAR(std::sqrt(moment), 0.45 * 4, 1e-12);
+  EXPECT_THROW(SampleAperture(weights * 2, 0.45, 4), Error);
+  EXPECT_THROW(SampleAperture(-weights, 0.45, 4), Error);
+  EXPECT_THROW(SampleAperture(Eigen::ArrayXXd(), 0.45, 4), Error);
+}
+
 TEST(GridIsValid, NamesFieldAndValue) {
   const LightFieldGrid good = DefaultGrid(BenchCamera(), 7, 7);
   std::string why;

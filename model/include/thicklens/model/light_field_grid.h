@@ -69,6 +69,19 @@ double RelativeIrradiance(const ThickLens& lens, double image_distance_mm,
 double ApertureTransmission(Psf psf, double blur_ratio, double aperture_radius_mm,
                             const Eigen::Vector2d& crossing_mm);
 
+// How the aperture weighs the views of a light field.
+enum class ApertureShape {
+  kUniform,   // all alike
+  kGaussian,  // exp(-(4 a/U)^2/2) per axis: +-2 standard deviations over the samples
+  kDisc,      // 1 inside a^2/(U/2)^2 + b^2/(V/2)^2 <= 1, 0 outside
+};
+ApertureShape ApertureShapeFromName(const std::string& name);  // "uniform", "gaussian", "disc"
+std::string ApertureShapeName(ApertureShape shape);
+ApertureShape ApertureShapeOf(Psf psf);
+
+// V x U weights, sum 1. Throws Error unless both counts are >= 1.
+Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count);
+
 // The directional samples of a light field whose UV plane lies on the aperture: U x V offsets
 // a_i = i - (U-1)/2 times `step`, each with a weight; the weights sum to 1.
 //
@@ -81,13 +94,15 @@ struct ApertureSamples {
   int v_count = 1;
   double u_step_mm = 0;
   double v_step_mm = 0;
-  Eigen::ArrayXXd weights;  // V x U, sum 1; disc: 0 outside a^2/(U/2)^2 + b^2/(V/2)^2 <= 1
+  Eigen::ArrayXXd weights;  // V x U, sum 1
 
   double u_offset(int i) const { return i - (u_count - 1) / 2.0; }
   double v_offset(int j) const { return j - (v_count - 1) / 2.0; }
 };
-// Gaussian weights: exp(-(4 a/U)^2/2) per axis, +-2 standard deviations over the samples.
-// Throws Error unless u_count, v_count >= 1 and blur_ratio, aperture_radius_mm >= 0.
+// Throws Error unless blur_ratio, aperture_radius_mm >= 0 and the weights are >= 0 with sum 1.
+ApertureSamples SampleAperture(const Eigen::ArrayXXd& weights, double blur_ratio,
+                               double aperture_radius_mm);
+// With the weights of the PSF's shape. Throws Error, too, unless u_count, v_count >= 1.
 ApertureSamples SampleAperture(Psf psf, double blur_ratio, double aperture_radius_mm, int u_count,
                                int v_count);
 
@@ -115,6 +130,10 @@ LightFieldGrid DefaultGrid(const Camera& camera, int u_count, int v_count);
 // (P = 0 at zl = zf: the rays no longer separate the pixels), zl + d0 <= 0 or d0 = 0.
 LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes, int u_count,
                             int v_count);
+
+// The same for given samples, where the weights are not those of the camera's PSF.
+LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes,
+                            const ApertureSamples& samples);
 
 // m = (z - zl - d0) du/((z - zl) ds): the step of s, in samples, per view step at a fixed scene
 // point. For Q = 0 it is minus the disparity. Throws Error at z = zl, where it is infinite.
