@@ -17,7 +17,8 @@ class RandomDraws {
     kBench = 2,
     kLamp = 3,
     kDrift = 4,
-    kSensor = 5
+    kSensor = 5,
+    kStoredNoise = 6
   };
 
   // `item` is the frame's index, so that a frame does not depend on which were drawn before.

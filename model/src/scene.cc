@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "random_draws.h"
 #include "thicklens/error.h"
 
 namespace thicklens::model {
@@ -36,6 +37,24 @@ void CheckBits(int bits) {
   if (bits != 8 && bits != 16) {
     throw Error(fmt::format("picture: {} bits a value: it must be 8 or 16", bits));
   }
+}
+
+// `noise` gives what is added to each stored value, in full scales, before it is rounded.
+template <typename Noise>
+StoredPicture ToStoredPlus(const LinearPicture& picture, const TransferCurve& transfer, int bits,
+                           const Noise& noise) {
+  CheckBits(bits);
+  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
+            picture.values.size());
+  StoredPicture stored{picture.width_px, picture.height_px, picture.channels, bits, {}};
+  stored.values.reserve(picture.values.size());
+  for (const float light : picture.values) {
+    const double level = std::floor((transfer.Encode(light) + noise()) * stored.full_scale() + 0.5);
+    // Written so that NaN becomes black; a cast of it would be undefined.
+    const double clipped = level > 0 ? std::min(level, stored.full_scale()) : 0.0;
+    stored.values.push_back(static_cast<std::uint16_t>(clipped));
+  }
+  return stored;
 }
 
 void CheckConvention(const DepthConvention& convention, const std::string& depth_name) {
@@ -187,18 +206,18 @@ LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transf
 }
 
 StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits) {
-  CheckBits(bits);
-  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
-            picture.values.size());
-  StoredPicture stored{picture.width_px, picture.height_px, picture.channels, bits, {}};
-  stored.values.reserve(picture.values.size());
-  for (const float light : picture.values) {
-    const double level = std::floor(transfer.Encode(light) * stored.full_scale() + 0.5);
-    // Written so that NaN becomes black; a cast of it would be undefined.
-    const double clipped = level > 0 ? std::min(level, stored.full_scale()) : 0.0;
-    stored.values.push_back(static_cast<std::uint16_t>(clipped));
+  return ToStoredPlus(picture, transfer, bits, [] { return 0.0; });
+}
+
+StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurve& transfer,
+                                int bits, double sigma, std::uint64_t seed) {
+  if (!(sigma >= 0) || !std::isfinite(sigma)) {
+    throw Error(
+        fmt::format("picture: the noise is {} full scales: it must be finite and >= 0", sigma));
   }
-  return stored;
+  if (sigma == 0) return ToStored(picture, transfer, bits);
+  RandomDraws draws(seed, RandomDraws::Purpose::kStoredNoise, 0);
+  return ToStoredPlus(picture, transfer, bits, [&] { return sigma * draws.Normal(); });
 }
 
 LinearPicture ToGrey(const LinearPicture& picture) {

@@ -38,6 +38,10 @@ struct LinearPicture {
 
 LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transfer);
 StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits);
+// The same with normal noise of standard deviation `sigma`, in full scales, added to the stored
+// values before they are rounded; sigma = 0 gives ToStored. The seed alone decides the draws.
+StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurve& transfer,
+                                int bits, double sigma, std::uint64_t seed);
 // .2126 R + .7152 G + .0722 B for three channels; one channel is returned as it is; of four the
 // last (alpha) is left out. Throws Error for other counts.
 LinearPicture ToGrey(const LinearPicture& picture);
