@@ -1,0 +1,157 @@
+#ifndef THICKLENS_MODEL_SCENE_SIMULATOR_H_
+#define THICKLENS_MODEL_SCENE_SIMULATOR_H_
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/camera.h"
+#include "thicklens/model/light_field.h"
+#include "thicklens/model/scene.h"
+
+namespace thicklens::model {
+
+// What is painted on a layer. Every kind but kUniform and kSine is a periodic tile that holds
+// nothing above half a cycle per px of the picture, measured where the layer's pixels are largest:
+// what every view can show without aliasing. A sine finer than that is refused.
+enum class TextureKind {
+  kUniform,
+  kSine,  // colour (1 + contrast cos(2 pi (X cos(angle) + Y sin(angle))/period)), (X, Y) as below
+  kCheckerboard,  // a corner of four squares at X = Y = 0, lower right and upper left bright
+  kDeadLeaves,    // discs of many sizes that hide each other, each of a colour of its own
+  kNoise,         // amplitude falls as 1/frequency
+  kPicture,       // the user's own
+};
+std::string TextureKindName(TextureKind kind);  // "uniform", "sine", "checkerboard", ...
+
+struct TextureOptions {
+  TextureKind kind = TextureKind::kDeadLeaves;
+  // Mean radiance, RGB in linear light, 1 at full scale. A picture keeps its own colours.
+  Eigen::Vector3d colour{0.5, 0.5, 0.5};
+  // (bright - dark)/(bright + dark) of sine and squares; leaves have every light between the two;
+  // noise has the relative standard deviation contrast/2.
+  double contrast = 0.6;
+  // Of leaves and noise: 0 all channels alike, 1 each on its own.
+  double saturation = 0.5;
+  // Radius of the smallest leaf, shortest period of noise, period of a sine, side of a square,
+  // width of the whole picture; px of the simulated picture at the layer's depth on the axis. 0:
+  // chosen (2, 4, 8, 12 px, as wide as can be seen).
+  double feature_size_px = 0;
+  double angle_deg = 0;      // of a sine: its direction, from the right, positive downward
+  std::string picture_path;  // kPicture, for messages
+};
+
+// A plane, z = depth_mm + slope . (X, Y): positions from the optical axis in mm, X right, Y down.
+// Its 1/z is linear in the picture: (1 - slope . tan(angle of the chief ray))/depth_mm.
+struct PlaneOptions {
+  double depth_mm = 0;
+  Eigen::Vector2d slope{0, 0};  // mm deeper per mm to the right and down
+};
+
+// Which part of its plane a layer fills. In px it is the part that chief rays meet inside these
+// positions of the picture; in mm, inside these (X, Y).
+struct OutlineOptions {
+  enum class Shape { kWhole, kRectangle, kDisc };
+  enum class Unit { kPx, kMm };
+  Shape shape = Shape::kWhole;
+  Unit unit = Unit::kPx;
+  Eigen::Vector2d centre{0, 0};  // in `unit`, as the two below
+  Eigen::Vector2d size{0, 0};    // kRectangle
+  double radius = 0;             // kDisc
+};
+
+struct SceneLayer {
+  std::string name;  // for messages; may be empty
+  PlaneOptions plane;
+  OutlineOptions outline;
+  TextureOptions texture;
+};
+
+struct SceneSimulationOptions {
+  // Size, pitch, lens; its calibration gives d1, kappa and the lens floor (absent: 0).
+  Camera camera;
+  std::vector<SceneLayer> layers;  // in any order: along each ray the nearest one is seen
+  bool falloff = true;             // irradiance by (12): cos(alpha) cos^3(beta)
+  int rays_per_pixel = 600;
+  // Standard deviation of the noise of the stored values, in 1/255 of full scale at 8 and 16 bits.
+  double noise_sigma_grey_levels = 0;
+  int bits = 8;
+  int u_count = 5, v_count = 5;  // views of the true light field
+  std::uint64_t seed = 1;
+
+  bool IsValid(std::string* why) const;
+};
+
+// Reads schema thicklens/simulate-scene/1 (docs/file-formats.md).
+SceneSimulationOptions ReadSceneSimulation(const std::string& path);
+
+// What a simulated picture was made with.
+struct SceneTruth {
+  double image_distance_mm = 0;
+  double focus_depth_mm = 0;
+  double blur_ratio = 0;
+  double blur_floor_px = 0;
+  double nearest_depth_mm = 0, farthest_depth_mm = 0;  // of the depth map
+  double largest_blur_sigma_px = 0;                    // of defocus alone, over the depth map
+  bool falloff = true;
+  std::uint64_t seed = 0;
+};
+std::string SceneTruthToYaml(const SceneTruth& truth);  // schema thicklens/scene-truth/1
+
+// How a long computation runs. `progress` is called from any thread, one call at a time; what it
+// throws ends the computation and passes to the caller.
+struct SceneRun {
+  int threads = 0;  // 0: one per core
+  std::function<void(int done, int total)> progress;
+};
+
+// Image formation from a scene of textured planes to a photograph and its true light field, by the
+// geometric optics of the thick lens. It knows no light-field samples: the ray of picture position
+// x through aperture position A meets depth z at
+//   X(z) = (x - cx) z p/K + A (1 - z/zf),
+// the line that lands A c(z)/p to the left of the chief ray of what it meets there (derived here
+// from (16) with UV on the aperture). A layer is met in closed form.
+//
+// A pixel of the photograph is the mean over one set of rays for all pixels (Hammersley points)
+// that spreads over the aperture by the camera's PSF (Gaussian of standard deviation kappa r, or
+// disc of radius 2 kappa r; the set's second moment is exactly (kappa r)^2) and over the pixel box
+// widened by the lens floor. At 600 rays its transfer function is off by 0.01 at the highest
+// frequencies and the share of a pixel that an edge hides by 0.005, rms.
+//
+// Everything is RGB. The same options give the same bits on any number of threads.
+class SceneSimulator {
+ public:
+  // `pictures`: linear light of the layers of kPicture, one entry a layer (empty ones for others).
+  // Throws Error if the options are not valid, a ray can miss or meet behind the front focal point
+  // one of the planes, no layer is whole, or a texture cannot be drawn.
+  SceneSimulator(const SceneSimulationOptions& options, const std::vector<LinearPicture>& pictures);
+  ~SceneSimulator();
+  SceneSimulator(const SceneSimulator&) = delete;
+  SceneSimulator& operator=(const SceneSimulator&) = delete;
+
+  // Linear light before noise and quantisation: 1 for the radiance 1 at the principal point.
+  LinearPicture RenderNoiseless(const SceneRun& run) const;
+  // What the camera stores of it: transfer curve, noise, rounding, clipping.
+  StoredPicture Store(const LinearPicture& noiseless) const;
+
+  // z in mm of what the chief ray of each pixel's centre meets.
+  RawDepthMap RenderDepth() const;
+  SceneTruth Truth(const RawDepthMap& depth) const;
+
+  // Radiance as seen from one aperture position, mm: pixel box and lens floor, neither defocus
+  // nor fall-off.
+  LinearPicture RenderView(const Eigen::Vector2d& aperture_mm, const SceneRun& run) const;
+  // Such views at the samples of DefaultGrid(camera, u_count, v_count).
+  LightField RenderLightField(int u_count, int v_count, const SceneRun& run) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SCENE_SIMULATOR_H_

@@ -1,0 +1,370 @@
+#include "scene_texture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <complex>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "thicklens/error.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+constexpr int kSamplesPerPixel = 4;
+// A tile of 4096 x 4096 samples holds 256 MiB. What is larger is drawn coarser.
+constexpr int kMaxSamples = 4096;
+// No detail above it, in cycles per px: more would alias in the views.
+constexpr double kHighestFrequency = 0.5;
+// Detail fades towards that limit as behind a Gaussian of this width, so that edges do not ring.
+constexpr double kSoftnessPx = 0.5;
+// The largest leaf, as a part of the shorter side of what is seen.
+constexpr double kLargestLeaf = 1.0 / 6;
+
+using Channels = std::array<cv::Mat, 3>;  // CV_32F
+
+struct FeatureRange {
+  double chosen_px, smallest_px, largest_px;
+};
+
+FeatureRange FeatureRangeOf(TextureKind kind) {
+  switch (kind) {
+    case TextureKind::kUniform:
+      return {1, 0, 1000};
+    case TextureKind::kSine:
+      return {8, 0, 1e6};  // the shortest period is the layer's, see CheckSine
+    case TextureKind::kCheckerboard:
+      return {12, 1, 1000};
+    case TextureKind::kDeadLeaves:
+      return {2, 0.5, 1000};
+    case TextureKind::kNoise:
+      return {4, 2, 1000};
+    case TextureKind::kPicture:
+      return {0, 16, 10000};
+  }
+  throw Error("no such kind of texture");
+}
+
+double FeaturePx(const TextureOptions& options) {
+  const FeatureRange range = FeatureRangeOf(options.kind);
+  const double size_px = options.feature_size_px;
+  if (size_px == 0) return range.chosen_px;
+  if (!(size_px >= range.smallest_px && size_px <= range.largest_px)) {
+    throw Error(fmt::format(
+        "texture.feature_size_px is {}: of {} it must be from {} to {}, or 0 to have it chosen",
+        size_px, TextureKindName(options.kind), range.smallest_px, range.largest_px));
+  }
+  return size_px;
+}
+
+// The frame of a drawing: a period of samples.
+struct Canvas {
+  int columns = 0, rows = 0;
+  Eigen::Vector2d spacing_mm{0, 0};
+  Eigen::Vector2d origin_mm{0, 0};
+  Channels light;
+
+  double width_mm() const { return columns * spacing_mm.x(); }
+  double height_mm() const { return rows * spacing_mm.y(); }
+  Eigen::Vector2d PositionMm(int row, int column) const {
+    return origin_mm + spacing_mm.cwiseProduct(Eigen::Vector2d(column, row));
+  }
+};
+
+int QuickCount(double samples) {
+  const int needed = static_cast<int>(std::ceil(samples * (1 - 1e-12)));
+  return std::min(cv::getOptimalDFTSize(std::max(needed, 4)), kMaxSamples);
+}
+
+// `unit_mm`: the sides are whole multiples of it; 0: any length.
+Canvas MakeCanvas(const TextureRequest& request, double unit_mm) {
+  Eigen::Vector2d size_mm = request.high_mm - request.low_mm;
+  if (unit_mm > 0) size_mm = unit_mm * (size_mm / unit_mm).array().ceil().max(1);
+  const double spacing_mm =
+      std::max(request.coarsest_pixel_mm / kSamplesPerPixel, size_mm.maxCoeff() / kMaxSamples);
+  Canvas canvas;
+  canvas.columns = QuickCount(size_mm.x() / spacing_mm);
+  canvas.rows = QuickCount(size_mm.y() / spacing_mm);
+  canvas.spacing_mm = {spacing_mm, spacing_mm};
+  if (unit_mm > 0) {
+    canvas.spacing_mm = {size_mm.x() / canvas.columns, size_mm.y() / canvas.rows};
+  }
+  canvas.origin_mm = request.low_mm;
+  for (cv::Mat& channel : canvas.light) {
+    channel = cv::Mat(canvas.rows, canvas.columns, CV_32F, cv::Scalar(0));
+  }
+  return canvas;
+}
+
+// Multiplies the spectrum by gain(fx, fy), cycles per mm.
+template <typename Gain>
+void Filter(const Canvas& canvas, const Gain& gain, cv::Mat* samples) {
+  cv::Mat spectrum;
+  cv::dft(*samples, spectrum, cv::DFT_COMPLEX_OUTPUT);
+  for (int i = 0; i < spectrum.rows; ++i) {
+    auto* row = spectrum.ptr<std::complex<float>>(i);
+    const double fy = std::min(i, spectrum.rows - i) / canvas.height_mm();
+    for (int j = 0; j < spectrum.cols; ++j) {
+      row[j] *= static_cast<float>(gain(std::min(j, spectrum.cols - j) / canvas.width_mm(), fy));
+    }
+  }
+  cv::dft(spectrum, *samples, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+}
+
+double SincSquared(double x) {
+  if (x == 0) return 1;
+  const double sinc = std::sin(kPi * x) / (kPi * x);
+  return sinc * sinc;
+}
+
+// Takes away what the pixels cannot show, and gives back what the lines between the samples, whose
+// transfer is sinc^2(spacing f) on each axis, will take.
+void LimitBand(double coarsest_pixel_mm, Canvas* canvas) {
+  const auto gain = [&](double fx_per_mm, double fy_per_mm) {
+    const double f = std::hypot(fx_per_mm, fy_per_mm) * coarsest_pixel_mm;
+    if (f >= kHighestFrequency) return 0.0;
+    return std::exp(-2 * kPi * kPi * kSoftnessPx * kSoftnessPx * f * f) /
+           (SincSquared(fx_per_mm * canvas->spacing_mm.x()) *
+            SincSquared(fy_per_mm * canvas->spacing_mm.y()));
+  };
+  for (cv::Mat& channel : canvas->light) Filter(*canvas, gain, &channel);
+}
+
+// What a leaf or a noise adds to each channel's mean, from -1 to 1: common and own parts.
+std::array<double, 3> DrawnColour(const TextureOptions& options, RandomDraws* draws) {
+  const double common = 2 * draws->Uniform() - 1;
+  std::array<double, 3> colour;
+  for (double& channel : colour) {
+    channel = (1 - options.saturation) * common + options.saturation * (2 * draws->Uniform() - 1);
+  }
+  return colour;
+}
+
+// Discs that hide each other, radii distributed as r^-3 between the smallest and the largest: the
+// statistics of natural pictures. Drawn from the front backward until nothing shines through.
+Canvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest& request,
+                      RandomDraws* draws) {
+  Canvas canvas = MakeCanvas(request, 0);
+  const double spacing_mm = canvas.spacing_mm.x();
+  const double smallest_mm = FeaturePx(options) * request.pixel_mm;
+  const double largest_mm =
+      std::max(kLargestLeaf * std::min(canvas.width_mm(), canvas.height_mm()), 2 * smallest_mm);
+  const double small_term = 1 / (smallest_mm * smallest_mm);
+  const double large_term = 1 / (largest_mm * largest_mm);
+  const int columns = canvas.columns;
+  const int rows = canvas.rows;
+  cv::Mat open(rows, columns, CV_32F, cv::Scalar(1));  // what still shines through
+  const double total = static_cast<double>(columns) * rows;
+  double remaining = total;
+  while (remaining > 1e-4 * total) {
+    const double radius =
+        1 / std::sqrt(small_term - draws->Uniform() * (small_term - large_term)) / spacing_mm;
+    const double x = draws->Uniform() * columns;
+    const double y = draws->Uniform() * rows;
+    const std::array<double, 3> colour = DrawnColour(options, draws);
+    // A leaf wider than the tile would lie on itself.
+    const int reach = std::min(static_cast<int>(std::ceil(radius + 1)), (rows - 1) / 2);
+    const int centre_y = static_cast<int>(y);
+    for (int i = centre_y - reach; i <= centre_y + reach; ++i) {
+      const int row = (i % rows + rows) % rows;
+      float* through = open.ptr<float>(row);
+      const double dy = i - y;
+      const double half_chord_square = (radius + 0.5) * (radius + 0.5) - dy * dy;
+      if (!(half_chord_square > 0)) continue;
+      const double half_chord = std::min(std::sqrt(half_chord_square), (columns - 1) / 2.0);
+      const int last = static_cast<int>(std::floor(x + half_chord));
+      for (int j = static_cast<int>(std::ceil(x - half_chord)); j <= last; ++j) {
+        const int column = (j % columns + columns) % columns;
+        if (through[column] == 0) continue;
+        // The part of the sample's cell that the leaf covers, its border taken as straight.
+        const double inside = std::clamp(radius + 0.5 - std::hypot(j - x, dy), 0.0, 1.0);
+        const auto hidden = static_cast<float>(through[column] * inside);
+        for (std::size_t c = 0; c < 3; ++c) {
+          canvas.light[c].ptr<float>(row)[column] +=
+              hidden * static_cast<float>(1 + options.contrast * colour[c]);
+        }
+        through[column] -= hidden;
+        remaining -= hidden;
+      }
+    }
+  }
+  for (cv::Mat& channel : canvas.light) channel += open;
+  return canvas;
+}
+
+// Gaussian noise whose amplitude falls as 1/f, from one cycle per side of what is seen up to the
+// shortest period. A tanh keeps it between no light and twice the mean.
+Canvas DrawNoise(const TextureOptions& options, const TextureRequest& request, RandomDraws* draws) {
+  Canvas canvas = MakeCanvas(request, 0);
+  const double period_mm = FeaturePx(options) * request.pixel_mm;
+  const double lowest_per_mm = 1 / std::min(canvas.width_mm(), canvas.height_mm());
+  const auto gain = [&](double fx, double fy) {
+    const double f = std::hypot(fx, fy);
+    return f > 0 && f * period_mm <= 1 ? 1 / std::max(f, lowest_per_mm) : 0.0;
+  };
+  const auto draw = [&] {
+    cv::Mat samples(canvas.rows, canvas.columns, CV_32F);
+    for (int i = 0; i < samples.rows; ++i) {
+      for (int j = 0; j < samples.cols; ++j) {
+        samples.at<float>(i, j) = static_cast<float>(draws->Normal());
+      }
+    }
+    Filter(canvas, gain, &samples);
+    const double rms = std::sqrt(samples.dot(samples) / static_cast<double>(samples.total()));
+    if (rms > 0) samples /= rms;
+    return samples;
+  };
+  const cv::Mat common = draw();
+  for (cv::Mat& channel : canvas.light) {
+    channel = (1 - options.saturation) * common + options.saturation * draw();
+    // Two independent parts of variance 1.
+    channel /= std::hypot(1 - options.saturation, options.saturation);
+    for (int i = 0; i < channel.rows; ++i) {
+      float* row = channel.ptr<float>(i);
+      for (int j = 0; j < channel.cols; ++j) {
+        row[j] = static_cast<float>(1 + std::tanh(options.contrast / 2 * row[j]));
+      }
+    }
+  }
+  return canvas;
+}
+
+// +1 on the first half of each period and -1 on the second; a sample in whose cell it changes gets
+// the mean over the cell.
+double SquareWave(double x, double period, double cell) {
+  const double phase = x - period * std::floor(x / period);
+  const double from_middle = std::abs(phase - period / 2);  // period/2 at the rise, 0 at the fall
+  const double from_change = std::min(from_middle, period / 2 - from_middle);
+  return std::copysign(std::min(from_change / (cell / 2), 1.0), period / 2 - phase);
+}
+
+Canvas DrawCheckerboard(const TextureOptions& options, const TextureRequest& request) {
+  const double period_mm = 2 * FeaturePx(options) * request.pixel_mm;
+  Canvas canvas = MakeCanvas(request, period_mm);
+  for (int i = 0; i < canvas.rows; ++i) {
+    for (int j = 0; j < canvas.columns; ++j) {
+      const Eigen::Vector2d at_mm = canvas.PositionMm(i, j);
+      const double light = 1 + options.contrast *
+                                   SquareWave(at_mm.x(), period_mm, canvas.spacing_mm.x()) *
+                                   SquareWave(at_mm.y(), period_mm, canvas.spacing_mm.y());
+      for (cv::Mat& channel : canvas.light) channel.at<float>(i, j) = static_cast<float>(light);
+    }
+  }
+  return canvas;
+}
+
+// One channel of a picture of 1 (grey), 3 (RGB) or 4 (RGBA) channels.
+cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
+  cv::Mat values(picture.height_px, picture.width_px, CV_32F);
+  for (int y = 0; y < picture.height_px; ++y) {
+    for (int x = 0; x < picture.width_px; ++x) {
+      values.at<float>(y, x) = picture.at(x, y, picture.channels < 3 ? 0 : channel);
+    }
+  }
+  return values;
+}
+
+// The user's picture, upright and around the centre; beyond its sides it is mirrored, so that its
+// tile is twice as large.
+Canvas DrawPicture(const TextureOptions& options, const TextureRequest& request,
+                   const LinearPicture& picture) {
+  if (picture.width_px < 1 || picture.height_px < 1) {
+    throw Error(fmt::format("texture.picture '{}' is empty", options.picture_path));
+  }
+  const double shape = static_cast<double>(picture.height_px) / picture.width_px;
+  // Chosen: all that is seen lies on it.
+  const Eigen::Vector2d reach_mm =
+      (request.high_mm - request.centre_mm).cwiseMax(request.centre_mm - request.low_mm);
+  const double feature_px = FeaturePx(options);
+  const double width_mm = feature_px > 0 ? feature_px * request.pixel_mm
+                                         : 2 * std::max(reach_mm.x(), reach_mm.y() / shape);
+  const Eigen::Vector2d size_mm(width_mm, width_mm * shape);
+
+  const double spacing_mm =
+      std::max(request.coarsest_pixel_mm / kSamplesPerPixel, 2 * size_mm.maxCoeff() / kMaxSamples);
+  const auto count = [&](double length_mm) {
+    return std::clamp(static_cast<int>(std::lround(length_mm / spacing_mm)), 2, kMaxSamples / 2);
+  };
+  const cv::Size size(count(size_mm.x()), count(size_mm.y()));
+  Canvas canvas;
+  canvas.columns = 2 * size.width;
+  canvas.rows = 2 * size.height;
+  canvas.spacing_mm = {size_mm.x() / size.width, size_mm.y() / size.height};
+  // Samples lie in the middle of their cells.
+  canvas.origin_mm = request.centre_mm - size_mm / 2 + canvas.spacing_mm / 2;
+  for (int c = 0; c < 3; ++c) {
+    cv::Mat resized;
+    cv::resize(ChannelOf(picture, c), resized, size, 0, 0,
+               size.width < picture.width_px ? cv::INTER_AREA : cv::INTER_CUBIC);
+    cv::copyMakeBorder(resized, canvas.light[static_cast<std::size_t>(c)], 0, size.height, 0,
+                       size.width, cv::BORDER_REFLECT);
+  }
+  return canvas;
+}
+
+Canvas Draw(const TextureOptions& options, const TextureRequest& request,
+            const LinearPicture& picture, RandomDraws* draws) {
+  switch (options.kind) {
+    case TextureKind::kCheckerboard:
+      return DrawCheckerboard(options, request);
+    case TextureKind::kDeadLeaves:
+      return DrawDeadLeaves(options, request, draws);
+    case TextureKind::kNoise:
+      return DrawNoise(options, request, draws);
+    default:
+      return DrawPicture(options, request, picture);
+  }
+}
+
+// Every channel gets its colour for its mean.
+void Paint(const Eigen::Vector3d& colour, Canvas* canvas) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    cv::Mat& channel = canvas->light[c];
+    channel *= colour(static_cast<int>(c)) / cv::mean(channel)[0];
+  }
+}
+
+}  // namespace
+
+SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& request,
+                           const LinearPicture& picture, RandomDraws* draws) {
+  const double feature_px = FeaturePx(options);
+  colour_.head<3>() = options.colour.cast<float>().array();
+  if (options.kind == TextureKind::kUniform) return;
+  if (options.kind == TextureKind::kSine) {
+    const double period_mm = feature_px * request.pixel_mm;
+    const double shortest_mm = request.coarsest_pixel_mm / kHighestFrequency;
+    if (!(period_mm >= shortest_mm)) {
+      throw Error(fmt::format(
+          "texture.feature_size_px is {}: the period of a sine must be at least {:.4g} here, two "
+          "of the layer's largest px",
+          feature_px, shortest_mm / request.pixel_mm));
+    }
+    const double angle_rad = options.angle_deg * kPi / 180;
+    amplitude_ = options.contrast;
+    wave_ = 2 * kPi / period_mm * Eigen::Vector2d(std::cos(angle_rad), std::sin(angle_rad));
+    return;
+  }
+  Canvas canvas = Draw(options, request, picture, draws);
+  LimitBand(request.coarsest_pixel_mm, &canvas);
+  if (options.kind != TextureKind::kPicture) Paint(options.colour, &canvas);
+  columns_ = canvas.columns;
+  rows_ = canvas.rows;
+  origin_mm_ = canvas.origin_mm;
+  per_mm_ = canvas.spacing_mm.cwiseInverse();
+  tile_.reserve(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  for (int i = 0; i < rows_; ++i) {
+    for (int j = 0; j < columns_; ++j) {
+      // The limited band may overshoot beside a dark edge: there is no negative light.
+      tile_.emplace_back(std::max(canvas.light[0].at<float>(i, j), 0.0F),
+                         std::max(canvas.light[1].at<float>(i, j), 0.0F),
+                         std::max(canvas.light[2].at<float>(i, j), 0.0F), 0.0F);
+    }
+  }
+}
+
+}  // namespace thicklens::model

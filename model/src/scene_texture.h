@@ -1,0 +1,79 @@
+#ifndef THICKLENS_MODEL_SRC_SCENE_TEXTURE_H_
+#define THICKLENS_MODEL_SRC_SCENE_TEXTURE_H_
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "random_draws.h"
+#include "thicklens/model/scene.h"
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::model {
+
+// What a layer's texture must do. Positions are (X, Y), mm from the optical axis.
+struct TextureRequest {
+  Eigen::Vector2d low_mm{0, 0}, high_mm{0, 0};  // what can be seen of the layer
+  Eigen::Vector2d centre_mm{0, 0};              // of a picture
+  double pixel_mm = 0;                          // one px at the layer's depth on the axis
+  double coarsest_pixel_mm = 0;                 // the largest px on the layer
+};
+
+// The painted plane: RGB radiance at every position. A tile repeats itself, a picture mirrored;
+// between its samples, four to the coarsest px, it is linear, and the samples are such that what
+// is below half a cycle per px comes out at its full amplitude.
+class SceneTexture {
+ public:
+  // Throws Error for a feature size that the layer cannot show, or an empty picture.
+  SceneTexture(const TextureOptions& options, const TextureRequest& request,
+               const LinearPicture& picture, RandomDraws* draws);
+
+  // R, G, B and a 0.
+  Eigen::Array4f At(double x_mm, double y_mm) const {
+    if (!tile_.empty()) return TileAt(x_mm, y_mm);
+    if (amplitude_ == 0) return colour_;
+    return colour_ *
+           static_cast<float>(1 + amplitude_ * std::cos(wave_.x() * x_mm + wave_.y() * y_mm));
+  }
+
+ private:
+  Eigen::Array4f TileAt(double x_mm, double y_mm) const {
+    const double x = (x_mm - origin_mm_.x()) * per_mm_.x();
+    const double y = (y_mm - origin_mm_.y()) * per_mm_.y();
+    const double column = std::floor(x);
+    const double row = std::floor(y);
+    const auto fx = static_cast<float>(x - column);
+    const auto fy = static_cast<float>(y - row);
+    const int left = Wrapped(column, columns_);
+    const int right = left + 1 == columns_ ? 0 : left + 1;
+    const int above = Wrapped(row, rows_);
+    const int below = above + 1 == rows_ ? 0 : above + 1;
+    return (1 - fy) * ((1 - fx) * Sample(above, left) + fx * Sample(above, right)) +
+           fy * ((1 - fx) * Sample(below, left) + fx * Sample(below, right));
+  }
+
+  const Eigen::Array4f& Sample(int row, int column) const {
+    return tile_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                 static_cast<std::size_t>(column)];
+  }
+
+  // A position may be far away where a plane runs to great depths.
+  static int Wrapped(double index, int count) {
+    if (index >= 0 && index < count) return static_cast<int>(index);
+    const int inside = static_cast<int>(index - count * std::floor(index / count));
+    return inside < count ? inside : 0;
+  }
+
+  Eigen::Array4f colour_{0, 0, 0, 0};
+  double amplitude_ = 0;              // of a sine
+  Eigen::Vector2d wave_{0, 0};        // radians per mm
+  std::vector<Eigen::Array4f> tile_;  // empty: closed form
+  int columns_ = 0, rows_ = 0;
+  Eigen::Vector2d origin_mm_{0, 0};  // of the sample (0, 0)
+  Eigen::Vector2d per_mm_{0, 0};     // samples per mm
+};
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SRC_SCENE_TEXTURE_H_
