@@ -1,0 +1,61 @@
+#ifndef THICKLENS_KERNELS_SPARSE_H_
+#define THICKLENS_KERNELS_SPARSE_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace thicklens::kernels {
+
+// A sparse matrix with a fixed number of slots a row, as kernels fill it: one item a row or a slot,
+// no search, neighbouring items write neighbouring addresses. Entry (row, slot) is at
+// slot * rows + row; column -1 marks an unused slot.
+template <typename Real>
+struct EllMatrix {
+  int rows = 0;
+  int columns = 0;
+  int slots = 0;
+  std::vector<std::int32_t> column;
+  std::vector<Real> value;
+};
+
+// Compressed rows; columns ascend within a row, none twice.
+template <typename Real>
+struct CsrMatrix {
+  int rows = 0;
+  int columns = 0;
+  std::vector<std::int64_t> row_start;  // rows + 1
+  std::vector<std::int32_t> column;
+  std::vector<Real> value;
+
+  std::int64_t entries() const { return row_start.empty() ? 0 : row_start.back(); }
+};
+
+// Where the entries of a matrix lie, without values.
+struct CsrPattern {
+  int rows = 0;
+  int columns = 0;
+  std::vector<std::int64_t> row_start;
+  std::vector<std::int32_t> column;
+
+  std::int64_t entries() const { return row_start.empty() ? 0 : row_start.back(); }
+};
+
+// Drops unused slots and sorts each row; entries of the same column are summed.
+template <typename Real>
+CsrMatrix<Real> Compress(const EllMatrix<Real>& ell);
+
+template <typename Real>
+CsrMatrix<Real> Transpose(const CsrMatrix<Real>& matrix);
+
+// The pattern of A^T A + Id: symmetric, with the whole diagonal.
+template <typename Real>
+CsrPattern NormalPattern(const CsrMatrix<Real>& a);
+template <typename Real>
+CsrPattern PatternOf(const CsrMatrix<Real>& a);
+// The union of two patterns of the same size.
+CsrPattern SumPattern(const CsrPattern& a, const CsrPattern& b);
+
+}  // namespace thicklens::kernels
+
+#endif  // THICKLENS_KERNELS_SPARSE_H_

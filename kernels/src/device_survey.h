@@ -1,0 +1,45 @@
+#ifndef THICKLENS_KERNELS_SRC_DEVICE_SURVEY_H_
+#define THICKLENS_KERNELS_SRC_DEVICE_SURVEY_H_
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "guarded_child.h"
+#include "opencl_device.h"
+#include "thicklens/kernels/device.h"
+
+namespace thicklens::kernels {
+
+// What looks at drivers does so in a child process, and that works only as long as OpenCL is not
+// in use in this one: a copy of a process with a loaded driver lacks the driver's threads. So:
+// first the survey and the trials, then the device. SetOpenClInUse says that the time has come.
+// From then on the survey is the one that was made, and a trial of another device is made in this
+// process, without the guard.
+void SetOpenClInUse();
+bool IsOpenClInUse();
+
+// Seconds that a driver gets; the first compilation of all can take several.
+constexpr double kChildLimitS = 60;
+
+// What the child does: tells of platforms and devices from `first_platform` on.
+using ListDevices = std::function<void(int first_platform, const Tell& tell)>;
+void ListOpenClDevices(int first_platform, const Tell& tell);
+
+// Runs `list` in a child, and again from the next platform on where one brings it down.
+DeviceSurvey SurveyWith(const ListDevices& list, double limit_s);
+
+// Compiles a small kernel and the files on the device, and runs the small kernel. Returns what went
+// wrong, or nothing.
+std::string TryDevice(int platform, int device, const std::vector<EmbeddedFile>& files);
+// The same in a child process, with the library's own files, once for each device.
+std::string TryDeviceOnce(int platform, int device);
+
+// What is said in a survey of devices, one line each.
+std::string PlatformLine(int platform, const std::string& name);
+std::string DeviceLine(const DeviceDescription& device);
+std::string ProblemLine(const std::string& problem);
+
+}  // namespace thicklens::kernels
+
+#endif  // THICKLENS_KERNELS_SRC_DEVICE_SURVEY_H_

@@ -1,0 +1,148 @@
+#include "opencl_call.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "opencl_program.h"
+#include "thicklens/error.h"
+
+namespace thicklens::kernels {
+namespace {
+
+// Fixed, since some drivers compile a kernel once for each size of its groups.
+constexpr std::size_t kGroupItems = 64;
+
+// Does the work; what OpenCL reports is told as an error of `what` on the device.
+template <typename Work>
+decltype(auto) Guarded(const OpenClDevice& device, const std::string& what, const Work& work) {
+  try {
+    return work();
+  } catch (const cl::Error& error) {
+    throw Error(fmt::format("device {}: {}: {}: {}", device.name, what, error.what(),
+                            OpenClErrorText(error.err())));
+  }
+}
+
+}  // namespace
+
+HostMemory HostMemoryOf(const OpenClDevice& device) {
+  return Guarded(device, "memory", [&] {
+    return device.device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() == CL_TRUE ? HostMemory::kShared
+                                                                             : HostMemory::kCopied;
+  });
+}
+
+OpenClQueue::OpenClQueue(std::shared_ptr<const OpenClDevice> device, cl::Program program,
+                         HostMemory memory)
+    : device_(std::move(device)), program_(std::move(program)), memory_(memory) {
+  Guarded(*device_, "new queue", [&] {
+    queue_ = cl::CommandQueue(device_->context, device_->device);
+    max_allocation_bytes_ = device_->device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+  });
+}
+
+std::unique_ptr<OpenClQueue> OpenClQueue::Clone() const {
+  return std::make_unique<OpenClQueue>(device_, program_, memory_);
+}
+
+OpenClQueue::Entry& OpenClQueue::EntryOf(const std::string& kernel) {
+  const auto found = entries_.find(kernel);
+  if (found != entries_.end()) return found->second;
+  return Guarded(*device_, "kernel " + kernel, [&]() -> Entry& {
+    Entry entry;
+    entry.kernel = cl::Kernel(program_, kernel.c_str());
+    entry.group_items = std::min(
+        kGroupItems, entry.kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(device_->device));
+    return entries_.emplace(kernel, std::move(entry)).first->second;
+  });
+}
+
+void OpenClQueue::CheckAllocation(const std::string& what, std::size_t bytes) const {
+  if (bytes > max_allocation_bytes_) {
+    throw Error(fmt::format("device {}: {}: {} bytes are needed, and it allows {} in one piece",
+                            device_->name, what, bytes, max_allocation_bytes_));
+  }
+}
+
+cl::Buffer OpenClQueue::NewBuffer(const std::string& what, void* data, std::size_t bytes,
+                                  bool is_read, bool is_written) {
+  CheckAllocation(what, bytes);
+  return Guarded(*device_, what, [&] {
+    cl_mem_flags flags = !is_written ? CL_MEM_READ_ONLY
+                         : !is_read  ? CL_MEM_WRITE_ONLY
+                                     : CL_MEM_READ_WRITE;
+    if (memory_ == HostMemory::kShared) {
+      flags |= CL_MEM_USE_HOST_PTR;
+    } else if (is_read) {
+      flags |= CL_MEM_COPY_HOST_PTR;
+    }
+    const bool has_data = memory_ == HostMemory::kShared || is_read;
+    return cl::Buffer(device_->context, flags, bytes, has_data ? data : nullptr);
+  });
+}
+
+void OpenClQueue::BringHome(const std::string& what, const cl::Buffer& buffer, void* data,
+                            std::size_t bytes) {
+  Guarded(*device_, what, [&] {
+    if (memory_ == HostMemory::kCopied) {
+      queue_.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, data);
+      return;
+    }
+    // Mapping makes lent memory current; nothing is copied where the device works in it.
+    void* mapped = queue_.enqueueMapBuffer(buffer, CL_TRUE, CL_MAP_READ, 0, bytes);
+    queue_.enqueueUnmapMemObject(buffer, mapped);
+    queue_.finish();
+  });
+}
+
+DeviceArray::DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes)
+    : queue_(queue),
+      what_(what),
+      data_(data),
+      bytes_(bytes),
+      buffer_(queue->NewBuffer(what, data, bytes, true, true)) {}
+
+void DeviceArray::BringHome() { queue_->BringHome(what_, buffer_, data_, bytes_); }
+
+OpenClCall::OpenClCall(OpenClQueue* queue, const std::string& kernel)
+    : queue_(queue), name_("kernel " + kernel), entry_(&queue->EntryOf(kernel)) {}
+
+OpenClCall& OpenClCall::OnDevice(const DeviceArray& array) {
+  SetBuffer(array.buffer_);
+  return *this;
+}
+
+void OpenClCall::SetBytes(const void* bytes, std::size_t count) {
+  Guarded(*queue_->device_, name_,
+          [&] { entry_->kernel.setArg(next_argument_++, count, const_cast<void*>(bytes)); });
+}
+
+void OpenClCall::SetBuffer(const cl::Buffer& buffer) {
+  Guarded(*queue_->device_, name_, [&] { entry_->kernel.setArg(next_argument_++, buffer); });
+}
+
+void OpenClCall::AddArray(const std::string& what, void* data, std::size_t bytes, bool is_read,
+                          bool is_written) {
+  const std::string name = name_ + ", " + what;
+  arrays_.push_back(
+      {name, queue_->NewBuffer(name, data, bytes, is_read, is_written), data, bytes, is_written});
+  SetBuffer(arrays_.back().buffer);
+}
+
+void OpenClCall::Run(std::size_t items) {
+  Guarded(*queue_->device_, name_, [&] {
+    const std::size_t group = entry_->group_items;
+    const std::size_t groups = (items + group - 1) / group;
+    queue_->queue_.enqueueNDRangeKernel(entry_->kernel, cl::NullRange, cl::NDRange(groups * group),
+                                        cl::NDRange(group));
+    // What goes wrong while the kernel runs is then said with its name.
+    queue_->queue_.finish();
+  });
+  for (const Array& array : arrays_) {
+    if (array.is_written) queue_->BringHome(array.what, array.buffer, array.data, array.bytes);
+  }
+}
+
+}  // namespace thicklens::kernels

@@ -1,0 +1,126 @@
+#ifndef THICKLENS_KERNELS_SRC_OPENCL_CALL_H_
+#define THICKLENS_KERNELS_SRC_OPENCL_CALL_H_
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "opencl_device.h"
+
+namespace thicklens::kernels {
+
+// How a device comes to a host's array.
+enum class HostMemory {
+  kShared,  // lent to the device, which works in it
+  kCopied,
+};
+// kShared where the device says that it has the host's memory.
+HostMemory HostMemoryOf(const OpenClDevice& device);
+
+// A queue of a device, and the kernels of a program for one thread: OpenCL keeps a kernel's
+// arguments in the kernel. Throws Error for whatever the device reports.
+class OpenClQueue {
+ public:
+  OpenClQueue(std::shared_ptr<const OpenClDevice> device, cl::Program program, HostMemory memory);
+
+  // Another queue on the same device and program, with its own kernels.
+  std::unique_ptr<OpenClQueue> Clone() const;
+
+  // Whether the device can have that much in one piece.
+  void CheckAllocation(const std::string& what, std::size_t bytes) const;
+
+ private:
+  friend class OpenClCall;
+  friend class DeviceArray;
+
+  struct Entry {
+    cl::Kernel kernel;
+    std::size_t group_items = 0;
+  };
+  Entry& EntryOf(const std::string& kernel);
+  cl::Buffer NewBuffer(const std::string& what, void* data, std::size_t bytes, bool is_read,
+                       bool is_written);
+  void BringHome(const std::string& what, const cl::Buffer& buffer, void* data, std::size_t bytes);
+
+  std::shared_ptr<const OpenClDevice> device_;
+  cl::Program program_;
+  cl::CommandQueue queue_;
+  std::map<std::string, Entry> entries_;
+  HostMemory memory_;
+  cl_ulong max_allocation_bytes_ = 0;
+};
+
+// Numbers that stay on the device from call to call. `data` is their home, which must outlive this
+// and is not to be touched before BringHome.
+class DeviceArray {
+ public:
+  DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes);
+  void BringHome();
+
+ private:
+  friend class OpenClCall;
+
+  OpenClQueue* queue_;
+  std::string what_;
+  void* data_;
+  std::size_t bytes_;
+  cl::Buffer buffer_;
+};
+
+// One call of a kernel: arguments in the kernel's order, then Run. Arrays must not be empty.
+class OpenClCall {
+ public:
+  OpenClCall(OpenClQueue* queue, const std::string& kernel);
+
+  template <typename Plain>
+  OpenClCall& Value(const Plain& value) {
+    SetBytes(&value, sizeof(Plain));
+    return *this;
+  }
+  template <typename Plain>
+  OpenClCall& Input(const std::string& what, const std::vector<Plain>& array) {
+    // Lent for reading only.
+    AddArray(what, const_cast<Plain*>(array.data()), array.size() * sizeof(Plain), true, false);
+    return *this;
+  }
+  // What the kernel writes, every element of it.
+  template <typename Plain>
+  OpenClCall& Output(const std::string& what, std::vector<Plain>* array) {
+    AddArray(what, array->data(), array->size() * sizeof(Plain), false, true);
+    return *this;
+  }
+  template <typename Plain>
+  OpenClCall& InputOutput(const std::string& what, std::vector<Plain>* array) {
+    AddArray(what, array->data(), array->size() * sizeof(Plain), true, true);
+    return *this;
+  }
+  OpenClCall& OnDevice(const DeviceArray& array);
+
+  // Returns when all is done and the outputs are at home.
+  void Run(std::size_t items);
+
+ private:
+  struct Array {
+    std::string what;
+    cl::Buffer buffer;
+    void* data;
+    std::size_t bytes;
+    bool is_written;
+  };
+  void SetBytes(const void* bytes, std::size_t count);
+  void SetBuffer(const cl::Buffer& buffer);
+  void AddArray(const std::string& what, void* data, std::size_t bytes, bool is_read,
+                bool is_written);
+
+  OpenClQueue* queue_;
+  std::string name_;
+  OpenClQueue::Entry* entry_;
+  cl_uint next_argument_ = 0;
+  std::vector<Array> arrays_;
+};
+
+}  // namespace thicklens::kernels
+
+#endif  // THICKLENS_KERNELS_SRC_OPENCL_CALL_H_

@@ -1,0 +1,134 @@
+#include "opencl_program.h"
+
+#include <fmt/format.h>
+
+#include "device_survey.h"
+#include "guarded_child.h"
+#include "thicklens/error.h"
+
+namespace thicklens::kernels {
+namespace {
+
+const char* ErrorName(int error) {
+  switch (error) {
+    case CL_DEVICE_NOT_FOUND:
+      return "no device found";
+    case CL_DEVICE_NOT_AVAILABLE:
+      return "device not available";
+    case CL_COMPILER_NOT_AVAILABLE:
+      return "no compiler";
+    case CL_MEM_OBJECT_ALLOCATION_FAILURE:
+      return "no memory on the device";
+    case CL_OUT_OF_RESOURCES:
+      return "out of resources";
+    case CL_OUT_OF_HOST_MEMORY:
+      return "out of memory";
+    case CL_BUILD_PROGRAM_FAILURE:
+      return "the program does not build";
+    case CL_INVALID_WORK_GROUP_SIZE:
+      return "wrong work group size";
+    case CL_INVALID_BUFFER_SIZE:
+      return "wrong buffer size";
+    case -1001:  // of the ICD loader: CL_PLATFORM_NOT_FOUND_KHR
+      return "no platform found";
+    default:
+      return nullptr;
+  }
+}
+
+// Platforms and devices in the order of the survey, whose indices these are.
+cl::Device DeviceAt(int platform_index, int device_index, std::string* platform_text) {
+  std::vector<cl::Platform> platforms;
+  cl::Platform::get(&platforms);
+  if (platform_index < 0 || platform_index >= static_cast<int>(platforms.size())) {
+    throw cl::Error(CL_INVALID_PLATFORM, "platforms have changed");
+  }
+  const cl::Platform& platform = platforms[static_cast<std::size_t>(platform_index)];
+  std::vector<cl::Device> devices;
+  platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
+  if (device_index < 0 || device_index >= static_cast<int>(devices.size())) {
+    throw cl::Error(CL_INVALID_DEVICE, "devices have changed");
+  }
+  *platform_text = OneLine(platform.getInfo<CL_PLATFORM_NAME>()) + ", " +
+                   OneLine(platform.getInfo<CL_PLATFORM_VERSION>());
+  return devices[static_cast<std::size_t>(device_index)];
+}
+
+// The compiler takes files and lines in its messages from here.
+std::string LineDirective(const std::string& path) {
+  std::string quoted;
+  for (const char c : path) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return fmt::format("#line 1 \"{}\"\n", quoted);
+}
+
+}  // namespace
+
+std::string OpenClErrorText(int error) {
+  const char* name = ErrorName(error);
+  return name == nullptr ? fmt::format("error {}", error)
+                         : fmt::format("error {}, {}", error, name);
+}
+
+bool HasDouble(const cl::Device& device) {
+  const std::string extensions = " " + device.getInfo<CL_DEVICE_EXTENSIONS>() + " ";
+  if (extensions.find(" cl_khr_fp64 ") != std::string::npos) return true;
+  cl_device_fp_config config = 0;
+  return ::clGetDeviceInfo(device(), CL_DEVICE_DOUBLE_FP_CONFIG, sizeof config, &config, nullptr) ==
+             CL_SUCCESS &&
+         config != 0;
+}
+
+std::shared_ptr<const OpenClDevice> OpenOpenClDevice(int platform, int device) {
+  const std::string name = fmt::format("opencl:{}:{}", platform, device);
+  SetOpenClInUse();
+  try {
+    auto opened = std::make_shared<OpenClDevice>();
+    std::string platform_text;
+    opened->device = DeviceAt(platform, device, &platform_text);
+    opened->name = name;
+    opened->description =
+        fmt::format("{} ({}, driver {})", OneLine(opened->device.getInfo<CL_DEVICE_NAME>()),
+                    platform_text, OneLine(opened->device.getInfo<CL_DRIVER_VERSION>()));
+    opened->has_double = HasDouble(opened->device);
+    opened->context = cl::Context(opened->device);
+    return opened;
+  } catch (const cl::Error& failure) {
+    throw Error(
+        fmt::format("device {}: {}: {}", name, failure.what(), OpenClErrorText(failure.err())));
+  }
+}
+
+cl::Program BuildProgram(const OpenClDevice& device, const std::vector<EmbeddedFile>& files,
+                         const std::string& real) {
+  const bool is_double = real == "double";
+  if (is_double && !device.has_double) {
+    throw Error(fmt::format("device {}: it has no double", device.name));
+  }
+  std::string source;
+  if (is_double) source += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n";
+  for (const EmbeddedFile& file : files) source += LineDirective(file.path) + file.text + "\n";
+  const std::string options =
+      fmt::format("-cl-std=CL1.2 -DREAL={}{}", real, is_double ? " -DREAL_IS_DOUBLE" : "");
+  try {
+    cl::Program program(device.context, source);
+    program.build({device.device}, options.c_str());
+    return program;
+  } catch (const cl::BuildError& failure) {
+    std::string log;
+    for (const auto& part : failure.getBuildLog()) log += part.second + "\n";
+    throw Error(fmt::format("device {}: the kernels do not build for {} ({}): {}", device.name,
+                            real, OpenClErrorText(failure.err()), OneLine(log)));
+  } catch (const cl::Error& failure) {
+    throw Error(fmt::format("device {}: the kernels do not build for {}: {}: {}", device.name, real,
+                            failure.what(), OpenClErrorText(failure.err())));
+  }
+}
+
+cl::Program BuildKernels(const OpenClDevice& device, const std::string& real) {
+  return BuildProgram(device, EmbeddedKernelFiles(), real);
+}
+
+}  // namespace thicklens::kernels

@@ -1,0 +1,176 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "thicklens/kernels/device.h"
+
+namespace thicklens::kernels {
+namespace {
+
+using ::testing::HasSubstr;
+
+// What a device may do wrong: `method` adds `amount` to one of its numbers.
+struct Fault {
+  std::string method;
+  double amount = 0;
+  bool has_double = true;
+};
+
+// The twin with a fault. Of each result the last number but one is changed.
+template <typename Real>
+class Faulty : public Kernels<Real> {
+ public:
+  explicit Faulty(Fault fault) : fault_(std::move(fault)), twin_(NewReference<Real>()) {}
+
+  std::unique_ptr<Kernels<Real>> Clone() const override { return std::make_unique<Faulty>(fault_); }
+  std::vector<std::int32_t> FindRays(const BlockGeometry& block, Splat splat) override {
+    auto rays = twin_->FindRays(block, splat);
+    if (fault_.method == "FindRays") ++rays.back();
+    return rays;
+  }
+  EllMatrix<Real> WeighRays(const BlockGeometry& block, Splat splat,
+                            const std::vector<std::int32_t>& rays,
+                            const std::vector<Real>& irradiance) override {
+    return Spoil("WeighRays", twin_->WeighRays(block, splat, rays, irradiance));
+  }
+  EllMatrix<Real> WarpDifferences(const BlockGeometry& block, const std::vector<Real>& slope_u,
+                                  const std::vector<Real>& slope_v) override {
+    return Spoil("WarpDifferences", twin_->WarpDifferences(block, slope_u, slope_v));
+  }
+  EllMatrix<Real> SixTermMasks(const BlockGeometry& block, const std::vector<Real>& slope_u,
+                               const std::vector<Real>& slope_v) override {
+    return Spoil("SixTermMasks", twin_->SixTermMasks(block, slope_u, slope_v));
+  }
+  std::vector<Real> Multiply(const CsrMatrix<Real>& a, const std::vector<Real>& x) override {
+    return Spoil("Multiply", twin_->Multiply(a, x));
+  }
+  std::vector<Real> MultiplyTransposed(const CsrMatrix<Real>& a,
+                                       const std::vector<Real>& x) override {
+    return Spoil("MultiplyTransposed", twin_->MultiplyTransposed(a, x));
+  }
+  void AddNormalProduct(const CsrMatrix<Real>& a, Real scale, const CsrPattern& pattern,
+                        std::vector<Real>* values) override {
+    twin_->AddNormalProduct(a, scale, pattern, values);
+    *values = Spoil("AddNormalProduct", *values);
+  }
+  std::vector<Real> FormPicture(const BlockGeometry& whole, Splat splat,
+                                const std::vector<Real>& views) override {
+    return Spoil("FormPicture", twin_->FormPicture(whole, splat, views));
+  }
+  void StartWhole(int s_count, int t_count, int u_count, int v_count, int channels) override {
+    twin_->StartWhole(s_count, t_count, u_count, v_count, channels);
+  }
+  void AddBlock(const BlockGeometry& block, int channel, const std::vector<Real>& rays) override {
+    twin_->AddBlock(block, channel, rays);
+  }
+  std::vector<float> FinishWhole() override { return Spoil("AddBlock", twin_->FinishWhole()); }
+
+ private:
+  template <typename Number>
+  std::vector<Number> Spoil(const std::string& method, std::vector<Number> numbers) const {
+    if (method == fault_.method && numbers.size() > 1) {
+      numbers[numbers.size() - 2] += static_cast<Number>(fault_.amount);
+    }
+    return numbers;
+  }
+  EllMatrix<Real> Spoil(const std::string& method, EllMatrix<Real> matrix) const {
+    matrix.value = Spoil(method, matrix.value);
+    if (fault_.method == method + " columns") ++matrix.column.front();
+    return matrix;
+  }
+
+  Fault fault_;
+  std::unique_ptr<Kernels<Real>> twin_;
+};
+
+class FaultyBackend : public Backend {
+ public:
+  FaultyBackend(Fault in_float, Fault in_double)
+      : in_float_(std::move(in_float)), in_double_(std::move(in_double)) {}
+  bool is_opencl() const override { return false; }
+  bool has_double() const override { return in_double_.has_double; }
+  std::string name() const override { return "faulty"; }
+  std::string description() const override { return "faulty"; }
+  std::unique_ptr<Kernels<float>> NewFloat() override {
+    return std::make_unique<Faulty<float>>(in_float_);
+  }
+  std::unique_ptr<Kernels<double>> NewDouble() override {
+    return std::make_unique<Faulty<double>>(in_double_);
+  }
+
+ private:
+  Fault in_float_, in_double_;
+};
+
+AgreementCheck Check(const Fault& in_float, const Fault& in_double) {
+  FaultyBackend backend(in_float, in_double);
+  return CheckAgreement(&backend);
+}
+
+TEST(Agreement, TheTwinAgreesWithItself) {
+  const AgreementCheck check = Check({}, {});
+  EXPECT_TRUE(check.agrees);
+  EXPECT_EQ(check.float_error, 0);
+  EXPECT_EQ(check.double_error, 0);
+}
+
+// A wrong number in any of the methods is seen, in either precision, and told.
+TEST(Agreement, SeesAFaultOfEveryMethod) {
+  for (const char* method :
+       {"FindRays", "WeighRays", "WarpDifferences", "SixTermMasks", "Multiply",
+        "MultiplyTransposed", "AddNormalProduct", "FormPicture", "AddBlock", "WeighRays columns",
+        "WarpDifferences columns", "SixTermMasks columns"}) {
+    const std::string name = std::string(method).substr(0, std::string(method).find(' '));
+    const AgreementCheck in_float = Check({method, 0.01}, {});
+    EXPECT_FALSE(in_float.agrees) << method;
+    EXPECT_GT(in_float.float_error, 1e-4) << method;
+    EXPECT_EQ(in_float.double_error, 0) << method;
+    EXPECT_EQ(in_float.worst, name + " in float");
+    const AgreementCheck in_double = Check({}, {method, 0.01});
+    EXPECT_FALSE(in_double.agrees) << method;
+    EXPECT_EQ(in_double.float_error, 0) << method;
+    EXPECT_GT(in_double.double_error, 1e-10) << method;
+    EXPECT_EQ(in_double.worst, name + " in double");
+  }
+}
+
+TEST(Agreement, HasItsLimits) {
+  EXPECT_TRUE(Check({"FormPicture", 1e-6}, {}).agrees);
+  EXPECT_FALSE(Check({"FormPicture", 1e-3}, {}).agrees);
+  EXPECT_TRUE(Check({}, {"FormPicture", 1e-12}).agrees);
+  EXPECT_FALSE(Check({}, {"FormPicture", 1e-9}).agrees);
+  // Pictures are of 0 to 1.
+  EXPECT_NEAR(Check({"FormPicture", 1e-3}, {}).float_error, 1e-3, 1e-3);
+}
+
+// NaN passes every comparison with < unless it is asked for.
+TEST(Agreement, NoNumberIsADifference) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(Check({"Multiply", nan}, {}).agrees);
+  EXPECT_FALSE(Check({}, {"AddBlock", nan}).agrees);
+}
+
+TEST(Agreement, WithoutDoubleTheFloatDecides) {
+  const Fault no_double = {"", 0, false};
+  const AgreementCheck check = Check({}, no_double);
+  EXPECT_TRUE(check.agrees);
+  EXPECT_TRUE(std::isnan(check.double_error));
+  EXPECT_FALSE(Check({"Multiply", 1}, no_double).agrees);
+}
+
+TEST(Agreement, TheDeviceAgrees) {
+  const auto backend = OpenBackend(ParseDeviceRequest("opencl"), nullptr);
+  const AgreementCheck check = CheckAgreement(backend.get());
+  EXPECT_TRUE(check.agrees) << check.worst;
+  EXPECT_LE(check.float_error, 1e-4);
+}
+
+}  // namespace
+}  // namespace thicklens::kernels
