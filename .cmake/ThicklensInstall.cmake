@@ -12,6 +12,7 @@ configure_package_config_file("${PROJECT_SOURCE_DIR}/.cmake/thicklensConfig.cmak
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/thicklensConfigVersion.cmake"
                                  COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/thicklensConfig.cmake"
-              "${PROJECT_BINARY_DIR}/thicklensConfigVersion.cmake" DESTINATION ${package_dir})
+              "${PROJECT_BINARY_DIR}/thicklensConfigVersion.cmake"
+              "${PROJECT_SOURCE_DIR}/.cmake/FindSuiteSparse.cmake" DESTINATION ${package_dir})
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/configs/" DESTINATION ${CMAKE_INSTALL_DATADIR}/thicklens)
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -1,0 +1,107 @@
+#ifndef THICKLENS_ESTIMATOR_ESTIMATE_H_
+#define THICKLENS_ESTIMATOR_ESTIMATE_H_
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/device.h"
+#include "thicklens/kernels/kernels.h"
+#include "thicklens/model/light_field.h"
+#include "thicklens/model/scene.h"
+
+namespace thicklens::estimator {
+
+// What solves the linear system of one block.
+enum class BlockSolver {
+  kUmfpack,  // unsymmetric multifrontal LU (the source's choice); GPL
+  kCholmod,  // supernodal Cholesky; GPL
+  kEigen,    // simplicial Cholesky, or LU for the six-term stencil; always there
+};
+BlockSolver BlockSolverFromName(const std::string& name);  // "umfpack", "cholmod", "eigen"; throws
+std::string BlockSolverName(BlockSolver solver);
+bool IsBuiltIn(BlockSolver solver);  // whether this build has it
+BlockSolver DefaultBlockSolver();
+
+// How the smoothness over the rays of one scene point is discretised.
+enum class Stencil {
+  kWarp,    // D L = L(i + m, k + 1) - L(i, k); -G = D^T D
+  kSource,  // G as six explicit finite differences; not symmetric where the depth varies
+};
+Stencil StencilFromName(const std::string& name);  // "warp", "source"; throws
+std::string StencilName(Stencil stencil);
+
+struct BlockOptions {
+  BlockSolver solver = DefaultBlockSolver();
+  Stencil stencil = Stencil::kWarp;
+  kernels::Splat splat = kernels::Splat::kBilinear;
+  double gamma = 1;             // > 0
+  std::optional<double> ridge;  // mu, >= 0; default 1e-2/(U V)
+  // Edge of the square blocks, px. Default: 16, or the largest that `memory_limit_mib` allows.
+  std::optional<int> block_px;
+  std::optional<double> memory_limit_mib;  // for the whole process
+  double rcond_min = 1e-12;
+  bool falloff = true;  // the irradiance of (12), where there is a camera
+  int threads = 0;      // 0: one per core
+  // Called from any thread, one at a time, as blocks are finished. May throw to stop.
+  std::function<void(int done, int total)> progress;
+
+  bool IsValid(std::string* why) const;
+};
+
+// What the estimate starts from.
+struct EstimateInput {
+  model::LinearPicture picture;
+  DisparityMap disparity;   // without holes, of the picture's size
+  Eigen::ArrayXXd weights;  // V x U, sum 1, >= 0
+  model::TransferCurve transfer = model::TransferCurve::Srgb();
+  // Both or none. S x T of the grid is the size of the picture.
+  std::optional<model::LightFieldGrid> grid;
+  std::optional<model::Camera> camera;
+};
+
+struct BlockReport {
+  int x = 0, y = 0, width_px = 0, height_px = 0;
+  int unknowns = 0;
+  std::int64_t entries = 0;      // of the system
+  double rcond = 0;              // the solver's own estimate from its factor's diagonal
+  double relative_residual = 0;  // |N x - b|/|b| recomputed; the largest of the channels
+};
+
+struct EstimateSummary {
+  std::string message = "not run";
+  int block_px = 0;
+  std::vector<BlockReport> blocks;
+  double gamma = 0, ridge = 0;
+  double rcond_min = 0;          // over the blocks
+  double relative_residual = 0;  // the largest
+  double setup_seconds = 0;      // geometry of the views, the prior, choice of the block size
+  double solve_seconds = 0;
+  double predicted_memory_mib = 0;  // of the largest block, all threads, with the light field
+  int threads = 0;
+  std::string device;
+};
+
+// The light field of one picture by blocks, each solved on its own:
+//   (H^T H - gamma G + mu Id) L = H^T I + mu L0,
+// the minimiser of |H L - I|^2 + gamma |D L|^2 + mu |L - L0|^2, L0 the picture warped by its depth.
+// (21) of the source has no ridge; without one the system is singular or so nearly that its
+// solution is noise, while its residual is perfect: see BlockOptions::rcond_min.
+// Channels share each block's factor. Blocks share no ray; smoothness links that leave a block
+// are lost. The result does not depend on the number of threads.
+// Throws Error for options and inputs that do not fit, a block whose factor is singular or has an
+// rcond below the limit (naming the block), and a memory limit that no block fits.
+model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& options,
+                                   kernels::Backend* backend, EstimateSummary* summary);
+
+// The picture warped to every view: the prior of the estimate, and the baseline DIBR.
+model::LightField WarpedLightField(const EstimateInput& input, bool falloff, int threads);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_ESTIMATE_H_

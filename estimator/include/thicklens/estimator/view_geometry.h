@@ -1,0 +1,77 @@
+#ifndef THICKLENS_ESTIMATOR_VIEW_GEOMETRY_H_
+#define THICKLENS_ESTIMATOR_VIEW_GEOMETRY_H_
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "thicklens/model/light_field_grid.h"
+#include "thicklens/model/scene.h"
+
+namespace thicklens::estimator {
+
+// The depth of a picture in the only form that the rays of its light field need: the displacement
+// of each scene point between views.
+struct DisparityMap {
+  int width_px = 0;
+  int height_px = 0;
+  // One number a pixel, near positive: what stands at sample x of the centre view stands at
+  // x - disparity * (a step.x, b step.y) in the view (a, b). NaN marks a hole.
+  std::vector<float> disparity;
+  // Per view in u and v. (1, 1) where the disparity is in px per view step; steps of the grid in mm
+  // where it is in px per mm.
+  Eigen::Vector2d step{1, 1};
+};
+
+// From depths to the samples of a grid: disparity * step = -m, m of model::SlopeOnGrid. Throws
+// Error unless every depth is beyond the UV plane (where nearer is larger).
+DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vector<float>& depth_mm,
+                             int width_px, int height_px);
+// A map that says px per view step: scale * value + offset; NaN and infinities are holes, and so is
+// 0 in an integer map. Throws Error if all are holes.
+DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, double offset_px);
+
+// Holes filled from the nearest known pixels to the left, right, above and below: of these the
+// farthest (smallest disparity), since a hole beside an edge belongs to what is behind. `filled`
+// (may be null) is told how many.
+DisparityMap FillHoles(const DisparityMap& map, std::size_t* filled);
+
+enum class Seen : std::uint8_t {
+  kSeen,    // a point of the centre view
+  kHidden,  // not seen from the centre; disparity and source are those of the background beside it
+};
+
+// What a view sees: one disparity for each of its samples.
+struct ViewDisparity {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<float> disparity;  // in the unit of the DisparityMap
+  std::vector<Seen> seen;
+  // Where in the centre view the sample's source is, px: sample + (source_x, source_y). For kSeen
+  // the displacement is disparity * (a step.x, b step.y); for kHidden it leads to the source of the
+  // background sample that fills it: that sample's own displacement, and the way to that sample.
+  // May lead outside of the picture by rounding; readers cut it.
+  std::vector<float> source_x, source_y;
+};
+
+// The disparity rendered into the view at (a, b) steps: every 2 x 2 cell of centre pixels whose
+// disparities differ by at most .2 px per view step is two triangles at (x - a d, y - b d), and
+// every pixel of the other cells a square of +-.5 px; the nearest wins. Px per view step are those
+// of the larger of the two steps. Samples that nothing covers are hidden, those beyond the border
+// of the centre picture as well: they walk both ways along the displacement (a step.x, b step.y) to
+// the first covered sample and take the farther of the two, or the only one; where there is none,
+// the closest in any direction; where nothing of the picture is in the view, the centre view's own
+// sample. (0, 0) gives the map itself. Throws Error if the map has holes.
+ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
+
+// The picture warped to that view by its depth (with the blurred photograph: depth-image-based
+// rendering, DIBR). Bicubic (Catmull-Rom) where all 16 taps agree with the sample's disparity to
+// .3 px per view step, else bilinear from the taps that do, renormalised; hidden samples take their
+// background source's value.
+model::LinearPicture WarpPicture(const model::LinearPicture& picture, const DisparityMap& map,
+                                 const ViewDisparity& view);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_VIEW_GEOMETRY_H_

@@ -1,0 +1,69 @@
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <string>
+#include <system_error>
+
+#include "thicklens/estimator/blas.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// A function in `scope`, or null. Functions are looked up by name because which BLAS this process
+// has is known at run time alone.
+template <typename Function>
+Function* Find(const char* name, void* scope = RTLD_DEFAULT) {
+  return reinterpret_cast<Function*>(::dlsym(scope, name));
+}
+
+std::string TrueName(const char* file) {
+  std::error_code failure;
+  const auto path = std::filesystem::canonical(file, failure);
+  return failure ? file : path.string();
+}
+
+// The BLAS of a library and what it depends on. Another one may be in the process, too.
+std::string NameOf(void* library, const std::string& file) {
+  if (const auto config = Find<char*()>("openblas_get_config", library)) {
+    std::string name = config();  // begins with "OpenBLAS" and the version
+    while (!name.empty() && name.back() == ' ') name.pop_back();
+    const auto threads = Find<int()>("openblas_get_num_threads", library);
+    return threads == nullptr ? name : fmt::format("{}, threads: {}", name, threads());
+  }
+  std::string name = file.find("/blas/") == std::string::npos ? "BLAS" : "reference BLAS";
+  if (Find<void()>("ATL_dgemm", library) != nullptr) name = "ATLAS";
+  if (Find<void()>("MKL_Get_Version", library) != nullptr) name = "MKL";
+  if (Find<void()>("openblas_get_config") != nullptr) {
+    name += ", which comes before the OpenBLAS that is loaded as well";
+  }
+  return name;
+}
+
+}  // namespace
+
+std::string BlasDescription() {
+  Dl_info known;
+  void* const dgemm = ::dlsym(RTLD_DEFAULT, "dgemm_");
+  if (dgemm == nullptr || ::dladdr(dgemm, &known) == 0 || known.dli_fname == nullptr) return "none";
+  const std::string file = TrueName(known.dli_fname);
+  void* const library = ::dlopen(known.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
+  // Without a library of its own it is in the program.
+  const std::string name = NameOf(library == nullptr ? RTLD_DEFAULT : library, file);
+  if (library != nullptr) ::dlclose(library);
+  return fmt::format("{} ({})", name, file);
+}
+
+OneBlasThread::OneBlasThread() {
+  const auto threads = Find<int()>("openblas_get_num_threads");
+  const auto set_threads = Find<void(int)>("openblas_set_num_threads");
+  if (threads == nullptr || set_threads == nullptr) return;
+  threads_before_ = threads();
+  set_threads(1);
+}
+
+OneBlasThread::~OneBlasThread() {
+  if (threads_before_ > 0) Find<void(int)>("openblas_set_num_threads")(threads_before_);
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,380 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "block_system.h"
+#include "linear_solver.h"
+#include "thicklens/error.h"
+#include "thicklens/estimator/blas.h"
+#include "thicklens/estimator/estimate.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+using kernels::BlockGeometry;
+using kernels::Kernels;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kDefaultBlockPx = 16;  // the source's
+constexpr double kBytesPerMib = 1024.0 * 1024.0;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// A file or field must be named by whoever read it; here the numbers are.
+void CheckInput(const EstimateInput& input) {
+  const auto fail = [](const std::string& what) { throw Error("estimate: " + what); };
+  const model::LinearPicture& picture = input.picture;
+  if (picture.channels != 1 && picture.channels != 3) {
+    fail(fmt::format("the picture has {} channels: it must have 1 or 3", picture.channels));
+  }
+  if (picture.width_px < 1 || picture.height_px < 1 ||
+      picture.values.size() !=
+          Index(picture.width_px) * Index(picture.height_px) * Index(picture.channels)) {
+    fail(fmt::format("the picture is {}x{} px with {} values", picture.width_px, picture.height_px,
+                     picture.values.size()));
+  }
+  if (!std::all_of(picture.values.begin(), picture.values.end(),
+                   [](float value) { return std::isfinite(value); })) {
+    fail("the picture has values that are not finite");
+  }
+  if (input.disparity.width_px != picture.width_px ||
+      input.disparity.height_px != picture.height_px) {
+    fail(fmt::format("the depth is {}x{} px, the picture {}x{} px: the sizes must be equal",
+                     input.disparity.width_px, input.disparity.height_px, picture.width_px,
+                     picture.height_px));
+  }
+  if (!std::all_of(input.disparity.disparity.begin(), input.disparity.disparity.end(),
+                   [](float value) { return std::isfinite(value); })) {
+    fail("the disparity has holes: they must be filled");
+  }
+  if (input.weights.size() < 2) {
+    fail(fmt::format("views are {}x{}: a light field needs at least two", input.weights.cols(),
+                     input.weights.rows()));
+  }
+  if (!(input.weights >= 0).all() || !(std::abs(input.weights.sum() - 1) < 1e-6)) {
+    fail(fmt::format("the weights of the views sum to {}: they must be >= 0 with sum 1",
+                     input.weights.sum()));
+  }
+  if (input.grid.has_value() != input.camera.has_value()) {
+    fail("a camera and a grid come together");
+  }
+  if (input.grid &&
+      (input.grid->s_count != picture.width_px || input.grid->t_count != picture.height_px ||
+       input.grid->u_count != input.weights.cols() ||
+       input.grid->v_count != input.weights.rows())) {
+    fail(fmt::format(
+        "the grid has {}x{} samples and {}x{} views, the picture {}x{} px and the "
+        "weights {}x{}: they must be equal",
+        input.grid->s_count, input.grid->t_count, input.grid->u_count, input.grid->v_count,
+        picture.width_px, picture.height_px, input.weights.cols(), input.weights.rows()));
+  }
+}
+
+// The blocks of a picture, row by row; those at the right and lower border may be smaller.
+std::vector<model::PixelRect> CutInBlocks(int width_px, int height_px, int block_px) {
+  std::vector<model::PixelRect> blocks;
+  for (int y = 0; y < height_px; y += block_px) {
+    for (int x = 0; x < width_px; x += block_px) {
+      blocks.push_back({x, y, std::min(block_px, width_px - x), std::min(block_px, height_px - y)});
+    }
+  }
+  return blocks;
+}
+
+double ResidentBytes() {
+  std::ifstream file("/proc/self/statm");
+  double total_pages = 0;
+  double resident_pages = 0;
+  file >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+// Bytes of a block's system beside its factor: patterns of its parts and of their sum, values, the
+// matrix, the solver's 64-bit copy of it; H, D, their transposes and the vectors. What malloc
+// cannot use again between blocks comes on top, about a seventh.
+double SystemBytes(const kernels::CsrMatrix<double>& matrix) {
+  constexpr double kPerEntry = 3 * 4 + 8 + 12 + 16;
+  constexpr double kPerRay = 3 * 12 * 4 + 10 * 8;
+  return kPerEntry * static_cast<double>(matrix.entries()) + kPerRay * matrix.rows;
+}
+constexpr double kLeftBetweenBlocks = 1.15;
+// A thread's stack and heap, and what the BLAS keeps for it.
+constexpr double kBytesPerThread = 12 * kBytesPerMib;
+
+// What the process will hold while blocks of this size are solved on all threads.
+class MemoryForecast {
+ public:
+  MemoryForecast(const RayField& rays, const BlockOptions& options, double ridge, int threads,
+                 Kernels<double>* kernels)
+      : rays_(rays), options_(options), ridge_(ridge), threads_(threads), kernels_(kernels) {}
+
+  // Bytes of the largest number of blocks at work at once, with what is held already and the whole
+  // light field, twice: on the device and as the result.
+  double Bytes(int block_px) const {
+    const model::LinearPicture& picture = rays_.input().picture;
+    const int width_px = std::min(block_px, picture.width_px);
+    const int height_px = std::min(block_px, picture.height_px);
+    // The middle of the picture stands for all: fill depends little on the slopes.
+    const BlockSystem system =
+        MakeBlockSystem(rays_,
+                        rays_.Block((picture.width_px - width_px) / 2,
+                                    (picture.height_px - height_px) / 2, width_px, height_px),
+                        options_, ridge_, kernels_);
+    const double of_factor = NewLinearSolver(options_.solver, options_.stencil == Stencil::kWarp)
+                                 ->PredictBytes(system.matrix);
+    const double of_block =
+        kBytesPerThread + kLeftBetweenBlocks * (SystemBytes(system.matrix) + of_factor);
+    const auto blocks = CutInBlocks(picture.width_px, picture.height_px, block_px).size();
+    const double at_once = std::min<double>(threads_, static_cast<double>(blocks));
+    const double whole = 2.0 * sizeof(float) * static_cast<double>(rays_.prior().values.size());
+    return ResidentBytes() + whole + at_once * of_block;
+  }
+
+ private:
+  const RayField& rays_;
+  const BlockOptions& options_;
+  const double ridge_;
+  const int threads_;
+  Kernels<double>* kernels_;
+};
+
+// Sizes to choose from: multiples of 2, each about a quarter larger than the one before.
+int NextBlockPx(int block_px) { return std::max(block_px + 2, (block_px * 5 / 4) / 2 * 2); }
+
+int ChooseBlockPx(const BlockOptions& options, const model::LinearPicture& picture,
+                  const MemoryForecast& forecast, double* bytes) {
+  const int whole_px = std::max(picture.width_px, picture.height_px);
+  if (!options.memory_limit_mib) {
+    const int block_px = std::min(options.block_px.value_or(kDefaultBlockPx), whole_px);
+    *bytes = forecast.Bytes(block_px);
+    return block_px;
+  }
+  const double limit = *options.memory_limit_mib * kBytesPerMib;
+  constexpr int kSmallestPx = 2;
+  const int first_px = std::min(options.block_px.value_or(kSmallestPx), whole_px);
+  *bytes = forecast.Bytes(first_px);
+  if (*bytes > limit) {
+    throw Error(fmt::format(
+        "memory limit {:.0f} MiB: blocks of {} px need {:.0f} MiB in all; the limit must be at "
+        "least that{}",
+        *options.memory_limit_mib, first_px, std::ceil(*bytes / kBytesPerMib),
+        options.block_px ? ", or the blocks smaller" : ", or the views or threads fewer"));
+  }
+  if (options.block_px) return first_px;
+  int block_px = first_px;
+  while (block_px < whole_px) {
+    const int next_px = std::min(NextBlockPx(block_px), whole_px);
+    const double next_bytes = forecast.Bytes(next_px);
+    if (next_bytes > limit) break;
+    block_px = next_px;
+    *bytes = next_bytes;
+  }
+  return block_px;
+}
+
+// A thread's own copies of what is used by one thread at a time.
+struct Worker {
+  std::unique_ptr<Kernels<double>> kernels;
+  std::unique_ptr<LinearSolver> solver;
+};
+
+// Hands workers out and takes them back, so that there are as many as threads.
+class Workers {
+ public:
+  explicit Workers(std::function<Worker()> make) : make_(std::move(make)) {}
+
+  Worker Take() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (idle_.empty()) return make_();
+    Worker worker = std::move(idle_.back());
+    idle_.pop_back();
+    return worker;
+  }
+  void GiveBack(Worker worker) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    idle_.push_back(std::move(worker));
+  }
+
+ private:
+  std::function<Worker()> make_;
+  std::mutex mutex_;
+  std::vector<Worker> idle_;
+};
+
+std::string NameOf(const model::PixelRect& rect) {
+  return fmt::format("block of {}x{} px at ({}, {})", rect.width, rect.height, rect.x, rect.y);
+}
+
+// Solves one block for all channels and judges the answer.
+std::vector<std::vector<double>> SolveBlock(const BlockSystem& system, const BlockOptions& options,
+                                            const model::PixelRect& rect, Worker* worker,
+                                            BlockReport* report) {
+  worker->solver->Factorize(system.matrix);
+  *report = {rect.x,
+             rect.y,
+             rect.width,
+             rect.height,
+             system.matrix.rows,
+             system.matrix.entries(),
+             worker->solver->rcond(),
+             0};
+  // Written so that NaN is refused, too.
+  if (!(report->rcond >= options.rcond_min) || !(report->rcond > 0)) {
+    throw Error(fmt::format(
+        "{}: its system is singular, or so nearly that the light field would be noise however "
+        "small "
+        "the residual: rcond is {:.2g}, and must be at least {:.2g}; a larger ridge (now {:.3g}) "
+        "helps",
+        NameOf(rect), report->rcond, options.rcond_min, options.ridge.value_or(0)));
+  }
+  std::vector<std::vector<double>> channels;
+  for (const std::vector<double>& right : system.right_sides) {
+    channels.push_back(worker->solver->Solve(right));
+    const double residual = RelativeResidual(system.matrix, channels.back(), right);
+    if (!std::isfinite(residual)) {
+      throw Error(fmt::format("{}: the solution is not finite", NameOf(rect)));
+    }
+    report->relative_residual = std::max(report->relative_residual, residual);
+  }
+  return channels;
+}
+
+// Rays that land outside of the picture are in no block: nothing but the prior is known of them.
+void KeepPriorBesideThePicture(const BlockGeometry& whole, const model::LightField& prior,
+                               std::vector<float>* values) {
+  const int width = prior.s_count;
+  const int height = prior.t_count;
+  for (int l = 0; l < prior.v_count; ++l) {
+    for (int k = 0; k < prior.u_count; ++k) {
+      const int shift_s = whole.s_shift[Index(k)];
+      const int shift_t = whole.t_shift[Index(l)];
+      if (shift_s == 0 && shift_t == 0) continue;
+      for (int channel = 0; channel < prior.channels; ++channel) {
+        std::size_t ray = prior.ViewStart(channel, k, l);
+        for (int t = 0; t < height; ++t) {
+          for (int s = 0; s < width; ++s, ++ray) {
+            const int x = s + shift_s;
+            const int y = t + shift_t;
+            const bool inside = x >= 0 && x < width && y >= 0 && y < height;
+            if (!inside) (*values)[ray] = prior.values[ray];
+          }
+        }
+      }
+    }
+  }
+}
+
+void CheckOptions(const BlockOptions& options) {
+  std::string why;
+  if (!options.IsValid(&why)) throw Error("block solver: " + why);
+}
+
+}  // namespace
+
+model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& given,
+                                   kernels::Backend* backend, EstimateSummary* summary) {
+  CheckOptions(given);
+  CheckInput(input);
+  const bool symmetric = given.stencil == Stencil::kWarp;
+  NewLinearSolver(given.solver, symmetric);  // refuses what this build or the stencil does not have
+
+  const auto start = Clock::now();
+  const int threads = model::ResolveThreads(given.threads);
+  BlockOptions options = given;
+  options.ridge = given.ridge.value_or(1e-2 / static_cast<double>(input.weights.size()));
+
+  // Systems are made in double: a device without it leaves that to the twin.
+  const bool on_device = backend->has_double();
+  std::unique_ptr<Kernels<double>> merging =
+      on_device ? backend->NewDouble() : kernels::NewReference<double>();
+  RayField rays(input, options.falloff, threads);
+  // Many small factorisations side by side: a BLAS with threads of its own would only be in the
+  // way, and make sums depend on their number.
+  const OneBlasThread one_blas_thread;
+
+  *summary = EstimateSummary();
+  summary->threads = threads;
+  summary->device = on_device ? backend->name() : "cpu (" + backend->name() + " has no double)";
+  summary->gamma = options.gamma;
+  summary->ridge = *options.ridge;
+  double bytes = 0;
+  summary->block_px =
+      ChooseBlockPx(options, input.picture,
+                    MemoryForecast(rays, options, *options.ridge, threads, merging.get()), &bytes);
+  summary->predicted_memory_mib = bytes / kBytesPerMib;
+  summary->setup_seconds = SecondsSince(start);
+
+  const auto solve_start = Clock::now();
+  const auto rects =
+      CutInBlocks(input.picture.width_px, input.picture.height_px, summary->block_px);
+  const int count = static_cast<int>(rects.size());
+  summary->blocks.resize(rects.size());
+  merging->StartWhole(input.picture.width_px, input.picture.height_px, rays.u_count(),
+                      rays.v_count(), input.picture.channels);
+  const std::unique_ptr<Kernels<double>> pattern_of_workers = merging->Clone();
+  Workers workers([&] {
+    return Worker{pattern_of_workers->Clone(), NewLinearSolver(options.solver, symmetric)};
+  });
+  std::mutex merge_mutex;
+  int done = 0;
+  model::ParallelFor(count, threads, [&](int i) {
+    Worker worker = workers.Take();
+    const model::PixelRect& rect = rects[Index(i)];
+    const BlockSystem system =
+        MakeBlockSystem(rays, rays.Block(rect.x, rect.y, rect.width, rect.height), options,
+                        *options.ridge, worker.kernels.get());
+    const auto channels = SolveBlock(system, options, rect, &worker, &summary->blocks[Index(i)]);
+    workers.GiveBack(std::move(worker));
+    const std::lock_guard<std::mutex> lock(merge_mutex);
+    for (std::size_t channel = 0; channel < channels.size(); ++channel) {
+      merging->AddBlock(system.block, static_cast<int>(channel), channels[channel]);
+    }
+    ++done;
+    if (options.progress) options.progress(done, count);
+  });
+  std::vector<float> values = merging->FinishWhole();
+  const BlockGeometry whole = rays.Block(0, 0, input.picture.width_px, input.picture.height_px);
+  model::LightField light_field = std::move(rays).TakePrior();
+  KeepPriorBesideThePicture(whole, light_field, &values);
+  light_field.values = std::move(values);
+
+  summary->rcond_min = 1;
+  for (const BlockReport& block : summary->blocks) {
+    summary->rcond_min = std::min(summary->rcond_min, block.rcond);
+    summary->relative_residual = std::max(summary->relative_residual, block.relative_residual);
+  }
+  summary->solve_seconds = SecondsSince(solve_start);
+  summary->message = fmt::format("{} blocks of {} px solved by {}", count, summary->block_px,
+                                 BlockSolverName(options.solver));
+
+  model::LightFieldOrigin& origin = light_field.origin;
+  origin = {};
+  origin.method = "blocks";
+  origin.block_solver = BlockSolverName(options.solver);
+  origin.stencil = StencilName(options.stencil);
+  origin.splat = options.splat == kernels::Splat::kNearest ? "nearest" : "bilinear";
+  origin.device = summary->device;
+  origin.block_px = summary->block_px;
+  origin.gamma = summary->gamma;
+  origin.ridge = summary->ridge;
+  origin.relative_residual = summary->relative_residual;
+  origin.rcond_min = summary->rcond_min;
+  origin.effects = {"defocus"};
+  if (options.falloff && input.camera) origin.effects.emplace_back("falloff");
+  return light_field;
+}
+
+}  // namespace thicklens::estimator

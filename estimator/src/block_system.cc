@@ -1,0 +1,191 @@
+#include "block_system.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "ray_irradiance.h"
+#include "ray_landing.h"
+#include "thicklens/model/parallel.h"
+#include "warped_views.h"
+
+namespace thicklens::estimator {
+namespace {
+
+using kernels::BlockGeometry;
+using kernels::CsrMatrix;
+using kernels::CsrPattern;
+
+// A point whose disparity differs by more than this from a sample's is not what the sample shows.
+constexpr double kSamePointPx = 0.3;
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// Calls visit(ray, k, l, s, t) for every ray of the block that exists.
+template <typename Visit>
+void ForEachRay(const BlockGeometry& block, const Visit& visit) {
+  for (int l = 0; l < block.v_count; ++l) {
+    for (int k = 0; k < block.u_count; ++k) {
+      for (int y = 0; y < block.height_px; ++y) {
+        for (int x = 0; x < block.width_px; ++x) {
+          if (!block.Exists(k, l, x, y)) continue;
+          const int ray = ((l * block.u_count + k) * block.height_px + y) * block.width_px + x;
+          visit(Index(ray), k, l, block.first_x + x - block.s_shift[Index(k)],
+                block.first_y + y - block.t_shift[Index(l)]);
+        }
+      }
+    }
+  }
+}
+
+// Entry (row, column) of the values of a pattern.
+std::size_t EntryOf(const CsrPattern& pattern, int row, int column) {
+  const auto begin = pattern.column.begin() + pattern.row_start[Index(row)];
+  const auto end = pattern.column.begin() + pattern.row_start[Index(row) + 1];
+  return static_cast<std::size_t>(std::lower_bound(begin, end, column) - pattern.column.begin());
+}
+
+void AddMatrix(const CsrMatrix<double>& a, double scale, const CsrPattern& pattern,
+               std::vector<double>* values) {
+  for (int row = 0; row < a.rows; ++row) {
+    for (std::int64_t e = a.row_start[Index(row)]; e < a.row_start[Index(row) + 1]; ++e) {
+      const auto entry = static_cast<std::size_t>(e);
+      (*values)[EntryOf(pattern, row, a.column[entry])] += scale * a.value[entry];
+    }
+  }
+}
+
+// Pixels of one channel, row by row.
+std::vector<double> PixelsOf(const model::LinearPicture& picture, const BlockGeometry& block,
+                             int channel) {
+  std::vector<double> pixels;
+  pixels.reserve(Index(block.pixels()));
+  for (int y = 0; y < block.height_px; ++y) {
+    for (int x = 0; x < block.width_px; ++x) {
+      pixels.push_back(picture.at(block.first_x + x, block.first_y + y, channel));
+    }
+  }
+  return pixels;
+}
+
+}  // namespace
+
+RayField::RayField(const EstimateInput& input, bool falloff, int threads)
+    : input_(input), prior_(WarpToAllViews(input, falloff, threads, &disparity_)) {
+  if (!falloff || !input.camera) return;
+  irradiance_.resize(disparity_.size());
+  model::ParallelFor(u_count() * v_count(), threads, [&](int view) {
+    irradiance_[Index(view)] = RelativeFalloff(*input_.grid, *input_.camera, input_.weights,
+                                               view % u_count(), view / u_count());
+  });
+}
+
+BlockGeometry RayField::Block(int x, int y, int width_px, int height_px) const {
+  return BlockOf(prior_, {x, y, width_px, height_px}, input_.weights);
+}
+
+// Bilinear neighbourhood of (s, t) in a view: every tap that has weight shows the disparity.
+bool RayField::ShowsSamePoint(int view, double s, double t, double disparity) const {
+  const int width = input_.picture.width_px;
+  const int height = input_.picture.height_px;
+  const double px_per_unit =
+      std::max(std::abs(input_.disparity.step.x()), std::abs(input_.disparity.step.y()));
+  const int s0 = static_cast<int>(std::floor(s));
+  const int t0 = static_cast<int>(std::floor(t));
+  const int s1 = s > s0 ? s0 + 1 : s0;
+  const int t1 = t > t0 ? t0 + 1 : t0;
+  if (s0 < 0 || t0 < 0 || s1 >= width || t1 >= height) return false;
+  const std::vector<float>& map = disparity_[Index(view)];
+  for (const int tt : {t0, t1}) {
+    for (const int ss : {s0, s1}) {
+      const double there = map[Index(tt) * Index(width) + Index(ss)];
+      if (!(std::abs(there - disparity) * px_per_unit <= kSamePointPx)) return false;
+    }
+  }
+  return true;
+}
+
+RayField::Slopes RayField::SlopesOf(const BlockGeometry& block, bool cut_hidden) const {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Slopes slopes;
+  slopes.u.assign(Index(block.rays()), kNone);
+  slopes.v = slopes.u;
+  const int width = input_.picture.width_px;
+  ForEachRay(block, [&](std::size_t ray, int k, int l, int s, int t) {
+    const int view = l * block.u_count + k;
+    const double disparity = disparity_[Index(view)][Index(t) * Index(width) + Index(s)];
+    const double m_u = -disparity * input_.disparity.step.x();
+    const double m_v = -disparity * input_.disparity.step.y();
+    const auto linked = [&](int next, double next_s, double next_t) {
+      return !cut_hidden || ShowsSamePoint(next, next_s, next_t, disparity);
+    };
+    // Without a next view the slope still serves the six-term mask.
+    if (k + 1 == block.u_count ? !cut_hidden : linked(view + 1, s + m_u, t)) slopes.u[ray] = m_u;
+    if (l + 1 == block.v_count ? !cut_hidden : linked(view + block.u_count, s, t + m_v)) {
+      slopes.v[ray] = m_v;
+    }
+  });
+  return slopes;
+}
+
+std::vector<double> RayField::IrradianceOf(const BlockGeometry& block) const {
+  if (irradiance_.empty()) return {};
+  std::vector<double> irradiance(Index(block.rays()), 0.0);
+  const int width = input_.picture.width_px;
+  ForEachRay(block, [&](std::size_t ray, int k, int l, int s, int t) {
+    irradiance[ray] = irradiance_[Index(l * block.u_count + k)][Index(t) * Index(width) + Index(s)];
+  });
+  return irradiance;
+}
+
+BlockSystem MakeBlockSystem(const RayField& rays, const BlockGeometry& block,
+                            const BlockOptions& options, double ridge,
+                            kernels::Kernels<double>* kernels) {
+  const CsrMatrix<double> h = kernels::Compress(kernels->WeighRays(
+      block, options.splat, kernels->FindRays(block, options.splat), rays.IrradianceOf(block)));
+
+  const bool warp = options.stencil == Stencil::kWarp;
+  const RayField::Slopes slopes = rays.SlopesOf(block, warp);
+  // D with -G = D^T D, or G itself.
+  const CsrMatrix<double> smoothness =
+      kernels::Compress(warp ? kernels->WarpDifferences(block, slopes.u, slopes.v)
+                             : kernels->SixTermMasks(block, slopes.u, slopes.v));
+  const CsrPattern pattern =
+      kernels::SumPattern(kernels::NormalPattern(h), warp ? kernels::NormalPattern(smoothness)
+                                                          : kernels::PatternOf(smoothness));
+
+  std::vector<double> values(static_cast<std::size_t>(pattern.entries()), 0.0);
+  kernels->AddNormalProduct(h, 1, pattern, &values);
+  if (warp) {
+    kernels->AddNormalProduct(smoothness, options.gamma, pattern, &values);
+  } else {
+    AddMatrix(smoothness, -options.gamma, pattern, &values);
+  }
+  std::vector<bool> exists(Index(block.rays()), false);
+  ForEachRay(block, [&](std::size_t ray, int, int, int, int) { exists[ray] = true; });
+  for (int ray = 0; ray < block.rays(); ++ray) {
+    values[EntryOf(pattern, ray, ray)] += exists[Index(ray)] ? ridge : 1;
+  }
+
+  BlockSystem system{block, {}, {}};
+  system.matrix.rows = system.matrix.columns = pattern.rows;
+  system.matrix.row_start = pattern.row_start;
+  system.matrix.column = pattern.column;
+  system.matrix.value = std::move(values);
+
+  const model::LightField& prior = rays.prior();
+  for (int channel = 0; channel < prior.channels; ++channel) {
+    std::vector<double> right =
+        kernels->MultiplyTransposed(h, PixelsOf(rays.input().picture, block, channel));
+    ForEachRay(block, [&](std::size_t ray, int k, int l, int s, int t) {
+      right[ray] +=
+          ridge *
+          prior.values[prior.ViewStart(channel, k, l) + Index(t) * Index(prior.s_count) + Index(s)];
+    });
+    system.right_sides.push_back(std::move(right));
+  }
+  return system;
+}
+
+}  // namespace thicklens::estimator

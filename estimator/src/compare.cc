@@ -1,0 +1,201 @@
+#include "thicklens/estimator/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Steps between views that differ by more than this share are other viewpoints, not an error of
+// calibration.
+constexpr double kStepTolerance = 0.05;
+
+void RequireEqual(const std::string& what, const std::string& reference, const std::string& other,
+                  const std::string& cure) {
+  if (reference == other) return;
+  throw Error(
+      fmt::format("{}: the reference has {}, the other light field {}: they must be equal{}", what,
+                  reference, other, cure));
+}
+
+void RequireSameViewpoints(const model::LightField& reference, const model::LightField& other) {
+  if (!reference.grid || !other.grid) return;
+  const std::array<std::array<double, 2>, 2> steps_mm = {
+      {{std::abs(reference.grid->u_step_mm), std::abs(other.grid->u_step_mm)},
+       {std::abs(reference.grid->v_step_mm), std::abs(other.grid->v_step_mm)}}};
+  const std::array<int, 2> counts = {reference.u_count, reference.v_count};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto [a_mm, b_mm] = steps_mm[axis];
+    if (counts[axis] == 1 || std::abs(a_mm - b_mm) <= kStepTolerance * std::max(a_mm, b_mm))
+      continue;
+    throw Error(
+        fmt::format("views in {}: they are {:.6g} mm apart in the reference and {:.6g} mm in the "
+                    "other light field: within {:g} % they must be the same, or other viewpoints "
+                    "are compared",
+                    axis == 0 ? "u" : "v", a_mm, b_mm, 100 * kStepTolerance));
+  }
+}
+
+void RequireComparable(const model::LightField& reference, const model::LightField& other) {
+  const auto counts = [](const model::LightField& light_field) {
+    return fmt::format("{}x{} views", light_field.u_count, light_field.v_count);
+  };
+  const auto size = [](const model::LightField& light_field) {
+    return fmt::format("{}x{} px", light_field.s_count, light_field.t_count);
+  };
+  const auto channels = [](const model::LightField& light_field) {
+    return fmt::format("{} channel(s)", light_field.channels);
+  };
+  RequireEqual("number of views", counts(reference), counts(other),
+               " (--views takes inner ones of both)");
+  RequireEqual("size of the views", size(reference), size(other), "");
+  RequireEqual("channels", channels(reference), channels(other), "");
+  RequireSameViewpoints(reference, other);
+}
+
+void RequireFitting(const model::LightField& reference, const DibrInput& dibr) {
+  const model::LinearPicture& photograph = dibr.photograph;
+  if (photograph.width_px != reference.s_count || photograph.height_px != reference.t_count ||
+      photograph.channels != reference.channels) {
+    throw Error(fmt::format(
+        "photograph: it has {}x{} px in {} channel(s), the views {}x{} px in {}: they must be "
+        "equal",
+        photograph.width_px, photograph.height_px, photograph.channels, reference.s_count,
+        reference.t_count, reference.channels));
+  }
+  if (dibr.disparity.width_px != reference.s_count ||
+      dibr.disparity.height_px != reference.t_count) {
+    throw Error(fmt::format("disparity: it has {}x{} px, the views {}x{} px: they must be equal",
+                            dibr.disparity.width_px, dibr.disparity.height_px, reference.s_count,
+                            reference.t_count));
+  }
+}
+
+ViewScores CompareView(const model::LightField& reference, const model::LightField& other, int k,
+                       int l, int border_px, const std::optional<DibrInput>& dibr) {
+  const StoredValues truth =
+      StoredValuesOf(model::ViewPicture(reference, k, l), reference.transfer);
+  ViewScores view;
+  view.u = k;
+  view.v = l;
+  view.scores = ComparePictures(
+      truth, StoredValuesOf(model::ViewPicture(other, k, l), reference.transfer), border_px);
+  if (!dibr) return view;
+  const ViewDisparity seen =
+      RenderDisparity(dibr->disparity, reference.u_offset(k), reference.v_offset(l));
+  view.dibr = ComparePictures(
+      truth,
+      StoredValuesOf(WarpPicture(dibr->photograph, dibr->disparity, seen), reference.transfer),
+      border_px);
+  return view;
+}
+
+// Views that equal the reference have no finite PSNR; the mean is that of the others, so that one
+// perfect view does not hide them.
+PictureScores MeanOf(const std::vector<PictureScores>& scores) {
+  PictureScores mean;
+  int finite_psnrs = 0;
+  int standins = 0;
+  double standin_sum = 0;
+  for (const PictureScores& one : scores) {
+    mean.ssim += one.ssim;
+    mean.delta_e94_mean += one.delta_e94_mean;
+    if (!std::isinf(one.psnr_db)) {
+      mean.psnr_db += one.psnr_db;
+      ++finite_psnrs;
+    }
+    if (one.macade_standin) {
+      standin_sum += *one.macade_standin;
+      ++standins;
+    }
+  }
+  const auto count = static_cast<double>(scores.size());
+  mean.ssim /= count;
+  mean.delta_e94_mean /= count;
+  mean.psnr_db =
+      finite_psnrs > 0 ? mean.psnr_db / finite_psnrs : std::numeric_limits<double>::infinity();
+  if (standins > 0) mean.macade_standin = standin_sum / standins;
+  return mean;
+}
+
+// Square of the distance from the middle of the views, in view steps; exact.
+double DistanceSquared(const model::LightField& light_field, const ViewScores& view) {
+  const double a = light_field.u_offset(view.u);
+  const double b = light_field.v_offset(view.v);
+  return a * a + b * b;
+}
+
+struct Means {
+  PictureScores all, centre, corner;
+};
+Means MeansOf(const model::LightField& light_field, const std::vector<ViewScores>& views,
+              const std::function<const PictureScores&(const ViewScores&)>& scores_of) {
+  double nearest = std::numeric_limits<double>::infinity();
+  double farthest = 0;
+  for (const ViewScores& view : views) {
+    nearest = std::min(nearest, DistanceSquared(light_field, view));
+    farthest = std::max(farthest, DistanceSquared(light_field, view));
+  }
+  std::vector<PictureScores> all, centre, corner;
+  for (const ViewScores& view : views) {
+    const double distance = DistanceSquared(light_field, view);
+    all.push_back(scores_of(view));
+    if (distance == nearest) centre.push_back(scores_of(view));
+    if (distance == farthest) corner.push_back(scores_of(view));
+  }
+  return {MeanOf(all), MeanOf(centre), MeanOf(corner)};
+}
+
+}  // namespace
+
+LightFieldScores CompareLightFields(const model::LightField& reference,
+                                    const model::LightField& other, int border_px,
+                                    const std::optional<DibrInput>& dibr, int threads) {
+  RequireComparable(reference, other);
+  if (dibr) RequireFitting(reference, *dibr);
+  std::vector<std::pair<int, int>> common;
+  for (int l = 0; l < reference.v_count; ++l) {
+    for (int k = 0; k < reference.u_count; ++k) {
+      if (reference.IsPresent(k, l) && other.IsPresent(k, l)) common.emplace_back(k, l);
+    }
+  }
+  if (common.empty()) throw Error("the two light fields have no view in common");
+
+  LightFieldScores result;
+  result.views.resize(common.size());
+  model::ParallelFor(static_cast<int>(common.size()), threads, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    const auto [k, l] = common[index];
+    try {
+      result.views[index] = CompareView(reference, other, k, l, border_px, dibr);
+    } catch (const Error& error) {
+      throw Error(fmt::format("view ({}, {}): {}", k, l, error.what()));
+    }
+  });
+  const Means means =
+      MeansOf(reference, result.views,
+              [](const ViewScores& view) -> const PictureScores& { return view.scores; });
+  result.mean = means.all;
+  result.centre = means.centre;
+  result.corner = means.corner;
+  if (!dibr) return result;
+  const Means dibr_means =
+      MeansOf(reference, result.views,
+              [](const ViewScores& view) -> const PictureScores& { return *view.dibr; });
+  result.dibr_mean = dibr_means.all;
+  result.dibr_centre = dibr_means.centre;
+  result.dibr_corner = dibr_means.corner;
+  return result;
+}
+
+}  // namespace thicklens::estimator

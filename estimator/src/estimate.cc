@@ -1,0 +1,107 @@
+#include "thicklens/estimator/estimate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "ray_irradiance.h"
+#include "ray_landing.h"
+#include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
+#include "warped_views.h"
+
+namespace thicklens::estimator {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// A light field of the input's sizes, without values of its own.
+model::LightField FrameOf(const EstimateInput& input) {
+  model::LightField frame = model::MakeLightField(
+      input.picture.width_px, input.picture.height_px, static_cast<int>(input.weights.cols()),
+      static_cast<int>(input.weights.rows()), input.picture.channels);
+  frame.weights = input.weights;
+  frame.transfer = input.transfer;
+  frame.grid = input.grid;
+  frame.camera = input.camera;
+  if (input.grid) frame.landing_step_px = LandingStepPx(*input.camera, *input.grid);
+  return frame;
+}
+
+// The picture as radiance: divided by what the fall-off leaves of a uniform radiance.
+model::LinearPicture RadianceOf(const EstimateInput& input, bool falloff, int threads) {
+  model::LinearPicture radiance = input.picture;
+  if (!falloff || !input.camera) return radiance;
+  const std::vector<float> share =
+      FalloffOfPicture(*input.grid, *input.camera, input.weights, input.picture.width_px,
+                       input.picture.height_px, threads);
+  for (std::size_t i = 0; i < radiance.values.size(); ++i) {
+    radiance.values[i] /= share[i / Index(radiance.channels)];
+  }
+  return radiance;
+}
+
+}  // namespace
+
+model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int threads,
+                                 std::vector<std::vector<float>>* disparity) {
+  model::LightField warped = FrameOf(input);
+  const model::LinearPicture radiance = RadianceOf(input, falloff, threads);
+  const int views = warped.u_count * warped.v_count;
+  if (disparity != nullptr) disparity->resize(Index(views));
+  model::ParallelFor(views, threads, [&](int view) {
+    const int k = view % warped.u_count;
+    const int l = view / warped.u_count;
+    ViewDisparity shown = RenderDisparity(input.disparity, warped.u_offset(k), warped.v_offset(l));
+    model::SetView(&warped, k, l, WarpPicture(radiance, input.disparity, shown));
+    if (disparity != nullptr) (*disparity)[Index(view)] = std::move(shown.disparity);
+  });
+  warped.origin.method = "dibr";
+  return warped;
+}
+
+model::LightField WarpedLightField(const EstimateInput& input, bool falloff, int threads) {
+  return WarpToAllViews(input, falloff, threads, nullptr);
+}
+
+Stencil StencilFromName(const std::string& name) {
+  if (name == "warp") return Stencil::kWarp;
+  if (name == "source") return Stencil::kSource;
+  throw Error(fmt::format("stencil \"{}\" is unknown: it must be warp or source", name));
+}
+
+std::string StencilName(Stencil stencil) { return stencil == Stencil::kWarp ? "warp" : "source"; }
+
+bool BlockOptions::IsValid(std::string* why) const {
+  const auto fail = [why](std::string reason) {
+    if (why != nullptr) *why = std::move(reason);
+    return false;
+  };
+  if (gamma == 0) {
+    return fail(
+        "gamma is 0: then nothing but the ridge says how the rays of a scene point belong "
+        "together, "
+        "and the light field does not follow the scene's geometry; it must be > 0");
+  }
+  if (!(gamma > 0) || !std::isfinite(gamma)) {
+    return fail(fmt::format("gamma is {}: it must be finite and > 0", gamma));
+  }
+  if (ridge && (!(*ridge >= 0) || !std::isfinite(*ridge))) {
+    return fail(fmt::format("ridge is {}: it must be finite and >= 0", *ridge));
+  }
+  if (block_px && !(*block_px >= 1)) {
+    return fail(fmt::format("block_px is {}: it must be >= 1", *block_px));
+  }
+  if (memory_limit_mib && !(*memory_limit_mib > 0)) {
+    return fail(fmt::format("memory_limit_mib is {}: it must be > 0", *memory_limit_mib));
+  }
+  if (!(rcond_min >= 0) || !(rcond_min < 1)) {
+    return fail(fmt::format("rcond_min is {}: it must be >= 0 and < 1", rcond_min));
+  }
+  if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
+  return true;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,351 @@
+#include "thicklens/estimator/render.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "catmull_rom.h"
+#include "ray_irradiance.h"
+#include "ray_landing.h"
+#include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Positions that differ by less, relatively or in px, are the same but for rounding.
+constexpr double kRounding = 1e-9;
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+void CheckLightField(const model::LightField& light_field) {
+  std::string why;
+  if (!light_field.IsValid(&why)) throw Error("light field: " + why);
+}
+
+void CheckIndex(const char* name, int value, int count) {
+  if (value >= 0 && value < count) return;
+  throw Error(fmt::format("{} is {}: it must be from 0 to {}", name, value, count - 1));
+}
+
+// The weights of the views that there are. Throws Error if they do not fit or nothing is left.
+Eigen::ArrayXXd PresentWeights(const model::LightField& light_field,
+                               const Eigen::ArrayXXd& weights) {
+  if (weights.cols() != light_field.u_count || weights.rows() != light_field.v_count) {
+    throw Error(fmt::format("weights are {}x{} for {}x{} views: the counts must be equal",
+                            weights.cols(), weights.rows(), light_field.u_count,
+                            light_field.v_count));
+  }
+  if (!(weights >= 0).all() || !weights.allFinite()) {
+    throw Error("weights of the views: they must be finite and >= 0");
+  }
+  Eigen::ArrayXXd present = weights;
+  for (int l = 0; l < light_field.v_count; ++l) {
+    for (int k = 0; k < light_field.u_count; ++k) {
+      if (!light_field.IsPresent(k, l)) present(l, k) = 0;
+    }
+  }
+  if (!(present.sum() > 0)) {
+    throw Error("weights of the views: no view that is present has a weight > 0");
+  }
+  return present;
+}
+
+model::LinearPicture BlackPicture(int width_px, int height_px, int channels) {
+  return {width_px, height_px, channels,
+          std::vector<float>(Index(width_px) * Index(height_px) * Index(channels), 0.0F)};
+}
+
+// All views of one channel, in the order of the light field.
+std::vector<float> ChannelOf(const model::LightField& light_field, int channel) {
+  const auto start = light_field.values.begin() +
+                     static_cast<std::ptrdiff_t>(light_field.ViewStart(channel, 0, 0));
+  const std::size_t count =
+      Index(light_field.u_count) * Index(light_field.v_count) * light_field.view_size();
+  return {start, start + static_cast<std::ptrdiff_t>(count)};
+}
+
+// Calls work(view, k, l) for all views.
+template <typename Work>
+void ForEachView(const model::LightField& light_field, int threads, const Work& work) {
+  model::ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int view) {
+    work(view, view % light_field.u_count, view / light_field.u_count);
+  });
+}
+
+// Irradiance of every ray, by view; empty unless it counts.
+std::vector<std::vector<float>> FalloffOfViews(const model::LightField& light_field,
+                                               const Eigen::ArrayXXd& weights, int threads) {
+  std::vector<std::vector<float>> falloff(Index(light_field.u_count * light_field.v_count));
+  ForEachView(light_field, threads, [&](int view, int k, int l) {
+    if (weights(l, k) == 0) return;
+    falloff[Index(view)] = RelativeFalloff(*light_field.grid, *light_field.camera, weights, k, l);
+  });
+  return falloff;
+}
+
+// Where a view crosses the aperture: mm with a camera, else view steps, from the centre.
+Eigen::Vector2d AperturePosition(const model::LightField& light_field, int k, int l) {
+  const double a = light_field.u_offset(k);
+  const double b = light_field.v_offset(l);
+  if (!light_field.camera) return {a, b};
+  const model::LightFieldGrid& grid = *light_field.grid;
+  return model::ApertureCrossingMm(grid.planes, {0, 0, a * grid.u_step_mm, b * grid.v_step_mm});
+}
+
+double TransmissionAt(const model::LightField& light_field, double radius,
+                      const Eigen::Vector2d& position) {
+  // A view on the rim of a disc is inside.
+  const Eigen::Vector2d inward = position * (1 - kRounding);
+  if (!light_field.camera) return inward.norm() <= radius ? 1 : 0;
+  return model::ApertureTransmission(light_field.camera->psf, light_field.camera->blur_ratio(),
+                                     radius, inward);
+}
+
+// The same weight for the present views that are nearest to the centre, none for the others.
+Eigen::ArrayXXd NearestViews(const model::LightField& light_field) {
+  Eigen::ArrayXXd distance = Eigen::ArrayXXd::Constant(light_field.v_count, light_field.u_count,
+                                                       std::numeric_limits<double>::infinity());
+  for (int l = 0; l < light_field.v_count; ++l) {
+    for (int k = 0; k < light_field.u_count; ++k) {
+      if (light_field.IsPresent(k, l)) distance(l, k) = AperturePosition(light_field, k, l).norm();
+    }
+  }
+  return (distance <= distance.minCoeff() * (1 + kRounding)).cast<double>();
+}
+
+// The samples x of [0, count) for which x - shift_px lies inside the view, and how to read there.
+struct ShiftedAxis {
+  int first = 0, last = -1;
+  int whole = 0;                    // sample at 0 of the four taps: x + whole
+  std::array<float, 4> tap_weight;  // of the taps at -1, 0, 1, 2
+
+  ShiftedAxis(double shift_px, int count) : tap_weight{} {
+    const double source_px = -shift_px;  // of x = 0
+    const double nearest_px = std::round(source_px);
+    const double snapped_px = std::abs(source_px - nearest_px) < kRounding ? nearest_px : source_px;
+    if (!(std::abs(snapped_px) < count)) return;  // all of it is outside
+    whole = static_cast<int>(std::floor(snapped_px));
+    tap_weight = CatmullRomWeights(snapped_px - whole);
+    first = static_cast<int>(std::max(0.0, std::ceil(-snapped_px)));
+    last = static_cast<int>(std::min(count - 1.0, std::floor(count - 1 - snapped_px)));
+  }
+
+  bool Holds(int x) const { return x >= first && x <= last; }
+};
+
+// One view of a refocused picture.
+struct ShiftedView {
+  int k = 0, l = 0;
+  double weight = 0;
+  ShiftedAxis x, y;
+};
+
+// Adds a row of the shifted view to the weighted sums of its samples.
+void AddRow(const float* view, int s_count, int t_count, const ShiftedView& shifted, int y,
+            std::vector<float>* blended, std::vector<double>* sums) {
+  std::fill(blended->begin(), blended->end(), 0.0F);
+  for (int tap = 0; tap < 4; ++tap) {
+    const int t = std::clamp(y + shifted.y.whole + tap - 1, 0, t_count - 1);
+    const float weight = shifted.y.tap_weight[Index(tap)];
+    const float* row = view + Index(t) * Index(s_count);
+    for (int s = 0; s < s_count; ++s) (*blended)[Index(s)] += weight * row[s];
+  }
+  for (int x = shifted.x.first; x <= shifted.x.last; ++x) {
+    double value = 0;
+    for (int tap = 0; tap < 4; ++tap) {
+      const int s = std::clamp(x + shifted.x.whole + tap - 1, 0, s_count - 1);
+      value += static_cast<double>(shifted.x.tap_weight[Index(tap)]) * (*blended)[Index(s)];
+    }
+    (*sums)[Index(x)] += shifted.weight * value;
+  }
+}
+
+// Row y of the mean of the shifted views, all channels.
+void RefocusRow(const model::LightField& light_field, const std::vector<ShiftedView>& views, int y,
+                model::LinearPicture* picture) {
+  const int width = light_field.s_count;
+  std::vector<double> weights(Index(width), 0.0);
+  for (const ShiftedView& view : views) {
+    if (!view.y.Holds(y)) continue;
+    for (int x = view.x.first; x <= view.x.last; ++x) weights[Index(x)] += view.weight;
+  }
+  std::vector<float> blended(Index(width));
+  for (int channel = 0; channel < light_field.channels; ++channel) {
+    std::vector<double> sums(Index(width), 0.0);
+    for (const ShiftedView& view : views) {
+      if (!view.y.Holds(y)) continue;
+      AddRow(light_field.values.data() + light_field.ViewStart(channel, view.k, view.l), width,
+             light_field.t_count, view, y, &blended, &sums);
+    }
+    for (int x = 0; x < width; ++x) {
+      if (weights[Index(x)] == 0) continue;  // no view reaches here: black
+      picture->values[(Index(y) * Index(width) + Index(x)) * Index(light_field.channels) +
+                      Index(channel)] = static_cast<float>(sums[Index(x)] / weights[Index(x)]);
+    }
+  }
+}
+
+// Copies channel values of one sample of a view to a pixel.
+void CopySample(const model::LightField& light_field, int k, int l, int s, int t, int x, int y,
+                model::LinearPicture* picture) {
+  for (int channel = 0; channel < light_field.channels; ++channel) {
+    picture->values[(Index(y) * Index(picture->width_px) + Index(x)) * Index(picture->channels) +
+                    Index(channel)] =
+        light_field.values[light_field.ViewStart(channel, k, l) +
+                           Index(t) * Index(light_field.s_count) + Index(s)];
+  }
+}
+
+void CheckRepeat(int repeat_px) {
+  if (repeat_px >= 1) return;
+  throw Error(fmt::format("repeat_px is {}: it must be >= 1", repeat_px));
+}
+
+}  // namespace
+
+model::LinearPicture Photograph(const model::LightField& light_field,
+                                const Eigen::ArrayXXd& weights, bool falloff,
+                                kernels::Kernels<float>* kernels, int threads) {
+  CheckLightField(light_field);
+  const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
+  const kernels::BlockGeometry whole =
+      BlockOf(light_field, {0, 0, light_field.s_count, light_field.t_count}, present);
+  std::vector<std::vector<float>> irradiance;
+  if (falloff && light_field.camera) irradiance = FalloffOfViews(light_field, present, threads);
+
+  model::LinearPicture photograph =
+      BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
+  for (int channel = 0; channel < light_field.channels; ++channel) {
+    std::vector<float> rays = ChannelOf(light_field, channel);
+    if (!irradiance.empty()) {
+      ForEachView(light_field, threads, [&](int view, int, int) {
+        const std::vector<float>& share = irradiance[Index(view)];
+        float* values = rays.data() + Index(view) * light_field.view_size();
+        for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
+      });
+    }
+    const std::vector<float> pixels = kernels->FormPicture(whole, kernels::Splat::kBilinear, rays);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      photograph.values[i * Index(light_field.channels) + Index(channel)] = pixels[i];
+    }
+  }
+  return photograph;
+}
+
+Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius) {
+  CheckLightField(light_field);
+  if (!(radius >= 0) || !std::isfinite(radius)) {
+    throw Error(fmt::format("aperture radius is {} {}: it must be finite and >= 0", radius,
+                            light_field.camera ? "mm" : "view steps"));
+  }
+  Eigen::ArrayXXd weights = Eigen::ArrayXXd::Zero(light_field.v_count, light_field.u_count);
+  for (int l = 0; l < light_field.v_count; ++l) {
+    for (int k = 0; k < light_field.u_count; ++k) {
+      if (!light_field.IsPresent(k, l)) continue;
+      weights(l, k) = TransmissionAt(light_field, radius, AperturePosition(light_field, k, l));
+    }
+  }
+  // So narrow a Gaussian that its tail underflows leaves no view either.
+  if (!(weights.sum() > std::numeric_limits<double>::min())) weights = NearestViews(light_field);
+  return weights / weights.sum();
+}
+
+model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,
+                             double disparity_v_px, const Eigen::ArrayXXd& weights, int threads) {
+  CheckLightField(light_field);
+  if (!std::isfinite(disparity_u_px) || !std::isfinite(disparity_v_px)) {
+    throw Error(fmt::format("disparity is ({}, {}) px per view step: both must be finite",
+                            disparity_u_px, disparity_v_px));
+  }
+  const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
+  std::vector<ShiftedView> views;
+  for (int l = 0; l < light_field.v_count; ++l) {
+    for (int k = 0; k < light_field.u_count; ++k) {
+      if (present(l, k) == 0) continue;
+      views.push_back({k, l, present(l, k),
+                       ShiftedAxis(light_field.u_offset(k) * disparity_u_px, light_field.s_count),
+                       ShiftedAxis(light_field.v_offset(l) * disparity_v_px, light_field.t_count)});
+    }
+  }
+  model::LinearPicture picture =
+      BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
+  model::ParallelFor(light_field.t_count, threads,
+                     [&](int y) { RefocusRow(light_field, views, y, &picture); });
+  return picture;
+}
+
+// d = -m; SlopeOnGrid says m in u, and in v of a grid whose axes are exchanged.
+Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double depth_mm) {
+  if (!light_field.grid) {
+    throw Error(fmt::format(
+        "depth {} mm: this light field has no camera; its planes are named by their disparity",
+        depth_mm));
+  }
+  model::LightFieldGrid exchanged = *light_field.grid;
+  std::swap(exchanged.s_step_mm, exchanged.t_step_mm);
+  std::swap(exchanged.u_step_mm, exchanged.v_step_mm);
+  return {-model::SlopeOnGrid(*light_field.grid, depth_mm),
+          -model::SlopeOnGrid(exchanged, depth_mm)};
+}
+
+model::LinearPicture Mosaic(const model::LightField& light_field, int gap_px) {
+  CheckLightField(light_field);
+  if (gap_px < 0) throw Error(fmt::format("gap_px is {}: it must be >= 0", gap_px));
+  const int step_x = light_field.s_count + gap_px;
+  const int step_y = light_field.t_count + gap_px;
+  model::LinearPicture mosaic =
+      BlackPicture(light_field.u_count * step_x - gap_px, light_field.v_count * step_y - gap_px,
+                   light_field.channels);
+  for (int l = 0; l < light_field.v_count; ++l) {
+    for (int k = 0; k < light_field.u_count; ++k) {
+      for (int t = 0; t < light_field.t_count; ++t) {
+        for (int s = 0; s < light_field.s_count; ++s) {
+          CopySample(light_field, k, l, s, t, k * step_x + s, l * step_y + t, &mosaic);
+        }
+      }
+    }
+  }
+  return mosaic;
+}
+
+model::LinearPicture EpipolarRow(const model::LightField& light_field, int t, int l,
+                                 int repeat_px) {
+  CheckLightField(light_field);
+  CheckIndex("row t", t, light_field.t_count);
+  CheckIndex("view row l", l, light_field.v_count);
+  CheckRepeat(repeat_px);
+  model::LinearPicture picture =
+      BlackPicture(light_field.s_count, light_field.u_count * repeat_px, light_field.channels);
+  for (int y = 0; y < picture.height_px; ++y) {
+    for (int s = 0; s < light_field.s_count; ++s) {
+      CopySample(light_field, y / repeat_px, l, s, t, s, y, &picture);
+    }
+  }
+  return picture;
+}
+
+model::LinearPicture EpipolarColumn(const model::LightField& light_field, int s, int k,
+                                    int repeat_px) {
+  CheckLightField(light_field);
+  CheckIndex("column s", s, light_field.s_count);
+  CheckIndex("view column k", k, light_field.u_count);
+  CheckRepeat(repeat_px);
+  model::LinearPicture picture =
+      BlackPicture(light_field.v_count * repeat_px, light_field.t_count, light_field.channels);
+  for (int t = 0; t < light_field.t_count; ++t) {
+    for (int x = 0; x < picture.width_px; ++x) {
+      CopySample(light_field, k, x / repeat_px, s, t, x, t, &picture);
+    }
+  }
+  return picture;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,734 @@
+#include "thicklens/estimator/view_geometry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "support/error_message.h"
+#include "thicklens/model/camera.h"
+#include "thicklens/model/light_field_grid.h"
+
+namespace thicklens::estimator {
+namespace {
+
+using ::testing::AllOf;
+using testing::ErrorOf;
+using ::testing::HasSubstr;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+std::size_t At(int x, int y, int width) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+         static_cast<std::size_t>(x);
+}
+
+DisparityMap MapOf(int width, int height, const std::function<double(int, int)>& disparity,
+                   const Eigen::Vector2d& step = {1, 1}) {
+  DisparityMap map{width, height, {}, step};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) map.disparity.push_back(static_cast<float>(disparity(x, y)));
+  }
+  return map;
+}
+
+model::LinearPicture PictureOf(int width, int height, int channels,
+                               const std::function<double(int, int, int)>& value) {
+  model::LinearPicture picture{width, height, channels, {}};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < channels; ++c) {
+        picture.values.push_back(static_cast<float>(value(x, y, c)));
+      }
+    }
+  }
+  return picture;
+}
+
+// Where in the centre view a sample's source is.
+Eigen::Vector2d SourceOf(const ViewDisparity& view, int x, int y) {
+  const std::size_t i = At(x, y, view.width_px);
+  return {x + double{view.source_x[i]}, y + double{view.source_y[i]}};
+}
+
+model::Camera BenchCamera() {
+  model::Camera camera;
+  camera.name = "bench";
+  camera.lens = {12.5, 12.8, 3.0, 4.46};
+  camera.sensor.width_px = 21;
+  camera.sensor.height_px = 17;
+  camera.sensor.pixel_pitch_mm = 0.05;
+  camera.sensor.principal_point_px = {10, 7};
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm =
+      model::Estimate{model::ImageDistanceMm(camera.lens, 640), 0};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
+  return camera;
+}
+
+// --- From depths and maps to disparities.
+
+struct PlanesCase {
+  const char* name;
+  model::LightFieldPlanes planes;
+  int u_count, v_count;
+};
+
+class DisparityOnGridTest : public ::testing::TestWithParam<PlanesCase> {};
+
+// A point of the scene is followed from the centre view to another by the geometry of its rays.
+TEST_P(DisparityOnGridTest, FollowsTheRaysOfAPoint) {
+  const PlanesCase& planes_case = GetParam();
+  const model::LightFieldGrid grid = model::GridOnPlanes(BenchCamera(), planes_case.planes,
+                                                         planes_case.u_count, planes_case.v_count);
+  const std::vector<float> depth_mm = {450, 640, 3000};
+  const DisparityMap map = DisparityOnGrid(grid, depth_mm, 3, 1);
+  EXPECT_GT(map.disparity[0], map.disparity[1]);
+  EXPECT_GT(map.disparity[1], map.disparity[2]);
+
+  for (std::size_t n = 0; n < depth_mm.size(); ++n) {
+    const double z = depth_mm[n];
+    const model::Ray centre{3.0, -2.0, 0, 0};
+    const Eigen::Vector2d point = model::PositionAtDepthMm(grid.planes, centre, z);
+    const double a = 2;
+    const double b = -1;
+    model::Ray other{0, 0, a * grid.u_step_mm, b * grid.v_step_mm};
+    const Eigen::Vector2d by_uv = model::PositionAtDepthMm(grid.planes, other, z);
+    const double st_share = (z - grid.planes.uv_depth_mm) / grid.planes.plane_spacing_mm;
+    const double moved_s = ((point.x() - by_uv.x()) / st_share - centre.s_mm) / grid.s_step_mm;
+    const double moved_t = ((point.y() - by_uv.y()) / st_share - centre.t_mm) / grid.t_step_mm;
+    EXPECT_NEAR(moved_s, -a * map.step.x() * map.disparity[n], 2e-5);
+    EXPECT_NEAR(moved_t, -b * map.step.y() * map.disparity[n], 2e-5);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Planes, DisparityOnGridTest,
+                         ::testing::Values(PlanesCase{"Default", {0, 640}, 5, 5},
+                                           PlanesCase{"NotSquare", {0, 640}, 3, 7},
+                                           PlanesCase{"OneColumn", {0, 640}, 1, 5},
+                                           PlanesCase{"UvInFront", {120, 300}, 5, 5},
+                                           PlanesCase{"StBeforeUv", {300, -100}, 5, 5}),
+                         [](const auto& tested) { return tested.param.name; });
+
+TEST(DisparityOnGrid, KeepsHolesAndRefusesDepthsThatAreNotBeyondTheUvPlane) {
+  const model::LightFieldGrid grid = model::GridOnPlanes(BenchCamera(), {120, 300}, 3, 3);
+  const DisparityMap map = DisparityOnGrid(grid, {500, kNan, 121}, 3, 1);
+  EXPECT_FALSE(std::isnan(map.disparity[0]));
+  EXPECT_TRUE(std::isnan(map.disparity[1]));
+  EXPECT_FALSE(std::isnan(map.disparity[2]));
+  EXPECT_THAT(ErrorOf([&] {
+                DisparityOnGrid(grid, {500, 120}, 2, 1);
+              }),
+              AllOf(HasSubstr("120 mm"), HasSubstr("UV plane")));
+  EXPECT_THAT(ErrorOf([&] { DisparityOnGrid(grid, {500, -3}, 2, 1); }), HasSubstr("-3 mm"));
+  EXPECT_THAT(ErrorOf([&] {
+                DisparityOnGrid(grid, {500, 600}, 3, 1);
+              }),
+              AllOf(HasSubstr("2 values"), HasSubstr("3x1")));
+}
+
+TEST(DisparityFromMap, ScalesMovesAndMarksHoles) {
+  const DisparityMap map =
+      DisparityFromMap({4, 1, {1, 0, kNan, kInfinity}, /*integer=*/false}, -2, 0.5);
+  EXPECT_EQ(map.disparity[0], -1.5F);
+  EXPECT_EQ(map.disparity[1], 0.5F);  // 0 is the plane of focus
+  EXPECT_TRUE(std::isnan(map.disparity[2]));
+  EXPECT_TRUE(std::isnan(map.disparity[3]));
+  EXPECT_EQ(map.step, Eigen::Vector2d(1, 1));
+  EXPECT_TRUE(std::isnan(DisparityFromMap({2, 1, {0, 3}, true}, 1, 1).disparity[0]));
+}
+
+TEST(DisparityFromMap, RefusesWhatIsNoMap) {
+  EXPECT_THAT(ErrorOf([] { DisparityFromMap({2, 1, {0, 0}, true}, 1, 0); }), HasSubstr("holes"));
+  EXPECT_THAT(ErrorOf([] { DisparityFromMap({1, 1, {kNan}, false}, 1, 0); }), HasSubstr("holes"));
+  EXPECT_THAT(ErrorOf([] { DisparityFromMap({2, 1, {1}, false}, 1, 0); }), HasSubstr("1 values"));
+  EXPECT_THAT(ErrorOf([] { DisparityFromMap({1, 1, {1}, false}, 0, 0); }), HasSubstr("scale"));
+  EXPECT_THAT(ErrorOf([] { DisparityFromMap({1, 1, {1}, false}, 1, kNan); }), HasSubstr("offset"));
+}
+
+// --- Holes.
+
+TEST(FillHoles, TakesTheFarthestOfTheFourNearest) {
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> uniform(-2, 2);
+  std::bernoulli_distribution is_hole(0.4);
+  const int width = 13;
+  const int height = 9;
+  const DisparityMap map = MapOf(width, height, [&](int, int) {
+    const double disparity = uniform(engine);
+    return is_hole(engine) ? std::nan("") : disparity;
+  });
+  std::size_t filled = 0;
+  const DisparityMap full = FillHoles(map, &filled);
+  std::size_t holes = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (!std::isnan(map.disparity[At(x, y, width)])) {
+        EXPECT_EQ(full.disparity[At(x, y, width)], map.disparity[At(x, y, width)]);
+        continue;
+      }
+      ++holes;
+      float farthest = kInfinity;
+      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        for (int n = 1;; ++n) {
+          const int xx = x + n * dx;
+          const int yy = y + n * dy;
+          if (xx < 0 || yy < 0 || xx >= width || yy >= height) break;
+          const float there = map.disparity[At(xx, yy, width)];
+          if (std::isnan(there)) continue;
+          farthest = std::min(farthest, there);
+          break;
+        }
+      }
+      EXPECT_EQ(full.disparity[At(x, y, width)], farthest) << x << ", " << y;
+    }
+  }
+  EXPECT_GT(holes, 30U);
+  EXPECT_EQ(filled, holes);
+}
+
+TEST(FillHoles, ReachesPixelsWithNothingKnownInTheirRowOrColumn) {
+  DisparityMap map = MapOf(7, 5, [](int, int) { return std::nan(""); });
+  map.disparity[At(2, 1, 7)] = 0.75F;
+  std::size_t filled = 0;
+  for (const float value : FillHoles(map, &filled).disparity) EXPECT_EQ(value, 0.75F);
+  EXPECT_EQ(filled, 34U);
+  map.disparity[At(2, 1, 7)] = kNan;
+  EXPECT_THAT(ErrorOf([&] { FillHoles(map, nullptr); }), HasSubstr("holes"));
+}
+
+// --- Views of known geometry.
+
+TEST(RenderDisparity, GivesTheMapItselfWhereNothingMoves) {
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> uniform(-2, 2);
+  const auto noise = [&](int, int) { return uniform(engine); };
+  const DisparityMap map = MapOf(9, 6, noise);
+  const DisparityMap still = MapOf(9, 6, noise, {0, 1});
+  for (const auto& [shown, a, b] : {std::tuple{&map, 0.0, 0.0}, std::tuple{&still, 3.0, 0.0}}) {
+    const ViewDisparity view = RenderDisparity(*shown, a, b);
+    EXPECT_EQ(view.disparity, shown->disparity);
+    EXPECT_EQ(view.source_x, std::vector<float>(54, 0));
+    EXPECT_EQ(view.source_y, std::vector<float>(54, 0));
+    EXPECT_EQ(std::count(view.seen.begin(), view.seen.end(), Seen::kSeen), 54);
+  }
+}
+
+struct PlaneCase {
+  const char* name;
+  double at_origin, per_x, per_y;
+  double a, b;
+  Eigen::Vector2d step;
+};
+
+class SlantedPlaneTest : public ::testing::TestWithParam<PlaneCase> {};
+
+// The plane d = d0 + g x is seen at x' = x - A d(x), A = (a step.x, b step.y), so that
+// x = (Id - A g^T)^-1 (x' + A d0).
+TEST_P(SlantedPlaneTest, HasItsClosedForm) {
+  const PlaneCase& plane = GetParam();
+  const int width = 40;
+  const int height = 30;
+  const Eigen::Vector2d gradient(plane.per_x, plane.per_y);
+  const Eigen::Vector2d shift(plane.a * plane.step.x(), plane.b * plane.step.y());
+  const DisparityMap map = MapOf(
+      width, height,
+      [&](int x, int y) { return plane.at_origin + gradient.dot(Eigen::Vector2d(x, y)); },
+      plane.step);
+  const ViewDisparity view = RenderDisparity(map, plane.a, plane.b);
+  const Eigen::Matrix2d inverse =
+      (Eigen::Matrix2d::Identity() - shift * gradient.transpose()).inverse();
+  int seen = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const std::size_t i = At(x, y, width);
+      const Eigen::Vector2d source = inverse * (Eigen::Vector2d(x, y) + shift * plane.at_origin);
+      // How far inside of the centre picture.
+      const double inside =
+          std::min({source.x(), width - 1 - source.x(), source.y(), height - 1 - source.y()});
+      if (std::abs(inside) < 1e-3) continue;  // on its rim
+      ASSERT_EQ(view.seen[i], inside > 0 ? Seen::kSeen : Seen::kHidden) << x << ", " << y;
+      const Eigen::Vector2d found = SourceOf(view, x, y);
+      if (inside > 0) {
+        ++seen;
+        EXPECT_NEAR(view.disparity[i], plane.at_origin + gradient.dot(source), 3e-5);
+        EXPECT_NEAR((found - source).norm(), 0, 1e-4);
+      } else {
+        EXPECT_NEAR(view.disparity[i], plane.at_origin + gradient.dot(found), 1e-4);
+        EXPECT_GE(found.minCoeff(), -1e-3);
+        EXPECT_LE(found.x(), width - 1 + 1e-3);
+        EXPECT_LE(found.y(), height - 1 + 1e-3);
+      }
+    }
+  }
+  EXPECT_GT(seen, 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Planes, SlantedPlaneTest,
+    ::testing::Values(PlaneCase{"Fronto", 1.3, 0, 0, 2, 0, {1, 1}},
+                      PlaneCase{"FrontoByWholePixels", 1, 0, 0, 2, -3, {1, 1}},
+                      PlaneCase{"AlongX", -1.7, 0.08, 0, 3, 0, {1, 1}},
+                      PlaneCase{"AlongY", 0.7, 0, -0.06, 0, 3, {1, 1}},
+                      PlaneCase{"Both", -1.1, 0.05, 0.03, 2, -3, {1, 1}},
+                      PlaneCase{"HalfSteps", -1.1, 0.05, 0.03, -1.5, 0.5, {1, 1}},
+                      PlaneCase{"StepsInMm", -11, 0.5, 0.3, -1.5, 2.5, {0.11, 0.07}},
+                      PlaneCase{"StepsOfOneAxis", -11, 0.5, 0.3, -1.5, 2.5, {0.11, 0}},
+                      // Everything exchanges left and right: its back is what is seen.
+                      PlaneCase{"TurnedOver", -3.5, 0.18, 0, 9, 0, {1, 1}}),
+    [](const auto& tested) { return tested.param.name; });
+
+// A rectangle before a wall, both parallel to the picture.
+struct TwoLayers {
+  static constexpr int kWidth = 48, kHeight = 36;
+  int left = 17, right = 26, top = 12, bottom = 20;  // pixels of the rectangle, inclusive
+  double near_px = 1.9, far_px = -0.6;
+
+  // Of the centre view, a pixel reaching half a pixel beyond its centre.
+  bool IsNear(double x, double y) const {
+    return x >= left - 0.5 && x <= right + 0.5 && y >= top - 0.5 && y <= bottom + 0.5;
+  }
+  DisparityMap Map() const {
+    return MapOf(kWidth, kHeight, [this](int x, int y) { return IsNear(x, y) ? near_px : far_px; });
+  }
+  bool NearCovers(double x, double y, double a, double b) const {
+    return IsNear(x + a * near_px, y + b * near_px);
+  }
+  bool FarCovers(double x, double y, double a, double b) const {
+    const double source_x = x + a * far_px;
+    const double source_y = y + b * far_px;
+    return source_x >= 0 && source_x <= kWidth - 1 && source_y >= 0 && source_y <= kHeight - 1 &&
+           !IsNear(source_x, source_y);
+  }
+};
+
+TEST(RenderDisparity, SeesTwoLayersInTheirClosedForm) {
+  const TwoLayers scene;
+  for (const auto& [a, b] : {std::pair{2.0, 0.0},
+                             {-3.0, 0.0},
+                             {0.0, 2.0},
+                             {0.0, -1.0},
+                             {2.0, 2.0},
+                             {-1.0, 3.0},
+                             {1.5, -2.2}}) {
+    const ViewDisparity view = RenderDisparity(scene.Map(), a, b);
+    int near = 0;
+    int hidden = 0;
+    for (int y = 0; y < TwoLayers::kHeight; ++y) {
+      for (int x = 0; x < TwoLayers::kWidth; ++x) {
+        const std::size_t i = At(x, y, TwoLayers::kWidth);
+        const bool is_near = scene.NearCovers(x, y, a, b);
+        const bool is_seen = is_near || scene.FarCovers(x, y, a, b);
+        ASSERT_EQ(view.seen[i], is_seen ? Seen::kSeen : Seen::kHidden)
+            << x << ", " << y << " of view " << a << ", " << b;
+        // What is hidden is background, at the picture's border as well.
+        const double disparity = is_near ? scene.near_px : scene.far_px;
+        ASSERT_NEAR(view.disparity[i], disparity, 1e-6) << x << ", " << y;
+        if (is_seen) {
+          EXPECT_NEAR(view.source_x[i], a * disparity, 1e-5);
+          EXPECT_NEAR(view.source_y[i], b * disparity, 1e-5);
+        } else {
+          const Eigen::Vector2d source = SourceOf(view, x, y);
+          EXPECT_FALSE(scene.IsNear(source.x(), source.y()));
+        }
+        near += is_near ? 1 : 0;
+        hidden += is_seen ? 0 : 1;
+      }
+    }
+    EXPECT_GT(near, 70);
+    EXPECT_GT(hidden, 20);
+  }
+}
+
+// In the view to the right the rectangle stands further left, and what comes out behind its right
+// edge is hidden from the centre; in the view to the left, its left edge.
+TEST(RenderDisparity, FillsFromTheBackgroundSide) {
+  const TwoLayers scene;
+  for (const int a : {3, -3}) {
+    const ViewDisparity view = RenderDisparity(scene.Map(), a, 0);
+    for (int y = scene.top; y <= scene.bottom; ++y) {
+      int hidden = 0;
+      for (int x = 4; x < TwoLayers::kWidth - 4; ++x) {
+        const std::size_t i = At(x, y, TwoLayers::kWidth);
+        if (view.seen[i] == Seen::kSeen) continue;
+        ++hidden;
+        int background = x;
+        while (!scene.FarCovers(background, y, a, 0)) background += a > 0 ? 1 : -1;
+        EXPECT_NEAR(view.source_x[i], background - x + a * scene.far_px, 1e-5) << x;
+        EXPECT_EQ(view.source_y[i], 0);
+      }
+      EXPECT_GE(hidden, 6);  // (near - far) * |a| = 7.5 px
+    }
+  }
+}
+
+TEST(RenderDisparity, FillsBordersFromTheOneSideAndCornersFromWhatIsClosest) {
+  const int width = 20;
+  const int height = 16;
+  const DisparityMap map = MapOf(width, height, [](int, int) { return 1.5; });
+  const ViewDisparity right = RenderDisparity(map, 2, 0);  // all moves 3 px to the left
+  EXPECT_EQ(right.seen[At(16, 5, width)], Seen::kSeen);
+  for (int x = 17; x < width; ++x) {
+    EXPECT_EQ(right.seen[At(x, 5, width)], Seen::kHidden);
+    EXPECT_EQ(right.source_x[At(x, 5, width)], 16 - x + 3);
+    EXPECT_EQ(right.source_y[At(x, 5, width)], 0);
+  }
+  // 3 px to the left and up: along the diagonal, the corners at the top right and bottom left meet
+  // nothing.
+  const ViewDisparity diagonal = RenderDisparity(map, 2, 2);
+  EXPECT_EQ(diagonal.source_x[At(19, 15, width)], -3 + 3);
+  EXPECT_EQ(diagonal.source_y[At(19, 15, width)], -3 + 3);
+  EXPECT_EQ(diagonal.source_x[At(18, 0, width)], -2 + 3);
+  EXPECT_EQ(diagonal.source_y[At(18, 0, width)], 0 + 3);
+  EXPECT_EQ(diagonal.source_x[At(0, 14, width)], 0 + 3);
+  EXPECT_EQ(diagonal.source_y[At(0, 14, width)], -2 + 3);
+}
+
+// Where a bar has stood before a wall, the wall to the left and to the right is equally far.
+TEST(RenderDisparity, FillsFromTheCloserOfTwoEquallyFarSides) {
+  const DisparityMap map = MapOf(40, 3, [](int x, int) { return x >= 20 && x <= 22 ? 2.0 : 0.0; });
+  const ViewDisparity view = RenderDisparity(map, 3, 0);
+  for (const auto& [x, source] : {std::pair{20, 19}, {21, 23}, {22, 23}}) {
+    EXPECT_EQ(view.seen[At(x, 1, 40)], Seen::kHidden);
+    EXPECT_EQ(SourceOf(view, x, 1).x(), source) << x;
+  }
+}
+
+// Rounding puts the last pixel 1.5e-8 px to the left of a sample.
+TEST(RenderDisparity, DoesNotLoseTheBorderToRounding) {
+  const DisparityMap map = MapOf(10, 8, [](int, int) { return 0.1; }, {10, 10});
+  ASSERT_GT(10 * double{map.disparity[0]}, 1);
+  const ViewDisparity view = RenderDisparity(map, 1, 1);
+  EXPECT_EQ(view.seen[At(8, 6, 10)], Seen::kSeen);
+  EXPECT_EQ(view.seen[At(9, 6, 10)], Seen::kHidden);
+}
+
+TEST(RenderDisparity, TakesTheCentreViewWhereNothingAtAllIsCovered) {
+  const DisparityMap map = MapOf(6, 5, [](int x, int) { return 1e9 + 1e6 * x; });
+  const ViewDisparity view = RenderDisparity(map, 3, 1);
+  EXPECT_EQ(view.disparity, map.disparity);
+  EXPECT_EQ(view.source_x, std::vector<float>(30, 0));
+  EXPECT_EQ(std::count(view.seen.begin(), view.seen.end(), Seen::kHidden), 30);
+}
+
+// Two surfaces pull apart, one surface is drawn out. Limit: .2 px per view step, the larger of the
+// two steps.
+TEST(RenderDisparity, JoinsNeighboursOfOneSurfaceOnly) {
+  for (const double step : {1.0, 0.5}) {
+    for (const double jump_px : {0.19, 0.21}) {
+      const DisparityMap map = MapOf(
+          30, 4, [&](int x, int) { return x < 15 ? 0.0 : -jump_px / step; }, {step, step / 3});
+      const ViewDisparity view = RenderDisparity(map, 20, 0);  // 3.8 or 4.2 px apart
+      const bool one_surface = jump_px < 0.2;
+      EXPECT_EQ(view.seen[At(16, 1, 30)], one_surface ? Seen::kSeen : Seen::kHidden);
+      EXPECT_EQ(view.seen[At(14, 1, 30)], Seen::kSeen);
+    }
+  }
+}
+
+TEST(RenderDisparity, KeepsWhatIsOnePixelWide) {
+  const DisparityMap map =
+      MapOf(25, 7, [](int x, int y) { return x == 12 || y == 3 ? 1.3 : -0.2; });
+  const ViewDisparity view = RenderDisparity(map, 1, 0);
+  // 12 - 1.3 = 10.7: sample 11 and no other.
+  for (int x = 5; x < 20; ++x) {
+    EXPECT_NEAR(view.disparity[At(x, 0, 25)], x == 11 ? 1.3 : -0.2, 1e-6) << x;
+    EXPECT_NEAR(view.disparity[At(x, 3, 25)], 1.3, 1e-6) << x;
+  }
+  const DisparityMap row = MapOf(9, 1, [](int, int) { return 1.0; });
+  EXPECT_EQ(RenderDisparity(row, 1, 0).seen[3], Seen::kSeen);
+}
+
+// --- A slow twin: every sample asks every triangle and square by itself.
+
+struct Point {
+  Eigen::Vector2d position;
+  double disparity;
+};
+
+// The disparity of the triangle at the position, or -infinity. By solving for its two edges.
+double OfTriangle(const Point& p, const Point& q, const Point& r, const Eigen::Vector2d& position) {
+  Eigen::Matrix2d edges;
+  edges << q.position - p.position, r.position - p.position;
+  if (std::abs(edges.determinant()) < 1e-9) return -kInfinity;
+  const Eigen::Vector2d share = edges.inverse() * (position - p.position);
+  if (share.minCoeff() < -1e-5 || share.sum() > 1 + 1e-5) return -kInfinity;
+  return p.disparity + share.x() * (q.disparity - p.disparity) +
+         share.y() * (r.disparity - p.disparity);
+}
+
+double SlowDisparity(const DisparityMap& map, double a, double b, int x, int y) {
+  const auto point = [&](int px, int py) {
+    const double d = map.disparity[At(px, py, map.width_px)];
+    return Point{{px - a * map.step.x() * d, py - b * map.step.y() * d}, d};
+  };
+  const Eigen::Vector2d position(x, y);
+  double nearest = -kInfinity;
+  std::vector<bool> alone(map.disparity.size(), false);
+  for (int cy = 0; cy + 1 < map.height_px; ++cy) {
+    for (int cx = 0; cx + 1 < map.width_px; ++cx) {
+      const std::array<Point, 4> corner = {point(cx, cy), point(cx + 1, cy), point(cx, cy + 1),
+                                           point(cx + 1, cy + 1)};
+      double spread = 0;
+      for (const Point& p : corner) {
+        for (const Point& q : corner) spread = std::max(spread, p.disparity - q.disparity);
+      }
+      if (spread * map.step.cwiseAbs().maxCoeff() <= 0.2) {
+        nearest = std::max({nearest, OfTriangle(corner[0], corner[1], corner[3], position),
+                            OfTriangle(corner[0], corner[2], corner[3], position)});
+        continue;
+      }
+      for (const Point& p : corner) {
+        if ((p.position - position).cwiseAbs().maxCoeff() <= 0.5) {
+          nearest = std::max(nearest, p.disparity);
+        }
+      }
+    }
+  }
+  return nearest;
+}
+
+TEST(RenderDisparity, AgreesWithASlowTwin) {
+  std::mt19937 engine(11);
+  std::uniform_real_distribution<double> uniform(-0.08, 0.08);
+  const int width = 27;
+  const int height = 19;
+  for (const Eigen::Vector2d& step : {Eigen::Vector2d(1, 1), Eigen::Vector2d(-0.4, 0.9)}) {
+    const DisparityMap map = MapOf(
+        width, height,
+        [&](int x, int y) {
+          const bool is_near = (x - 9) * (x - 9) + (y - 8) * (y - 8) < 30;
+          const bool is_ridge = x > 19 && y > 4;
+          return (is_near ? 1.6 : is_ridge ? 0.12 * std::abs(x - 23) : -0.9) + uniform(engine);
+        },
+        step);
+    for (const auto& [a, b] : {std::pair{1.37, -2.21}, {-3.13, 0.59}, {4.71, 3.83}}) {
+      const ViewDisparity view = RenderDisparity(map, a, b);
+      int hidden = 0;
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+          const std::size_t i = At(x, y, width);
+          const double expected = SlowDisparity(map, a, b, x, y);
+          const bool seen = std::isfinite(expected);
+          ASSERT_EQ(view.seen[i] == Seen::kSeen, seen) << x << ", " << y;
+          if (seen) {
+            EXPECT_NEAR(view.disparity[i], expected, 1e-5) << x << ", " << y;
+            EXPECT_NEAR(view.source_x[i], a * step.x() * expected, 1e-4);
+            EXPECT_NEAR(view.source_y[i], b * step.y() * expected, 1e-4);
+          } else {
+            ++hidden;
+          }
+        }
+      }
+      EXPECT_GT(hidden, 10);
+    }
+  }
+}
+
+// Both ways along the displacement, the first sample that is seen; of the two the farther.
+TEST(RenderDisparity, HiddenSamplesReuseTheFartherNeighbourAlongTheDisplacement) {
+  std::mt19937 engine(12);
+  std::uniform_real_distribution<double> uniform(-1.5, 1.5);
+  const int width = 31;
+  const int height = 23;
+  const DisparityMap map = MapOf(width, height, [&](int, int) { return uniform(engine); });
+  const double a = 2;
+  const double b = 1;  // one sample down for two to the right
+  const ViewDisparity view = RenderDisparity(map, a, b);
+  int compared = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (view.seen[At(x, y, width)] == Seen::kSeen) continue;
+      double farther = kInfinity;
+      float source_x = 0;
+      int found = 0;
+      for (const int sense : {1, -1}) {
+        for (int n = 1;; ++n) {
+          const int xx = x + sense * n;
+          const int yy = static_cast<int>(std::floor(y + sense * n * 0.5 + 0.5));
+          if (xx < 0 || yy < 0 || xx >= width || yy >= height) break;
+          const std::size_t i = At(xx, yy, width);
+          if (view.seen[i] != Seen::kSeen) continue;
+          ++found;
+          if (view.disparity[i] < farther) {
+            farther = view.disparity[i];
+            source_x = static_cast<float>(xx - x) + view.source_x[i];
+          }
+          break;
+        }
+      }
+      if (found < 2) continue;
+      ++compared;
+      EXPECT_EQ(view.disparity[At(x, y, width)], farther) << x << ", " << y;
+      EXPECT_NEAR(view.source_x[At(x, y, width)], source_x, 1e-5) << x << ", " << y;
+    }
+  }
+  EXPECT_GT(compared, 50);
+}
+
+TEST(RenderDisparity, RefusesHolesAndWrongSizes) {
+  DisparityMap map = MapOf(3, 2, [](int, int) { return 1; });
+  EXPECT_THAT(ErrorOf([&] { RenderDisparity(map, kNan, 0); }), HasSubstr("finite"));
+  map.disparity[4] = kNan;
+  EXPECT_THAT(ErrorOf([&] { RenderDisparity(map, 1, 0); }), HasSubstr("holes"));
+  map.disparity.pop_back();
+  EXPECT_THAT(ErrorOf([&] { RenderDisparity(map, 1, 0); }), HasSubstr("5 values"));
+}
+
+// --- Pictures.
+
+// Catmull-Rom is exact for polynomials of the second degree.
+TEST(WarpPicture, IsExactForAQuadraticTexture) {
+  const int width = 30;
+  const int height = 24;
+  const auto texture = [](double x, double y, int c) {
+    return 0.3 + 0.01 * x - 0.02 * y + 0.001 * (c + 1) * x * x + 0.0007 * x * y - 0.0004 * y * y;
+  };
+  const model::LinearPicture picture = PictureOf(width, height, 3, texture);
+  const double per_x = 0.04;
+  const DisparityMap map =
+      MapOf(width, height, [&](int x, int) { return -0.5 + per_x * x; }, {1, 0.8});
+  for (const auto& [a, b] : {std::pair{2.0, 0.0}, {-2.0, 1.0}, {0.0, 3.0}, {0.5, -0.5}}) {
+    const model::LinearPicture warped = WarpPicture(picture, map, RenderDisparity(map, a, b));
+    int compared = 0;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const double source_x = (x + a * -0.5) / (1 - a * per_x);
+        const double source_y = y + b * 0.8 * (-0.5 + per_x * source_x);
+        if (!(source_x >= 1 && source_x <= width - 2 && source_y >= 1 && source_y <= height - 2)) {
+          continue;  // taps beyond the border are repeated
+        }
+        ++compared;
+        for (int c = 0; c < 3; ++c) {
+          EXPECT_NEAR(warped.at(x, y, c), texture(source_x, source_y, c), 1e-5) << x << ", " << y;
+        }
+      }
+    }
+    EXPECT_GT(compared, 350);
+  }
+}
+
+TEST(WarpPicture, FollowsASineTexture) {
+  const int width = 64;
+  const auto texture = [](double x) { return 0.5 + 0.4 * std::sin(2 * std::acos(-1.0) * x / 12); };
+  const model::LinearPicture picture =
+      PictureOf(width, 5, 1, [&](int x, int, int) { return texture(x); });
+  const DisparityMap map = MapOf(width, 5, [](int x, int) { return 0.9 - 0.03 * x; });
+  const model::LinearPicture warped = WarpPicture(picture, map, RenderDisparity(map, 3, 0));
+  for (int x = 4; x < width - 4; ++x) {
+    const double source = (x + 3 * 0.9) / (1 + 3 * 0.03);
+    if (source < 1 || source > width - 2) continue;
+    // Error of the cubic convolution at 12 samples a period, at most: amplitude times
+    // (2 pi/12)^3/(4 sqrt(27)).
+    EXPECT_NEAR(warped.at(x, 2, 0), texture(source), 0.4 * 0.0071) << x;
+  }
+}
+
+TEST(WarpPicture, NeverMixesSurfaces) {
+  const TwoLayers scene;
+  const DisparityMap map = scene.Map();
+  const model::LinearPicture picture = PictureOf(
+      TwoLayers::kWidth, TwoLayers::kHeight, 3,
+      [&](int x, int y, int c) { return scene.IsNear(x, y) ? 0.9 - 0.1 * c : 0.1 + 0.05 * c; });
+  for (const auto& [a, b] : {std::pair{2.0, 0.0}, {-1.0, 3.0}, {1.5, -2.2}}) {
+    const model::LinearPicture warped = WarpPicture(picture, map, RenderDisparity(map, a, b));
+    for (int y = 0; y < TwoLayers::kHeight; ++y) {
+      for (int x = 0; x < TwoLayers::kWidth; ++x) {
+        const bool near = scene.NearCovers(x, y, a, b);
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_NEAR(warped.at(x, y, c), near ? 0.9 - 0.1 * c : 0.1 + 0.05 * c, 1e-6)
+              << x << ", " << y << " of view " << a << ", " << b;
+        }
+      }
+    }
+  }
+}
+
+// The texture of the wall is linear: taps of the wall on both sides give it exactly; where the
+// other tap shows the rectangle, the one that is left stands for it; hidden samples show what their
+// background shows.
+TEST(WarpPicture, UsesTheTapsOfTheSurfaceAlone) {
+  const TwoLayers scene;
+  const DisparityMap map = scene.Map();
+  const auto wall = [](double x) { return 0.1 + 0.01 * x; };
+  const model::LinearPicture picture =
+      PictureOf(TwoLayers::kWidth, TwoLayers::kHeight, 1,
+                [&](int x, int y, int) { return scene.IsNear(x, y) ? 5.0 : wall(x); });
+  const double a = 2;  // wall: source x - 1.2
+  const ViewDisparity view = RenderDisparity(map, a, 0);
+  const model::LinearPicture warped = WarpPicture(picture, map, view);
+  const int y = 15;
+  int cut = 0;
+  int hidden = 0;
+  for (int x = 3; x < TwoLayers::kWidth - 3; ++x) {
+    if (scene.NearCovers(x, y, a, 0)) continue;
+    double source = x + a * scene.far_px;
+    if (view.seen[At(x, y, TwoLayers::kWidth)] == Seen::kHidden) {
+      ++hidden;
+      source = SourceOf(view, x, y).x();
+    }
+    const bool right_is_near = scene.IsNear(std::ceil(source), y);
+    const bool left_is_near = scene.IsNear(std::floor(source), y);
+    cut += right_is_near || left_is_near ? 1 : 0;
+    const double expected = wall(right_is_near  ? std::floor(source)
+                                 : left_is_near ? std::ceil(source)
+                                                : source);
+    EXPECT_NEAR(warped.at(x, y, 0), expected, 1e-6) << x;
+  }
+  EXPECT_GT(cut, 0);
+  EXPECT_GT(hidden, 3);
+}
+
+// .3 px per view step is the limit between one surface and two, by the larger of the steps.
+TEST(WarpPicture, TellsSurfacesByTheLargerStep) {
+  for (const double difference_px : {0.28, 0.32}) {
+    const double step = 0.25;
+    const DisparityMap map = MapOf(
+        12, 6, [&](int x, int) { return x < 6 ? 0.0 : difference_px / step; }, {step, step / 9});
+    const model::LinearPicture picture =
+        PictureOf(12, 6, 1, [](int x, int, int) { return x < 6 ? 0.0 : 1.0; });
+    ViewDisparity view = RenderDisparity(map, 0, 0);
+    view.source_x[At(5, 3, 12)] = 0.5F;  // half way to the other part
+    const float value = WarpPicture(picture, map, view).at(5, 3, 0);
+    if (difference_px < 0.3) {
+      EXPECT_NEAR(value, 0.5, 1e-6);
+    } else {
+      EXPECT_EQ(value, 0);
+    }
+  }
+}
+
+TEST(WarpPicture, RepeatsTheBorder) {
+  const DisparityMap map = MapOf(5, 4, [](int, int) { return 0.0; });
+  const model::LinearPicture picture =
+      PictureOf(5, 4, 1, [](int x, int y, int) { return x + 10 * y; });
+  ViewDisparity view = RenderDisparity(map, 0, 0);
+  EXPECT_EQ(WarpPicture(picture, map, view).values, picture.values);
+  std::fill(view.source_x.begin(), view.source_x.end(), -100.0F);
+  std::fill(view.source_y.begin(), view.source_y.end(), 100.0F);
+  for (const float value : WarpPicture(picture, map, view).values) EXPECT_EQ(value, 30);
+}
+
+TEST(WarpPicture, RefusesSizesThatDiffer) {
+  const DisparityMap map = MapOf(5, 4, [](int, int) { return 0.0; });
+  const ViewDisparity view = RenderDisparity(map, 0, 0);
+  const auto flat = [](int, int, int) { return 0.5; };
+  EXPECT_THAT(ErrorOf([&] { WarpPicture(PictureOf(4, 5, 1, flat), map, view); }),
+              AllOf(HasSubstr("4x5"), HasSubstr("5x4")));
+  const DisparityMap other = MapOf(4, 4, [](int, int) { return 0.0; });
+  EXPECT_THAT(
+      ErrorOf([&] { WarpPicture(PictureOf(5, 4, 1, flat), map, RenderDisparity(other, 0, 0)); }),
+      HasSubstr("4x4"));
+}
+
+}  // namespace
+}  // namespace thicklens::estimator
