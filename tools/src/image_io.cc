@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "png_check.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
 
@@ -34,6 +35,7 @@ void CopyValues(const cv::Mat& picture, std::vector<std::uint16_t>* values) {
 }  // namespace
 
 cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
+  RequireWholePng(bytes, name);
   cv::Mat picture;
   try {
     // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
@@ -73,6 +75,16 @@ model::StoredPicture ToStoredPicture(const cv::Mat& picture) {
     CopyValues<std::uint16_t>(picture, &stored.values);
   }
   return stored;
+}
+
+model::StoredPicture WithoutAlpha(const model::StoredPicture& picture) {
+  if (picture.channels != 4) return picture;
+  model::StoredPicture opaque{picture.width_px, picture.height_px, 3, picture.bits, {}};
+  opaque.values.reserve(picture.values.size() / 4 * 3);
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    if (i % 4 != 3) opaque.values.push_back(picture.values[i]);
+  }
+  return opaque;
 }
 
 std::string EncodePng(const model::StoredPicture& picture) {

@@ -14,6 +14,8 @@ cv::Mat DecodePicture(const std::string& bytes, const std::string& name);
 cv::Mat ReadPictureFile(const std::string& path);
 
 model::StoredPicture ToStoredPicture(const cv::Mat& picture);
+// The first three of four channels; others as they are. Alpha says nothing about light.
+model::StoredPicture WithoutAlpha(const model::StoredPicture& picture);
 
 // A PNG file of 1 or 3 channels, 8 or 16 bit. Compressed lightly: the noise of a photograph hardly
 // gets smaller, but takes much longer, by trying harder.

@@ -1,0 +1,21 @@
+#ifndef THICKLENS_TOOLS_DEPTH_IO_H_
+#define THICKLENS_TOOLS_DEPTH_IO_H_
+
+#include <string>
+
+#include "thicklens/model/scene.h"
+
+namespace thicklens::tools {
+
+// A depth map of one channel: PFM (grey, either byte order, rows bottom to top as the format has
+// them), 8- or 16-bit PNG, 16-bit or float TIFF, float EXR. The map's rows go top to bottom. Throws
+// Error that names the file, what was found and what would be right (three channels, no
+// picture, a broken header, missing values).
+model::RawDepthMap ReadDepthMap(const std::string& path);
+
+// A PFM file (little endian) of the map.
+std::string EncodePfm(const model::RawDepthMap& map);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_DEPTH_IO_H_

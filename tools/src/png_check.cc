@@ -1,0 +1,78 @@
+#include "png_check.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr char kSignature[] = "\x89PNG\r\n\x1A\n";
+constexpr std::size_t kSignatureBytes = 8;
+constexpr std::size_t kLengthBytes = 4, kTypeBytes = 4, kCrcBytes = 4;
+constexpr std::size_t kBitsAt = 24;  // in the first chunk, IHDR
+
+bool IsPng(const std::string& bytes) {
+  return bytes.compare(0, kSignatureBytes, kSignature, kSignatureBytes) == 0;
+}
+
+std::uint32_t BigEndian(const std::string& bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<std::uint8_t>(bytes[at + i]);
+  return value;
+}
+
+// The CRC of ISO 3309, as PNG has it.
+std::array<std::uint32_t, 256> MakeCrcTable() {
+  std::array<std::uint32_t, 256> table{};
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    std::uint32_t crc = byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1) != 0 ? 0xEDB88320U ^ crc >> 1 : crc >> 1;
+    table[byte] = crc;
+  }
+  return table;
+}
+
+std::uint32_t Crc(const std::string& bytes, std::size_t begin, std::size_t end) {
+  static const std::array<std::uint32_t, 256> table = MakeCrcTable();
+  std::uint32_t crc = 0xFFFFFFFFU;
+  for (std::size_t i = begin; i < end; ++i)
+    crc = table[(crc ^ static_cast<std::uint8_t>(bytes[i])) & 0xFFU] ^ crc >> 8;
+  return ~crc;
+}
+
+}  // namespace
+
+void RequireWholePng(const std::string& bytes, const std::string& name) {
+  if (!IsPng(bytes)) return;
+  for (std::size_t at = kSignatureBytes;;) {
+    const std::size_t left = bytes.size() - at;
+    constexpr std::size_t kFrame = kLengthBytes + kTypeBytes + kCrcBytes;
+    const std::size_t length = left >= kFrame ? BigEndian(bytes, at) : 0;
+    if (left < kFrame || left - kFrame < length) {
+      throw Error(
+          fmt::format("{}: broken PNG: it ends after {} bytes, in the middle of the picture", name,
+                      bytes.size()));
+    }
+    const std::size_t type_at = at + kLengthBytes;
+    const std::size_t crc_at = type_at + kTypeBytes + length;
+    if (Crc(bytes, type_at, crc_at) != BigEndian(bytes, crc_at)) {
+      throw Error(
+          fmt::format("{}: broken PNG: the checksum of the chunk at byte {} is wrong", name, at));
+    }
+    if (bytes.compare(type_at, kTypeBytes, "IEND") == 0) return;
+    at = crc_at + kCrcBytes;
+  }
+}
+
+int PngBits(const std::string& bytes) {
+  if (!IsPng(bytes) || bytes.size() <= kBitsAt) return 0;
+  return static_cast<std::uint8_t>(bytes[kBitsAt]);
+}
+
+}  // namespace thicklens::tools

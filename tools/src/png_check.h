@@ -1,0 +1,18 @@
+#ifndef THICKLENS_TOOLS_PNG_CHECK_H_
+#define THICKLENS_TOOLS_PNG_CHECK_H_
+
+#include <string>
+
+namespace thicklens::tools {
+
+// Throws Error that begins with `name` if the bytes are a PNG file that ends early or of which a
+// chunk is damaged; other files pass. To be called before such a file is decoded: libpng tells what
+// it finds on stderr, in its own words and without the file's name.
+void RequireWholePng(const std::string& bytes, const std::string& name);
+
+// Bits a value of a PNG file; 0 for other files.
+int PngBits(const std::string& bytes);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_PNG_CHECK_H_
