@@ -1,14 +1,12 @@
 // thicklens calibrate: from a focus sweep to a camera that knows its image distance and blur.
 #include "thicklens/calib/calibrate.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -82,10 +80,6 @@ struct Outputs {
   std::optional<model::OutputFile> camera;
   std::optional<model::OutputFile> report;
 };
-
-std::string NowIso8601() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-}
 
 const model::SweepTruth* TruthOf(const SweepInput& input) {
   return input.truth ? &*input.truth : nullptr;

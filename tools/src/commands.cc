@@ -1,9 +1,12 @@
 #include "commands.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <optional>
@@ -49,7 +52,8 @@ void AddCommonOptions(CLI::App* command, CommonOptions* options) {
 
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command) {
   if (options.verbose) spdlog::set_level(spdlog::level::debug);
-  cv::setNumThreads(model::ResolveThreads(options.threads));
+  // More than there are cores would not be faster, and the library below would complain.
+  cv::setNumThreads(std::min(model::ResolveThreads(options.threads), model::ResolveThreads(0)));
   std::optional<model::OutputFile> json;
   if (!options.json_path.empty()) json.emplace(options.json_path);
   CommandResult result;
@@ -67,6 +71,10 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
     spdlog::debug("{} written", options.json_path);
   }
   if (!result.refusal.empty()) throw Error(result.refusal);
+}
+
+std::string NowIso8601() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 void PrintResult(const CommonOptions& options, const std::string& text) {

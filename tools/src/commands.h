@@ -32,6 +32,9 @@ struct CommandResult {
 // refusal.
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command);
 
+// The moment, UTC, as in 2026-01-31T12:00:00Z.
+std::string NowIso8601();
+
 // Results go to stdout, unless --quiet.
 void PrintResult(const CommonOptions& options, const std::string& text);
 
@@ -47,7 +50,12 @@ void RequireDistinctFiles(const std::vector<std::string>& outputs,
 using CommandAction = std::function<void()>;
 void AddSimulateCommand(CLI::App* program, CommandAction* action);
 void AddCalibrateCommand(CLI::App* program, CommandAction* action);
+void AddEstimateCommand(CLI::App* program, CommandAction* action);
+void AddRenderCommand(CLI::App* program, CommandAction* action);
+void AddCompareCommand(CLI::App* program, CommandAction* action);
+void AddReportCommand(CLI::App* program, CommandAction* action);
 void AddExplainCommand(CLI::App* program, CommandAction* action);
+void AddDoctorCommand(CLI::App* program, CommandAction* action);
 void AddCameraCommand(CLI::App* program, CommandAction* action);
 
 }  // namespace thicklens::tools

@@ -16,6 +16,7 @@
 #include "image_io.h"
 #include "interrupt.h"
 #include "progress_line.h"
+#include "simulate_scene.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/parallel.h"
@@ -160,6 +161,7 @@ void AddSimulateCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] { RunCommand(options->common, [&] { return SimulateSweep(*options); }); };
   });
+  AddSimulateSceneCommands(simulate, action);
 }
 
 }  // namespace thicklens::tools

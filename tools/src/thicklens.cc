@@ -65,13 +65,20 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
 int Main(int argc, char** argv) {
   SetUpMessages();
   tools::CatchSignals();
-  CLI::App program("Thick-lens camera calibration from focus sweeps", "thicklens");
+  CLI::App program(
+      "Thick-lens camera calibration from focus sweeps, and light fields from one picture",
+      "thicklens");
   program.set_version_flag("--version", tools::BuildInfo(), "Version, and what it was built with");
   program.require_subcommand(1);
   tools::CommandAction action;
   tools::AddSimulateCommand(&program, &action);
   tools::AddCalibrateCommand(&program, &action);
+  tools::AddEstimateCommand(&program, &action);
+  tools::AddRenderCommand(&program, &action);
+  tools::AddCompareCommand(&program, &action);
+  tools::AddReportCommand(&program, &action);
   tools::AddExplainCommand(&program, &action);
+  tools::AddDoctorCommand(&program, &action);
   tools::AddCameraCommand(&program, &action);
   return ParseAndRun(&program, &action, argc, argv);
 }

@@ -1,0 +1,340 @@
+// thicklens estimate as a person meets it, alone and in the protocol with a known light field.
+#include "thicklens/estimator/estimate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "child_process.h"
+#include "depth_io.h"
+#include "image_io.h"
+#include "light_field_io.h"
+#include "support/temporary_folder.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/light_field.h"
+#include "thicklens/model/output_file.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using thicklens::testing::ContentOf;
+using thicklens::testing::TemporaryFolder;
+using Arguments = std::vector<std::string>;
+
+constexpr int kWidth = 36;
+constexpr int kHeight = 28;
+
+model::StoredPicture RandomPicture(int channels, int bits) {
+  model::StoredPicture picture{kWidth, kHeight, channels, bits, {}};
+  std::mt19937 engine(7);
+  std::uniform_int_distribution<int> any(0, bits == 8 ? 255 : 65535);
+  for (int i = 0; i < kWidth * kHeight * channels; ++i) {
+    picture.values.push_back(static_cast<std::uint16_t>(any(engine)));
+  }
+  return picture;
+}
+
+model::RawDepthMap MapOf(const std::function<double(int x, int y)>& value) {
+  model::RawDepthMap map{kWidth, kHeight, {}, false};
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) map.values.push_back(static_cast<float>(value(x, y)));
+  }
+  return map;
+}
+
+// 12.5 mm lens focused at 800 mm; depths of about that are sensible.
+std::string CameraYaml(int width_px, int height_px) {
+  model::Camera camera;
+  camera.name = "bench";
+  camera.lens = {12.5, 12.8, 3, 4.46};
+  camera.sensor = {width_px, height_px, 0.006, {}, model::TransferCurve::Srgb()};
+  camera.sensor.principal_point_px = {(width_px - 1) / 2.0, (height_px - 1) / 2.0};
+  camera.calibration = model::CameraCalibration{};
+  camera.calibration->image_distance_mm =
+      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
+  camera.calibration->evidence.method = "assumed";
+  return model::CameraToYaml(camera);
+}
+
+class EstimateTest : public ::testing::Test {
+ protected:
+  std::string Picture(int channels = 3, int bits = 8) const {
+    return folder_.Put("picture.png", EncodePng(RandomPicture(channels, bits)));
+  }
+  std::string Depth(const std::function<double(int x, int y)>& value) const {
+    return folder_.Put("depth.pfm", EncodePfm(MapOf(value)));
+  }
+  std::string Disparity() const {
+    return Depth([](int x, int) { return 0.05 * x - 0.8; });
+  }
+  std::string Camera() const { return folder_.Put("camera.yaml", CameraYaml(kWidth, kHeight)); }
+  std::string Output() const { return folder_ / "lf"; }
+
+  ProgramResult Run(Arguments arguments) const {
+    arguments.insert(arguments.begin(), "estimate");
+    arguments.insert(arguments.end(), {"-o", Output()});
+    return ChildProgram(arguments, scratch_.path(), 0).Wait();
+  }
+  model::LightField Estimated(Arguments arguments) const {
+    arguments.insert(arguments.end(), {"--format", "tiff"});
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ReadLightField(Output(), {});
+  }
+  // The one line of a refusal; nothing may be left where the light field would have been.
+  std::string Refusal(const Arguments& arguments, int exit_code = 1) const {
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_FALSE(fs::exists(Output()));
+    for (const auto& entry : fs::directory_iterator(folder_.path())) {
+      EXPECT_THAT(entry.path().filename().string(), ::testing::Not(HasSubstr(".part")));
+    }
+    int errors = 0;
+    std::string message;
+    std::istringstream lines(result.err);
+    for (std::string line; std::getline(lines, line);) {
+      EXPECT_THAT(line, StartsWith("thicklens: "));
+      if (line.find("thicklens: error: ") != 0) continue;
+      ++errors;
+      message = line;
+    }
+    EXPECT_EQ(errors, 1) << result.err;
+    return message;
+  }
+  static Arguments AsDisparity(const std::string& picture, const std::string& depth) {
+    return {picture, depth, "--depth-kind", "disparity", "--views", "3x3", "--device", "cpu"};
+  }
+  static Arguments With(Arguments arguments, const Arguments& more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  TemporaryFolder folder_;
+  TemporaryFolder scratch_;
+};
+
+TEST_F(EstimateTest, WritesALightFieldThatSaysHowItWasMade) {
+  const std::string json = folder_ / "estimate.json";
+  const ProgramResult result =
+      Run(With(AsDisparity(Picture(), Disparity()), {"--json", json, "--threads", "2"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("3 x 3 views of 36 x 28 px"), HasSubstr("6 blocks")));
+
+  const nlohmann::json summary = nlohmann::json::parse(ContentOf(json));
+  EXPECT_EQ(summary["status"], "ok");
+  EXPECT_EQ(summary["solver"], "blocks");
+  EXPECT_EQ(summary["block_solver"], estimator::BlockSolverName(estimator::DefaultBlockSolver()));
+  EXPECT_EQ(summary["views"], nlohmann::json({3, 3}));
+  EXPECT_EQ(summary["size"], nlohmann::json({kWidth, kHeight}));
+  EXPECT_EQ(summary["threads"], 2);
+  EXPECT_EQ(summary["device"], "cpu");
+  EXPECT_EQ(summary["block_px"], 16);
+  EXPECT_EQ(summary["effects"], nlohmann::json({"defocus"}));
+  EXPECT_GT(summary["peak_rss_mib"].get<double>(), 10);
+  EXPECT_GT(summary["seconds"]["total"].get<double>(), 0);
+  EXPECT_LT(summary["relative_residual"].get<double>(), 1e-12);
+  EXPECT_GT(summary["rcond_min"].get<double>(), 1e-6);
+
+  const model::LightField found = ReadLightField(Output(), {});
+  EXPECT_EQ(found.u_count, 3);
+  EXPECT_EQ(found.channels, 3);
+  EXPECT_EQ(found.origin.method, "blocks");
+  EXPECT_FALSE(found.camera.has_value());
+  EXPECT_NEAR(found.weights(0, 0), 1.0 / 9, 1e-12);  // uniform where there is no camera
+}
+
+TEST_F(EstimateTest, DepthByItsUnitAndACamera) {
+  const std::string picture = Picture();
+  const auto plane = [](int x, int) { return 700.0 + 4 * x; };
+  const Arguments camera = {"--camera", Camera(), "--views", "3x3", "--device", "cpu"};
+  const model::LightField in_mm =
+      Estimated(With({picture, Depth(plane), "--depth-kind", "z", "--depth-unit", "mm"}, camera));
+  const model::LightField in_m =
+      Estimated(With({picture, Depth([&](int x, int y) { return plane(x, y) / 1000; }),
+                      "--depth-kind", "z", "--depth-unit", "m"},
+                     camera));
+  ASSERT_TRUE(in_mm.camera.has_value());
+  EXPECT_EQ(in_mm.origin.effects, (std::vector<std::string>{"defocus", "falloff"}));
+  EXPECT_GT(in_mm.weights(1, 1), in_mm.weights(0, 0));  // the camera's PSF is Gaussian
+  double largest = 0;
+  for (std::size_t i = 0; i < in_mm.values.size(); ++i) {
+    largest = std::max(largest, static_cast<double>(std::abs(in_mm.values[i] - in_m.values[i])));
+  }
+  EXPECT_LT(largest, 1e-3);  // depths differ by the rounding of float
+}
+
+TEST_F(EstimateTest, APictureOfAPartOfTheSensor) {
+  const std::string camera = folder_.Put("large.yaml", CameraYaml(kWidth + 20, kHeight + 8));
+  const std::string depth = Depth([](int, int) { return 900; });
+  const Arguments rest = {"--depth-kind", "z",    "--depth-unit", "mm",
+                          "--camera",     camera, "--views",      "3x3"};
+  EXPECT_THAT(Refusal(With({Picture(), depth}, rest)),
+              AllOf(HasSubstr("36x28"), HasSubstr("56x36"), HasSubstr("--sensor-origin")));
+  const model::LightField found =
+      Estimated(With(With({Picture(), depth}, rest), {"--sensor-origin", "20,8"}));
+  EXPECT_EQ(found.camera->sensor.width_px, kWidth);
+  EXPECT_DOUBLE_EQ(found.camera->sensor.principal_point_px.x(), (kWidth + 19) / 2.0 - 20);
+  fs::remove_all(Output());
+  EXPECT_THAT(Refusal(With(With({Picture(), depth}, rest), {"--sensor-origin", "21,8"})),
+              HasSubstr("21"));
+}
+
+TEST_F(EstimateTest, GreyAndSixteenBits) {
+  const model::LightField grey = Estimated(AsDisparity(Picture(1, 8), Disparity()));
+  EXPECT_EQ(grey.channels, 1);
+  const model::LightField deep = Estimated(AsDisparity(Picture(3, 16), Disparity()));
+  EXPECT_EQ(deep.channels, 3);
+}
+
+TEST_F(EstimateTest, OneViewAcrossIsToldAndOneViewInAllIsRefused) {
+  const ProgramResult result = Run(
+      {Picture(), Disparity(), "--depth-kind", "disparity", "--views", "1x3", "--device", "cpu"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("one view along u"));
+  fs::remove_all(Output());
+  EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "1x1"}),
+              HasSubstr("1x1 is no light field"));
+}
+
+TEST_F(EstimateTest, BlocksLargerThanThePictureAndTheSourcesStencil) {
+  const std::string json = folder_ / "estimate.json";
+  const ProgramResult result =
+      Run(With(AsDisparity(Picture(), Disparity()), {"--block-px", "500", "--stencil", "source",
+                                                     "--block-solver", "eigen", "--json", json}));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json summary = nlohmann::json::parse(ContentOf(json));
+  EXPECT_EQ(summary["block_px"], kWidth);
+  EXPECT_EQ(summary["blocks"], 1);
+  EXPECT_EQ(summary["stencil"], "source");
+}
+
+TEST_F(EstimateTest, DepthThatCannotBe) {
+  const std::string picture = Picture();
+  const auto as_z = [&](const std::string& depth, const std::string& unit) {
+    return Arguments{picture, depth,      "--depth-kind", "z",       "--depth-unit",
+                     unit,    "--camera", Camera(),       "--views", "3x3"};
+  };
+  EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 0; }), "mm")),
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("all are holes")));
+  EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 800; }), "m")),
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("is the unit right")));
+  EXPECT_THAT(Refusal(as_z(Depth([](int, int) { return 0.8; }), "mm")),
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("is the unit right")));
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(Refusal(AsDisparity(picture, Depth([](int, int) { return kNan; }))),
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("holes")));
+  const model::RawDepthMap small{8, 8, std::vector<float>(64, 1.0F), false};
+  EXPECT_THAT(Refusal(AsDisparity(picture, folder_.Put("small.pfm", EncodePfm(small)))),
+              AllOf(HasSubstr("small.pfm"), HasSubstr("8x8"), HasSubstr("36x28")));
+  EXPECT_THAT(Refusal({picture, Disparity(), "--depth-kind", "z", "--depth-unit", "mm"}, 2),
+              HasSubstr("camera"));
+  EXPECT_THAT(Refusal({picture, Disparity()}, 2), HasSubstr("--depth-kind"));
+}
+
+TEST_F(EstimateTest, HolesAreFilledAndCounted) {
+  const std::string json = folder_ / "estimate.json";
+  const std::string depth = Depth([](int x, int y) {
+    return x > 10 && x < 14 && y > 3 && y < 9 ? std::numeric_limits<double>::quiet_NaN() : 0.4;
+  });
+  const ProgramResult result = Run(With(AsDisparity(Picture(), depth), {"--json", json}));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("15 px, filled"));
+  EXPECT_EQ(nlohmann::json::parse(ContentOf(json))["holes_filled"], 15);
+}
+
+TEST_F(EstimateTest, SettingsThatCannotBe) {
+  const Arguments good = AsDisparity(Picture(), Disparity());
+  EXPECT_THAT(Refusal(With(good, {"--gamma", "0"})),
+              AllOf(HasSubstr("gamma is 0"), HasSubstr("geometry")));
+  EXPECT_THAT(Refusal(With(good, {"--gamma", "-1"})), HasSubstr("gamma is -1"));
+  const std::string json = folder_ / "refused.json";
+  EXPECT_THAT(Refusal(With(good, {"--ridge", "0", "--json", json})),
+              AllOf(HasSubstr("block of "), HasSubstr("rcond is "), HasSubstr("ridge")));
+  EXPECT_EQ(nlohmann::json::parse(ContentOf(json))["status"], "refused");
+  EXPECT_THAT(Refusal(With(good, {"--memory-limit", "5"})),
+              AllOf(HasSubstr("memory limit 5 MiB"), HasSubstr("at least")));
+  EXPECT_THAT(Refusal(With(good, {"--crop", "30,20,10,10"})),
+              AllOf(HasSubstr("30"), HasSubstr("36")));
+  EXPECT_THAT(Refusal(With(good, {"--block-solver", "superlu"}), 2), HasSubstr("superlu"));
+  EXPECT_THAT(Refusal(With(good, {"--sensor-origin", "0,0"}), 2), HasSubstr("--camera"));
+  if (estimator::IsBuiltIn(estimator::BlockSolver::kCholmod)) {
+    EXPECT_THAT(Refusal(With(good, {"--stencil", "source", "--block-solver", "cholmod"})),
+                HasSubstr("not symmetric"));
+  } else {
+    EXPECT_THAT(Refusal(With(good, {"--block-solver", "cholmod"})),
+                HasSubstr("THICKLENS_WITH_GPL=OFF"));
+  }
+}
+
+TEST_F(EstimateTest, AFolderWithOtherThingsIsLeftAlone) {
+  folder_.Put("lf/thesis.txt", "years of work");
+  const ProgramResult result = Run(AsDisparity(Picture(), Disparity()));
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(ContentOf(folder_ / "lf/thesis.txt"), "years of work");
+}
+
+TEST_F(EstimateTest, AFailingRunLeavesTheOlderLightField) {
+  Estimated(AsDisparity(Picture(), Disparity()));
+  const std::string before = ContentOf(Output() + "/lightfield.yaml");
+  EXPECT_EQ(Run(With(AsDisparity(Picture(), Disparity()), {"--ridge", "0"})).exit_code, 1);
+  EXPECT_EQ(ContentOf(Output() + "/lightfield.yaml"), before);
+}
+
+// The road of a light field with true views, at 3 x 3 on a part of a real one.
+class ProtocolTest : public EstimateTest {
+ protected:
+  void SetUp() override {
+    data_ = std::string(THICKLENS_SHARED_DATA_DIR) + "/lf_antinous";
+    if (!fs::exists(data_)) GTEST_SKIP() << data_ << " is missing";
+  }
+  nlohmann::json Compare(const Arguments& arguments) const {
+    const std::string json = folder_ / "result.json";
+    Arguments all = With({"compare"}, arguments);
+    all.insert(all.end(), {"--json", json});
+    const ProgramResult result = ChildProgram(all, scratch_.path(), 0).Wait();
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(ContentOf(json));
+  }
+  std::string data_;
+};
+
+TEST_F(ProtocolTest, RenderEstimateCompareAsWritten) {
+  const std::string photo = folder_ / "photo.png";
+  const std::string depth = data_ + "/gt_disp_lowres.pfm";
+  const Arguments crop = {"--crop", "192,192,128,128"};
+  const ProgramResult render =
+      ChildProgram(
+          {"render", data_, "--grid", "9", "--views", "3x3", "--as-captured", "--aperture-shape",
+           "uniform", "--noise", "1", "--bits", "8", "--seed", "1", "-o", photo},
+          scratch_.path(), 0)
+          .Wait();
+  ASSERT_EQ(render.exit_code, 0) << render.err;
+  const ProgramResult estimate = Run(With({photo, depth, "--depth-kind", "disparity", "--views",
+                                           "3x3", "--aperture-shape", "uniform", "--device", "cpu"},
+                                          crop));
+  ASSERT_EQ(estimate.exit_code, 0) << estimate.err;
+  const nlohmann::json result = Compare(
+      With({data_, Output(), "--grid", "9", "--border", "20", "--dibr", photo, depth}, crop));
+  // Blocks amplify the noise and lose what leaves them: below the photograph warped by its depth.
+  EXPECT_GT(result["mean"]["psnr_db"].get<double>(), 37);
+  EXPECT_GT(result["dibr"]["mean"]["psnr_db"].get<double>(), 42);
+  EXPECT_EQ(result["per_view"].size(), 9u);
+}
+
+}  // namespace
+}  // namespace thicklens::tools

@@ -1,0 +1,220 @@
+// thicklens simulate picture and simulate light-field as a person meets them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "child_process.h"
+#include "depth_io.h"
+#include "image_io.h"
+#include "light_field_io.h"
+#include "support/temporary_folder.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/scene_simulator.h"
+#include "thicklens/model/yaml_reader.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using thicklens::testing::ContentOf;
+using thicklens::testing::TemporaryFolder;
+using Arguments = std::vector<std::string>;
+
+// A card in front of a slanted background, 40 x 30 px.
+std::string SceneConfig(const std::string& more) {
+  return std::string("schema: thicklens/simulate-scene/1\ncamera: ") + THICKLENS_SOURCE_DIR +
+         "/configs/cameras/case-ii.yaml\n"
+         "truth: {focus_depth_mm: 300, blur_ratio: 0.45, blur_floor_px: 0.5}\n"
+         "size_px: [40, 30]\n"
+         "layers:\n"
+         "- {name: wall, plane: {depth_mm: 303, slope: [1, 0]}, texture: {kind: dead-leaves}}\n"
+         "- plane: {depth_mm: 297}\n"
+         "  outline: {centre_px: [20, 15], size_px: [15, 11]}\n"
+         "  texture: {kind: noise}\n" +
+         more;
+}
+
+class SimulateSceneTest : public ::testing::Test {
+ protected:
+  ProgramResult Run(Arguments arguments) const {
+    arguments.insert(arguments.begin(), "simulate");
+    return ChildProgram(arguments, scratch_.path(), 0).Wait();
+  }
+  void Succeed(const Arguments& arguments) const {
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+  // Runs what must fail with one line and exit code 1, and gives the line.
+  std::string Failure(const Arguments& arguments) const {
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_THAT(result.err, ::testing::StartsWith("thicklens: error: "));
+    return result.err;
+  }
+  nlohmann::json JsonOf(const std::string& name) const {
+    return nlohmann::json::parse(ContentOf(folder_ / name));
+  }
+
+  TemporaryFolder folder_, scratch_;
+};
+
+TEST_F(SimulateSceneTest, PictureFolderHoldsWhatTheSimulatorMakes) {
+  const std::string config = folder_.Put("scene.yaml", SceneConfig("noise_sigma_grey_levels: 1\n"));
+  const std::string out = folder_ / "out";
+  const ProgramResult result = Run({"picture", config, "-o", out, "--json", folder_ / "a.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("40 x 30 px"), HasSubstr(out)));
+
+  const model::SceneSimulationOptions options = model::ReadSceneSimulation(config);
+  const model::SceneSimulator simulator(options, {});
+  const model::StoredPicture picture = ToStoredPicture(ReadPictureFile(out + "/picture.png"));
+  EXPECT_EQ(picture.bits, 8);
+  EXPECT_EQ(picture.channels, 3);
+  EXPECT_EQ(picture.values, simulator.Store(simulator.RenderNoiseless({})).values);
+  const model::RawDepthMap depth = ReadDepthMap(out + "/depth.pfm");
+  EXPECT_EQ(depth.width_px, 40);
+  EXPECT_EQ(depth.values, simulator.RenderDepth().values);
+  EXPECT_EQ(depth.values[15 * 40 + 20], 297);
+  const model::Camera camera = model::ReadCamera(out + "/camera.yaml");
+  EXPECT_EQ(camera.sensor.width_px, 40);
+  EXPECT_EQ(camera.image_distance_mm(), options.camera.image_distance_mm());
+  EXPECT_EQ(camera.blur_ratio(), 0.45);
+  EXPECT_EQ(camera.calibration->blur_floor_px->value, 0.5);
+  const model::YamlNode truth = model::YamlNode::LoadFile(out + "/truth.yaml");
+  EXPECT_EQ(truth.At("nearest_depth_mm").Number(), 297);
+
+  const nlohmann::json json = JsonOf("a.json");
+  EXPECT_EQ(json["status"], "ok");
+  EXPECT_EQ(json["output"], out);
+  EXPECT_EQ(json["width_px"], 40);
+  EXPECT_EQ(json["height_px"], 30);
+  EXPECT_EQ(json["bits"], 8);
+  EXPECT_EQ(json["layers"], 2);
+  EXPECT_EQ(json["rays_per_pixel"], 600);
+  EXPECT_EQ(json["nearest_depth_mm"], 297);
+  EXPECT_NEAR(json["truth"]["focus_depth_mm"], 300, 1e-9);
+  EXPECT_EQ(json["truth"]["blur_ratio"], 0.45);
+}
+
+TEST_F(SimulateSceneTest, LightFieldFolderHoldsTheTrueViews) {
+  const std::string config = folder_.Put("scene.yaml", SceneConfig("views: [3, 5]\n"));
+  Succeed({"light-field", config, "-o", folder_ / "a", "--format", "tiff", "--quiet"});
+  const model::SceneSimulationOptions options = model::ReadSceneSimulation(config);
+  const model::SceneSimulator simulator(options, {});
+  const model::LightField expected = simulator.RenderLightField(3, 5, {});
+  const model::LightField tiff = ReadLightField(folder_ / "a", {});
+  EXPECT_EQ(tiff.values, expected.values);
+  EXPECT_EQ(tiff.origin.method, "simulated");
+  ASSERT_TRUE(tiff.grid && tiff.camera);
+  EXPECT_EQ(tiff.grid->u_step_mm, expected.grid->u_step_mm);
+
+  Succeed({"light-field", config, "-o", folder_ / "b", "--views", "1x3", "--json",
+           folder_ / "b.json", "--quiet"});
+  const model::LightField png = ReadLightField(folder_ / "b", {});
+  EXPECT_EQ(png.u_count, 1);
+  EXPECT_EQ(png.v_count, 3);
+  const model::LightField three = simulator.RenderLightField(1, 3, {});
+  ASSERT_EQ(png.values.size(), three.values.size());
+  for (std::size_t i = 0; i < three.values.size(); ++i)
+    EXPECT_NEAR(png.values[i], three.values[i], 1e-5f);
+  const nlohmann::json json = JsonOf("b.json");
+  EXPECT_EQ(json["status"], "ok");
+  EXPECT_THAT(json["views"], ElementsAre(1, 3));
+  EXPECT_EQ(json["clipped_values"], 0);
+}
+
+TEST_F(SimulateSceneTest, SeedDecidesAndThreadsDoNot) {
+  const std::string config = folder_.Put(
+      "scene.yaml", SceneConfig("noise_sigma_grey_levels: 1\nrays_per_pixel: 50\nseed: 2\n"));
+  const auto picture = [&](const Arguments& more) {
+    Arguments arguments = {"picture", config, "-o", folder_ / "out", "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    Succeed(arguments);  // replaces its own older folder
+    return ContentOf(folder_ / "out/picture.png");
+  };
+  const std::string first = picture({"--threads", "1"});
+  EXPECT_EQ(picture({"--threads", "3"}), first);
+  EXPECT_EQ(picture({"--seed", "2"}), first);
+  EXPECT_NE(picture({"--seed", "3"}), first);
+}
+
+TEST_F(SimulateSceneTest, TextureMayBeAPictureFile) {
+  model::StoredPicture texture{32, 32, 3, 8, {}};
+  for (int i = 0; i < 32 * 32; ++i) {
+    for (const int level : {188, 0, 255}) {
+      texture.values.push_back(static_cast<std::uint16_t>(level));
+    }
+  }
+  folder_.Put("purple.png", EncodePng(texture));
+  const std::string config =
+      folder_.Put("scene.yaml", SceneConfig("falloff: false\n")
+                                    .replace(SceneConfig("").find("{kind: dead-leaves}"), 19,
+                                             "{kind: picture, picture: purple.png}"));
+  Succeed({"picture", config, "-o", folder_ / "out", "--quiet"});
+  const model::StoredPicture picture =
+      ToStoredPicture(ReadPictureFile(folder_ / "out/picture.png"));
+  // The file is sRGB, the camera linear: 188 of 255 is half the light.
+  EXPECT_NEAR(picture.values[0], 128, 1);
+  EXPECT_EQ(picture.values[1], 0);
+  EXPECT_EQ(picture.values[2], 255);
+
+  fs::remove(folder_ / "purple.png");
+  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "other"}), HasSubstr("purple.png"));
+  EXPECT_FALSE(fs::exists(folder_ / "other"));
+}
+
+TEST_F(SimulateSceneTest, RefusesInOneLineAndWritesNothing) {
+  const std::string config = folder_.Put("scene.yaml", SceneConfig("viewss: [3, 3]\n"));
+  for (const char* command : {"picture", "light-field"}) {
+    EXPECT_THAT(Failure({command, config, "-o", folder_ / "out", "--json", folder_ / "a.json"}),
+                HasSubstr("unknown key 'viewss'; did you mean 'views'"));
+    EXPECT_EQ(JsonOf("a.json")["status"], "refused");
+    EXPECT_THAT(Failure({command, folder_ / "none.yaml", "-o", folder_ / "out"}),
+                HasSubstr("none.yaml"));
+  }
+  // Somebody's own folder, and the other command's.
+  const std::string good = folder_.Put("good.yaml", SceneConfig("rays_per_pixel: 16\n"));
+  folder_.Put("mine/letter.txt", "dear");
+  Succeed({"light-field", good, "-o", folder_ / "views", "--views", "1x1", "--quiet"});
+  for (const char* name : {"mine", "views"}) {
+    EXPECT_THAT(Failure({"picture", good, "-o", folder_ / name}), HasSubstr(name));
+  }
+  EXPECT_THAT(folder_.Entries(), ElementsAre("a.json", "good.yaml", "mine", "scene.yaml", "views"));
+
+  EXPECT_EQ(Run({"light-field", good, "-o", folder_ / "out", "--views", "3"}).exit_code, 2);
+  EXPECT_EQ(Run({"light-field", good, "-o", folder_ / "out", "--format", "jpg"}).exit_code, 2);
+  EXPECT_EQ(Run({"picture", good}).exit_code, 2);
+  EXPECT_THAT(Failure({"light-field", good, "-o", folder_ / "out", "--views", "3x100"}),
+              HasSubstr("views is 3x100"));
+}
+
+TEST_F(SimulateSceneTest, AnInterruptLeavesNothingHalfWritten) {
+  std::string text = SceneConfig("rays_per_pixel: 2000\n");
+  text.replace(text.find("[40, 30]"), 8, "[512, 512]");
+  const std::string config = folder_.Put("scene.yaml", text);
+  ChildProgram child({"simulate", "picture", config, "-o", folder_ / "out"}, scratch_.path(), 0);
+  while (child.Running() && !fs::exists(folder_ / ".out.part"))
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  child.Interrupt();
+  const ProgramResult result = child.Wait();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("interrupted"));
+  EXPECT_THAT(folder_.Entries(), ElementsAre("scene.yaml"));
+}
+
+}  // namespace
+}  // namespace thicklens::tools

@@ -1,0 +1,205 @@
+// thicklens simulate picture, thicklens simulate light-field: a made-up photograph with its depth
+// map, and the true light field of the same scene.
+#include "simulate_scene.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "build_info.h"
+#include "depth_io.h"
+#include "image_io.h"
+#include "interrupt.h"
+#include "light_field_io.h"
+#include "light_field_options.h"
+#include "progress_line.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/output_file.h"
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::tools {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Sign of a folder that this program wrote and may replace.
+constexpr char kPictureMarker[] = "truth.yaml";
+
+struct SceneOptions {
+  CommonOptions common;
+  std::string config_path;
+  std::string output_folder;
+  std::optional<std::int64_t> seed;
+  ViewsOption views;           // light-field
+  std::string format = "png";  // light-field
+};
+
+model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
+  model::SceneSimulationOptions scene = model::ReadSceneSimulation(options.config_path);
+  if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
+  const auto [u_count, v_count] = ViewCounts(options.views);
+  if (u_count > 0) {
+    scene.u_count = u_count;
+    scene.v_count = v_count;
+  }
+  return scene;
+}
+
+// Picture files of unknown origin are taken as sRGB, as a screen would show them.
+std::vector<model::LinearPicture> ReadTextures(const model::SceneSimulationOptions& scene) {
+  std::vector<model::LinearPicture> pictures(scene.layers.size());
+  for (std::size_t i = 0; i < scene.layers.size(); ++i) {
+    const model::TextureOptions& texture = scene.layers[i].texture;
+    if (texture.kind != model::TextureKind::kPicture) continue;
+    pictures[i] = model::ToLinear(ToStoredPicture(ReadPictureFile(texture.picture_path)),
+                                  model::TransferCurve::Srgb());
+  }
+  return pictures;
+}
+
+// Progress on the terminal, and an end when the person asks for one.
+model::SceneRun RunWith(const CommonOptions& common, ProgressLine* progress) {
+  return {common.threads, [progress](int done, int total) {
+            ThrowIfInterrupted();
+            progress->Show(done, total);
+          }};
+}
+
+nlohmann::json Summary(const SceneOptions& options, const model::SceneSimulationOptions& scene,
+                       const model::SceneTruth& truth, Clock::time_point start) {
+  const std::chrono::duration<double> seconds = Clock::now() - start;
+  return {{"status", "ok"},
+          {"reason", ""},
+          {"output", options.output_folder},
+          {"width_px", scene.camera.sensor.width_px},
+          {"height_px", scene.camera.sensor.height_px},
+          {"layers", scene.layers.size()},
+          {"seed", scene.seed},
+          {"nearest_depth_mm", truth.nearest_depth_mm},
+          {"farthest_depth_mm", truth.farthest_depth_mm},
+          {"largest_blur_sigma_px", truth.largest_blur_sigma_px},
+          {"truth",
+           {{"image_distance_mm", truth.image_distance_mm},
+            {"focus_depth_mm", truth.focus_depth_mm},
+            {"blur_ratio", truth.blur_ratio},
+            {"blur_floor_px", truth.blur_floor_px}}},
+          {"seconds", seconds.count()}};
+}
+
+CommandResult SimulatePicture(const SceneOptions& options) {
+  const auto start = Clock::now();
+  const model::SceneSimulationOptions scene = ReadConfig(options);
+  model::OutputFolder folder(options.output_folder, kPictureMarker,
+                             {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker});
+
+  const model::SceneSimulator simulator(scene, ReadTextures(scene));
+  const model::RawDepthMap depth = simulator.RenderDepth();
+  const model::SceneTruth truth = simulator.Truth(depth);
+  {
+    ProgressLine progress("rendering", options.common.quiet);
+    const model::LinearPicture picture =
+        simulator.RenderNoiseless(RunWith(options.common, &progress));
+    folder.Write("picture.png", EncodePng(simulator.Store(picture)));
+  }
+  folder.Write("depth.pfm", EncodePfm(depth));
+  folder.Write("camera.yaml", model::CameraToYaml(scene.camera));
+  folder.Write(kPictureMarker, model::SceneTruthToYaml(truth));
+  ThrowIfInterrupted();
+  folder.Commit();
+
+  CommandResult result;
+  result.summary = Summary(options, scene, truth, start);
+  result.summary["bits"] = scene.bits;
+  result.summary["rays_per_pixel"] = scene.rays_per_pixel;
+  PrintResult(
+      options.common,
+      fmt::format("a picture of {} x {} px, depths from {:.6g} to {:.6g} mm, blur sigma up "
+                  "to {:.3g} px, in {:.1f} s: {}\n",
+                  scene.camera.sensor.width_px, scene.camera.sensor.height_px,
+                  truth.nearest_depth_mm, truth.farthest_depth_mm, truth.largest_blur_sigma_px,
+                  result.summary["seconds"].get<double>(), options.output_folder));
+  return result;
+}
+
+CommandResult SimulateLightField(const SceneOptions& options) {
+  const auto start = Clock::now();
+  const model::SceneSimulationOptions scene = ReadConfig(options);
+  model::OutputFolder folder(options.output_folder, kLightFieldMarker, LightFieldEntries());
+
+  const model::SceneSimulator simulator(scene, ReadTextures(scene));
+  std::size_t clipped = 0;
+  {
+    ProgressLine progress("rendering", options.common.quiet);
+    model::LightField light_field = simulator.RenderLightField(scene.u_count, scene.v_count,
+                                                               RunWith(options.common, &progress));
+    light_field.origin.version = Version();
+    light_field.origin.date = NowIso8601();
+    const ViewFormat format = options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng;
+    clipped = WriteLightField(light_field, format, &folder);
+  }
+  ThrowIfInterrupted();
+  folder.Commit();
+
+  CommandResult result;
+  result.summary = Summary(options, scene, simulator.Truth(simulator.RenderDepth()), start);
+  result.summary["views"] = {scene.u_count, scene.v_count};
+  result.summary["clipped_values"] = clipped;
+  PrintResult(
+      options.common,
+      fmt::format("{} x {} views of {} x {} px in {:.1f} s: {}\n", scene.u_count, scene.v_count,
+                  scene.camera.sensor.width_px, scene.camera.sensor.height_px,
+                  result.summary["seconds"].get<double>(), options.output_folder));
+  return result;
+}
+
+CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std::string& help,
+                          SceneOptions* options) {
+  CLI::App* command = simulate->add_subcommand(name, help);
+  command->add_option("config", options->config_path, "The scene")->required()->type_name("CONFIG");
+  command->add_option("-o,--output", options->output_folder, "Folder to write")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--seed", options->seed, "Replaces the config's seed")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
+  AddCommonOptions(command, &options->common);
+  return command;
+}
+
+}  // namespace
+
+void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
+  const auto picture = std::make_shared<SceneOptions>();
+  AddSceneCommand(simulate, "picture",
+                  "A photograph of a scene: picture.png, depth.pfm (z in mm), camera.yaml (the "
+                  "true calibration) and truth.yaml",
+                  picture.get())
+      ->callback([picture, action] {
+        *action = [picture] {
+          RunCommand(picture->common, [&] { return SimulatePicture(*picture); });
+        };
+      });
+
+  const auto views = std::make_shared<SceneOptions>();
+  CLI::App* command = AddSceneCommand(simulate, "light-field",
+                                      "The true light field of a scene, as its views", views.get());
+  AddViewsOption(command, &views->views, "Replaces the config's views");
+  command
+      ->add_option("--format", views->format,
+                   "Of the views: png (16 bit, stored values) or tiff (float, linear light)")
+      ->check(CLI::IsMember({"png", "tiff"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command->callback([views, action] {
+    *action = [views] { RunCommand(views->common, [&] { return SimulateLightField(*views); }); };
+  });
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,15 @@
+#ifndef THICKLENS_TOOLS_SIMULATE_SCENE_H_
+#define THICKLENS_TOOLS_SIMULATE_SCENE_H_
+
+#include <CLI/CLI.hpp>
+
+#include "commands.h"
+
+namespace thicklens::tools {
+
+// `picture` and `light-field`, below `simulate`.
+void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_SIMULATE_SCENE_H_
