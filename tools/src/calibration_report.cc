@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calibration_summary.h"
+#include "page_style.h"
 #include "svg_plot.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -18,58 +19,6 @@ namespace {
 using calib::Calibration;
 using calib::FocusSweep;
 using calib::FrameMeasurement;
-
-constexpr char kStyle[] = R"(
-:root { color-scheme: light dark; --paper: #ffffff; --ink: #1c2128; --soft: #59616c;
-  --rule: #d9dde2; --panel: #f5f6f8; --ok: #008a64; --partial: #b87400; --refused: #b3261e; }
-@media (prefers-color-scheme: dark) {
-  :root { --paper: #14171c; --ink: #e4e7eb; --soft: #a0a8b4; --rule: #333a44;
-    --panel: #1c2027; --ok: #35c79c; --partial: #f0b23a; --refused: #ff7b72; } }
-@media print {
-  :root { --paper: #ffffff; --ink: #1c2128; --soft: #59616c; --rule: #d9dde2; --panel: #f5f6f8;
-    --ok: #008a64; --partial: #b87400; --refused: #b3261e; } }
-* { box-sizing: border-box; }
-body { margin: 0; background: var(--paper); color: var(--ink);
-  font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
-main { max-width: 940px; margin: 0 auto; padding: 36px 24px 64px; }
-h1 { font-size: 25px; line-height: 1.25; margin: 0 0 2px; font-weight: 600; }
-h2 { font-size: 18px; margin: 40px 0 10px; font-weight: 600; }
-.under-title { color: var(--soft); margin: 0 0 20px; overflow-wrap: anywhere; }
-.verdict { border-left: 5px solid var(--verdict); background: var(--panel);
-  padding: 14px 18px; border-radius: 0 6px 6px 0; }
-.verdict p { margin: 6px 0 0; }
-.verdict .outcome { margin: 0; font-size: 18px; font-weight: 600; color: var(--verdict); }
-.ok { --verdict: var(--ok); } .partial { --verdict: var(--partial); }
-.refused { --verdict: var(--refused); }
-.warnings { margin: 14px 0 0; padding-left: 20px; }
-.warnings li::marker { color: var(--partial); }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; }
-th, td { padding: 5px 16px 5px 0; text-align: left; vertical-align: top;
-  border-bottom: 1px solid var(--rule); }
-th { font-weight: 500; } tbody th, .name { white-space: nowrap; } thead th { color: var(--soft); font-weight: 500; vertical-align: bottom; }
-.number { text-align: right; white-space: nowrap; }
-.soft { color: var(--soft); }
-.chosen { font-weight: 600; }
-h3 { font-size: 15px; margin: 24px 0 6px; font-weight: 600; }
-figure { margin: 22px 0 30px; break-inside: avoid; }
-figcaption { color: var(--soft); font-size: 14px; margin-top: 6px; max-width: 80ch; }
-figcaption b { color: var(--ink); font-weight: 600; }
-details { margin-top: 12px; } summary { cursor: pointer; color: var(--soft); }
-@media print { body { font-size: 11pt; } main { padding: 0; max-width: none; }
-  h2 { break-after: avoid; } tr { break-inside: avoid; } }
-)";
-
-// Hyphens of negative numbers as minus signs; those of exponents stay.
-std::string TrueMinus(const std::string& text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i)
-    if (text[i] == '-' && (i == 0 || text[i - 1] != 'e'))
-      out += "−";
-    else
-      out += text[i];
-  return out;
-}
 
 std::vector<double> Column(const std::vector<std::pair<double, double>>& points, bool first) {
   std::vector<double> column;
@@ -468,13 +417,6 @@ void AddScaleFigure(const FocusSweep& sweep, const Calibration& calibration, Fig
 
 constexpr char kNone[] = "–";
 
-// A table cell; one of class "number" holds a number.
-std::string Cell(const std::string& content, const std::string& css_class = "number") {
-  const bool is_number = css_class.rfind("number", 0) == 0;
-  return fmt::format("<td class=\"{}\">{}</td>", css_class,
-                     EscapeXml(is_number ? TrueMinus(content) : content));
-}
-
 // With no-break spaces. Without a sigma it was not fitted: given, or taken for granted.
 std::string WithSigma(const calib::Result& result) {
   if (!std::isfinite(result.value)) return "not determined";
@@ -497,13 +439,13 @@ std::string ResultsTable(const std::vector<ResultRow>& rows) {
   for (const ResultRow& row : rows) {
     const double sigma = row.fit ? row.fit->sigma : 0;
     html += RowName(row);
-    html += Cell(row.fit ? WithSigma(*row.fit) : kNone, "number chosen");
-    html += Cell(row.fit && row.fit->systematic
-                     ? fmt::format("{} … {}", RoundedTo(row.fit->systematic->x(), sigma),
-                                   RoundedTo(row.fit->systematic->y(), sigma))
-                     : kNone);
-    html += Cell(row.source ? RoundedTo(*row.source, sigma) : kNone);
-    html += Cell(row.peak ? WithSigma(*row.peak) : kNone) + "</tr>\n";
+    html += TableCell(row.fit ? WithSigma(*row.fit) : kNone, "number chosen");
+    html += TableCell(row.fit && row.fit->systematic
+                          ? fmt::format("{} … {}", RoundedTo(row.fit->systematic->x(), sigma),
+                                        RoundedTo(row.fit->systematic->y(), sigma))
+                          : kNone);
+    html += TableCell(row.source ? RoundedTo(*row.source, sigma) : kNone);
+    html += TableCell(row.peak ? WithSigma(*row.peak) : kNone) + "</tr>\n";
   }
   html += "</tbody></table></div>\n";
   html +=
@@ -524,12 +466,14 @@ std::string ErrorsTable(const std::vector<ResultRow>& rows) {
   for (const ResultRow& row : rows) {
     if (!row.truth) continue;
     const double sigma = row.fit ? row.fit->sigma : 0;
-    html += RowName(row) + Cell(RoundedTo(*row.truth, sigma));
-    html += Cell(row.fit ? SignedRoundedTo(row.fit->value - *row.truth, sigma) : kNone,
-                 "number chosen");
-    html += Cell(sigma > 0 ? fmt::format("{:+.1f}", (row.fit->value - *row.truth) / sigma) : kNone);
-    html += Cell(row.source ? SignedRoundedTo(*row.source - *row.truth, sigma) : kNone);
-    html += Cell(row.peak ? SignedRoundedTo(row.peak->value - *row.truth, row.peak->sigma) : kNone);
+    html += RowName(row) + TableCell(RoundedTo(*row.truth, sigma));
+    html += TableCell(row.fit ? SignedRoundedTo(row.fit->value - *row.truth, sigma) : kNone,
+                      "number chosen");
+    html += TableCell(sigma > 0 ? fmt::format("{:+.1f}", (row.fit->value - *row.truth) / sigma)
+                                : kNone);
+    html += TableCell(row.source ? SignedRoundedTo(*row.source - *row.truth, sigma) : kNone);
+    html += TableCell(row.peak ? SignedRoundedTo(row.peak->value - *row.truth, row.peak->sigma)
+                               : kNone);
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>\n";
@@ -550,9 +494,9 @@ std::string CorrelationTable(const Calibration& calibration) {
                         EscapeXml(calibration.covariance_order[static_cast<std::size_t>(i)]));
     for (Eigen::Index j = 0; j < count; ++j) {
       const double scale = std::sqrt(covariance(i, i) * covariance(j, j));
-      html += Cell(scale > 0 ? fmt::format("{:+.3f}", covariance(i, j) / scale) : kNone);
+      html += TableCell(scale > 0 ? fmt::format("{:+.3f}", covariance(i, j) / scale) : kNone);
     }
-    html += Cell(fmt::format("{:.3g}", std::sqrt(covariance(i, i)))) + "</tr>\n";
+    html += TableCell(fmt::format("{:.3g}", std::sqrt(covariance(i, i)))) + "</tr>\n";
   }
   html += "</tbody></table></div>\n";
   return html;
@@ -573,13 +517,14 @@ std::string RejectedFrames(const Calibration& calibration) {
     const int count = run.last - run.first + 1;
     rejected += count;
     const std::string first = FrameName(frame_at(run.first).image);
-    html += "<tr>" +
-            Cell(count == 1 ? first
-                            : fmt::format("{} … {}", first, FrameName(frame_at(run.last).image)),
-                 "name") +
-            Cell(fmt::format("{}", count)) +
-            Cell(run.reason + (run.identical ? "" : " (numbers of the first of them)"), "") +
-            "</tr>\n";
+    html +=
+        "<tr>" +
+        TableCell(
+            count == 1 ? first : fmt::format("{} … {}", first, FrameName(frame_at(run.last).image)),
+            "name") +
+        TableCell(fmt::format("{}", count)) +
+        TableCell(run.reason + (run.identical ? "" : " (numbers of the first of them)"), "") +
+        "</tr>\n";
   }
   html += "</tbody></table></div>\n";
   html += fmt::format(
@@ -590,12 +535,12 @@ std::string RejectedFrames(const Calibration& calibration) {
       rejected);
   for (const FrameMeasurement& frame : calibration.frames) {
     if (frame.rejection.empty()) continue;
-    html += "<tr>" + Cell(FrameName(frame.image), "name") +
-            Cell(fmt::format("{:.6g}", frame.reading_mm)) +
-            Cell(fmt::format("{:.4f}", frame.statistics.mean_stored)) +
-            Cell(fmt::format("{:.3f}", frame.statistics.contrast)) +
-            Cell(fmt::format("{:.1f} %", 100 * frame.statistics.saturated_fraction)) +
-            Cell(frame.rejection, "") + "</tr>\n";
+    html += "<tr>" + TableCell(FrameName(frame.image), "name") +
+            TableCell(fmt::format("{:.6g}", frame.reading_mm)) +
+            TableCell(fmt::format("{:.4f}", frame.statistics.mean_stored)) +
+            TableCell(fmt::format("{:.3f}", frame.statistics.contrast)) +
+            TableCell(fmt::format("{:.1f} %", 100 * frame.statistics.saturated_fraction)) +
+            TableCell(frame.rejection, "") + "</tr>\n";
   }
   html += "</tbody></table></div></details>\n";
   return html;
@@ -690,7 +635,7 @@ std::string CameraRow(const model::Camera& camera, const char* label, const std:
     if (statement->second.assumed) remark += remark.empty() ? "assumed" : ", assumed";
   }
   return fmt::format("<tr><th scope=\"row\">{}</th>", EscapeXml(label)) +
-         Cell(fmt::format("{:.6g}", value)) + Cell(remark, "soft") + "</tr>\n";
+         TableCell(fmt::format("{:.6g}", value)) + TableCell(remark, "soft") + "</tr>\n";
 }
 
 std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration,
@@ -759,12 +704,8 @@ std::string CalibrationReportHtml(const FocusSweep& sweep, const Calibration& ca
   AddScaleFigure(sweep, calibration, &figures);
 
   const std::string camera_name = EscapeXml(sweep.camera.name);
-  std::string html = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n";
-  html += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n";
-  html += fmt::format("<title>Calibration of {}</title>\n<style>{}{}</style>\n</head>\n<body>\n",
-                      camera_name, kStyle, SvgPlotStyle());
-  html += fmt::format("<main>\n<h1>Calibration of {}</h1>\n<p class=\"under-title\">{}</p>\n",
-                      camera_name,
+  std::string html = PageHead("Calibration of " + sweep.camera.name, SvgPlotStyle());
+  html += fmt::format("<h1>Calibration of {}</h1>\n<p class=\"under-title\">{}</p>\n", camera_name,
                       EscapeXml(fmt::format("Focus sweep {}, {} frames · {}", origin.sweep_name,
                                             sweep.frames.size(), origin.date)));
   html += Verdict(sweep, calibration);

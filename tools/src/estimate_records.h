@@ -1,0 +1,47 @@
+#ifndef THICKLENS_TOOLS_ESTIMATE_RECORDS_H_
+#define THICKLENS_TOOLS_ESTIMATE_RECORDS_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace thicklens::tools {
+
+// What `thicklens estimate --json` wrote. What the file leaves out or gives as null is absent.
+struct EstimateRecord {
+  std::string solver;
+  int u_count = 0, v_count = 0, s_count = 0, t_count = 0;
+  std::string block_solver, stencil, splat, device;  // empty: absent
+  std::optional<double> gamma, ridge;
+  std::optional<int> threads, block_px, blocks, holes_filled;
+  std::optional<double> setup_seconds, solve_seconds, views_seconds, total_seconds;
+  std::optional<double> peak_rss_mib, relative_residual, rcond_min;
+  std::optional<std::vector<std::string>> effects;
+};
+// Throws Error that begins with the path: no JSON, of another command, refused, wrong types.
+EstimateRecord ReadEstimateRecord(const std::string& path);
+
+// Metrics of a view, or their mean over views. JSON has no infinity: the PSNR of equal pictures is
+// null there and +inf here.
+struct ScoresRecord {
+  double psnr_db = 0;
+  std::optional<double> ssim, delta_e94_mean, macade_standin;
+};
+struct ViewRecord {
+  int u = 0, v = 0;
+  double psnr_db = 0;
+  std::optional<double> dibr_psnr_db;
+};
+// What `thicklens compare TRUE_LF LF --json` wrote.
+struct ComparisonRecord {
+  ScoresRecord mean;
+  std::optional<ScoresRecord> centre, corner;
+  std::optional<ScoresRecord> dibr_mean, dibr_centre, dibr_corner;
+  std::vector<ViewRecord> views;
+  std::optional<int> views_above_dibr;
+};
+ComparisonRecord ReadComparisonRecord(const std::string& path);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_ESTIMATE_RECORDS_H_

@@ -1,0 +1,23 @@
+#ifndef THICKLENS_TOOLS_LIGHT_FIELD_FIGURES_H_
+#define THICKLENS_TOOLS_LIGHT_FIELD_FIGURES_H_
+
+#include <string>
+
+#include "light_field_page.h"
+
+namespace thicklens::tools {
+
+// The parts of the page about a light field that show pictures, each without its heading and empty
+// where the input has nothing to show.
+std::string SweepFigure(const LightFieldPageInput& input);
+std::string PictureAndDepthFigure(const LightFieldPageInput& input);
+std::string ViewFigures(const LightFieldPageInput& input);
+std::string EpipolarFigure(const LightFieldPageInput& input);
+std::string RefocusFigure(const LightFieldPageInput& input);
+
+// The style rules of these.
+std::string LightFieldFigureStyle();
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_LIGHT_FIELD_FIGURES_H_

@@ -1,0 +1,61 @@
+#ifndef THICKLENS_TOOLS_LIGHT_FIELD_PAGE_H_
+#define THICKLENS_TOOLS_LIGHT_FIELD_PAGE_H_
+
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimate_records.h"
+#include "thicklens/model/light_field.h"
+#include "thicklens/model/scene.h"
+
+namespace thicklens::tools {
+
+// Some frames of a focus sweep.
+struct SweepShot {
+  cv::Mat picture;  // as stored, of the region that is shown
+  std::string image;
+  double reading_mm = 0;
+  bool nearest_to_focus = false;
+};
+struct SweepStrip {
+  std::string name;              // file or folder, as the person gave it
+  int frame_count = 0;           // of the whole sweep
+  std::vector<SweepShot> shots;  // from near to far
+};
+
+// The depth of the photograph's pixels, NaN where it is not known.
+struct PageDepth {
+  int width_px = 0, height_px = 0;
+  std::vector<float> values;
+  bool in_mm = false;  // z from the aperture; else disparity in px per view step
+};
+
+// What a page tells. Of what is absent (null, empty) it says nothing.
+struct LightFieldPageInput {
+  std::string name;  // of the light field, as the person gave it
+  const model::LightField* light_field = nullptr;
+  const model::LightField* truth = nullptr;  // of the same views and size
+  std::optional<model::LinearPicture> photo;
+  std::optional<PageDepth> depth;
+  std::optional<SweepStrip> sweep;
+  std::string calibration;  // from InlinedCalibrationReport
+  std::optional<EstimateRecord> estimate;
+  std::optional<ComparisonRecord> comparison;
+  std::string version;  // of thicklens
+  std::string date;     // ISO 8601
+  int threads = 0;
+};
+
+struct LightFieldPage {
+  std::string html;
+  std::vector<std::string> sections;  // their ids, in order
+};
+// One page that needs nothing else: no network, no script; its pictures are in it. It is
+// well-formed XML too. Sections without data are left out.
+LightFieldPage MakeLightFieldPage(const LightFieldPageInput& input);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_LIGHT_FIELD_PAGE_H_
