@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -13,6 +15,7 @@
 #include <random>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "child_process.h"
@@ -293,6 +296,66 @@ TEST_F(EstimateTest, AFailingRunLeavesTheOlderLightField) {
   const std::string before = ContentOf(Output() + "/lightfield.yaml");
   EXPECT_EQ(Run(With(AsDisparity(Picture(), Disparity()), {"--ridge", "0"})).exit_code, 1);
   EXPECT_EQ(ContentOf(Output() + "/lightfield.yaml"), before);
+}
+
+TEST_F(EstimateTest, AnInterruptLeavesNothing) {
+  // Large enough to be under way when the signal comes.
+  constexpr int kSize = 400;
+  model::StoredPicture picture{kSize, kSize, 1, 8, {}};
+  model::RawDepthMap map{kSize, kSize, {}, false};
+  for (int i = 0; i < kSize * kSize; ++i) {
+    picture.values.push_back(static_cast<std::uint16_t>(i * 7919 % 256));
+    map.values.push_back(static_cast<float>(i % kSize) * 0.005F);
+  }
+  Arguments arguments = With({"estimate"}, AsDisparity(folder_.Put("large.png", EncodePng(picture)),
+                                                       folder_.Put("large.pfm", EncodePfm(map))));
+  arguments = With(arguments, {"-o", Output(), "--views", "7x7", "--verbose"});
+  arguments.erase(std::find(arguments.begin(), arguments.end(), "3x3") - 1,
+                  std::find(arguments.begin(), arguments.end(), "3x3") + 1);
+  ChildProgram program(arguments, scratch_.path(), 0);
+  // The device is opened right before the blocks are solved.
+  while (program.Running() && ContentOf(scratch_ / "stderr").find("device") == std::string::npos) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  program.Interrupt();
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("interrupted; nothing was written"));
+  EXPECT_FALSE(fs::exists(Output()));
+}
+
+TEST_F(EstimateTest, SlowARealRoomOfAKinect) {
+  const std::string data = std::string(THICKLENS_SHARED_DATA_DIR) + "/tum_kinect";
+  if (!fs::exists(data)) GTEST_SKIP() << data << " is missing";
+  const std::string json = folder_ / "estimate.json";
+  const ProgramResult result = Run(
+      {data + "/TUM_color.png", data + "/TUM_depth.png", "--depth-kind", "z", "--depth-unit",
+       "tum5000", "--camera", std::string(THICKLENS_SOURCE_DIR) + "/configs/cameras/kinect.yaml",
+       "--views", "3x3", "--json", json});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json summary = nlohmann::json::parse(ContentOf(json));
+  EXPECT_EQ(summary["size"], nlohmann::json({640, 480}));
+  EXPECT_EQ(summary["blocks"], 1200);
+  EXPECT_GT(summary["holes_filled"], 0);
+  EXPECT_NEAR(summary["depth"]["median_mm"].get<double>(), 2415, 1);
+  EXPECT_LT(summary["relative_residual"].get<double>(), 1e-12);
+  EXPECT_GT(summary["rcond_min"].get<double>(), 1e-6);
+
+  // The light field put through the camera is the photograph again. In the corners, where the
+  // fall-off is divided out, bright radiance is above full scale and clipped in the views' files.
+  const std::string again = folder_ / "again.png";
+  const ProgramResult render =
+      ChildProgram({"render", Output(), "--as-captured", "--crop", "160,120,320,240", "-o", again},
+                   scratch_.path(), 0)
+          .Wait();
+  ASSERT_EQ(render.exit_code, 0) << render.err;
+  const std::string compared = folder_ / "compared.json";
+  const ProgramResult compare = ChildProgram({"compare", data + "/TUM_color.png", again, "--crop",
+                                              "160,120,320,240", "--json", compared},
+                                             scratch_.path(), 0)
+                                    .Wait();
+  ASSERT_EQ(compare.exit_code, 0) << compare.err;
+  EXPECT_GT(nlohmann::json::parse(ContentOf(compared))["psnr_db"].get<double>(), 45);
 }
 
 // The road of a light field with true views, at 3 x 3 on a part of a real one.
