@@ -9,6 +9,9 @@ function(thicklens_compile_settings target)
     target_compile_options(${target} PUBLIC -fsanitize=${THICKLENS_SANITIZE}
                                             -fno-sanitize-recover=all -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${THICKLENS_SANITIZE})
+    # Under a sanitizer Eigen would align memory by itself, but the Eigen inside of Debian's Ceres
+    # does not: the linker takes one's malloc and the other's free.
+    target_compile_definitions(${target} PUBLIC EIGEN_MALLOC_ALREADY_ALIGNED=1)
   endif()
 endfunction()
 
