@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -54,12 +55,12 @@ class OpenClBackend : public Backend {
 };
 
 // The best device that works, or none and why.
-std::shared_ptr<Backend> OpenBestDevice(const DeviceRequest& request,
+std::shared_ptr<Backend> OpenBestDevice(const DeviceRequest& request, const StopCheck& stop,
                                         std::vector<std::string>* problems) {
-  const DeviceSurvey& survey = SurveyDevices();
+  const DeviceSurvey& survey = SurveyDevices(false, stop);
   *problems = survey.problems;
   for (const DeviceDescription& device : Candidates(survey, request, problems)) {
-    const std::string problem = TryDeviceOnce(device.platform, device.device);
+    const std::string problem = TryDeviceOnce(device.platform, device.device, stop);
     if (!problem.empty()) {
       problems->push_back(problem);
       continue;
@@ -76,7 +77,8 @@ std::shared_ptr<Backend> OpenBestDevice(const DeviceRequest& request,
 
 }  // namespace
 
-std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* notice) {
+std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* notice,
+                                     const std::function<void()>& stop) {
   if (notice != nullptr) notice->clear();
   if (request.kind == DeviceRequest::Kind::kCpu) return std::make_shared<TwinBackend>();
 
@@ -86,7 +88,9 @@ std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* 
   std::vector<std::string> problems;
   std::shared_ptr<Backend> backend;
   try {
-    backend = OpenBestDevice(request, &problems);
+    backend = OpenBestDevice(request, stop, &problems);
+  } catch (const Interrupted&) {
+    throw;
   } catch (const Error& error) {  // no child process could be had
     problems.emplace_back(error.what());
   }

@@ -256,12 +256,12 @@ void ListOpenClDevices(int first_platform, const Tell& tell) {
   }
 }
 
-DeviceSurvey SurveyWith(const ListDevices& list, double limit_s) {
+DeviceSurvey SurveyWith(const ListDevices& list, double limit_s, const StopCheck& stop) {
   DeviceSurvey survey;
   int first_platform = 0;
   while (true) {
     const ChildOutcome outcome =
-        RunInChild([&](const Tell& tell) { list(first_platform, tell); }, limit_s);
+        RunInChild([&](const Tell& tell) { list(first_platform, tell); }, limit_s, stop);
     SurveyReader reader(&survey);
     reader.Read(outcome.told);
     if (outcome.failure.empty()) return survey;
@@ -278,12 +278,12 @@ DeviceSurvey SurveyWith(const ListDevices& list, double limit_s) {
   }
 }
 
-const DeviceSurvey& SurveyDevices(bool again) {
+const DeviceSurvey& SurveyDevices(bool again, const StopCheck& stop) {
   static std::mutex mutex;
   static std::optional<DeviceSurvey> kept;
   const std::lock_guard<std::mutex> lock(mutex);
   if (!IsOpenClInUse()) {
-    if (!kept || again) kept = SurveyWith(ListOpenClDevices, kChildLimitS);
+    if (!kept || again) kept = SurveyWith(ListOpenClDevices, kChildLimitS, stop);
   } else if (!kept) {
     kept = SurveyHere();
   }

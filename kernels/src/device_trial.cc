@@ -76,7 +76,7 @@ std::string TryDevice(int platform, int device, const std::vector<EmbeddedFile>&
   return "";
 }
 
-std::string TryDeviceOnce(int platform, int device) {
+std::string TryDeviceOnce(int platform, int device, const StopCheck& stop) {
   static std::map<std::pair<int, int>, std::string> results;
   const auto known = results.find({platform, device});
   if (known != results.end()) return known->second;
@@ -86,7 +86,7 @@ std::string TryDeviceOnce(int platform, int device) {
   } else {
     const ChildOutcome outcome = RunInChild(
         [&](const Tell& tell) { tell(TryDevice(platform, device, EmbeddedKernelFiles())); },
-        kChildLimitS);
+        kChildLimitS, stop);
     problem = OneLine(outcome.told);
     if (!outcome.failure.empty()) {
       problem = fmt::format("device opencl:{}:{}: its driver {} when a small kernel was tried",

@@ -85,7 +85,11 @@ void WriteAll(int descriptor, const std::string& text) {
                           int chatter) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ}) {
+  // Ctrl-C goes to the whole process group of the terminal, and a service's stop to all of its
+  // processes: they are meant for the parent, which then ends this one.
+  ::setpgid(0, 0);
+  for (const int signal : {SIGINT, SIGTERM}) ::signal(signal, SIG_IGN);
+  for (const int signal : {SIGHUP, SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ}) {
     ::signal(signal, SIG_DFL);
   }
   sigset_t all;
@@ -111,6 +115,43 @@ void WriteAll(int descriptor, const std::string& text) {
   ::_exit(0);
 }
 
+// A child process, in a group of its own. Killed with its group if this ends before it does.
+class Child {
+ public:
+  explicit Child(pid_t pid) : pid_(pid) {
+    // As the child does: whoever comes first, the group is there when it is killed.
+    ::setpgid(pid_, pid_);
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  ~Child() {
+    if (!ended_) Kill();
+  }
+
+  bool HasEnded() {
+    const pid_t ended = ::waitpid(pid_, &status_, WNOHANG);
+    if (ended < 0 && errno != EINTR) {
+      ended_ = true;
+      throw Error(fmt::format("a child process: {}", std::strerror(errno)));
+    }
+    ended_ = ended == pid_;
+    return ended_;
+  }
+  void Kill() {
+    ::kill(-pid_, SIGKILL);
+    ::kill(pid_, SIGKILL);
+    while (::waitpid(pid_, &status_, 0) < 0 && errno == EINTR) {
+    }
+    ended_ = true;
+  }
+  int status() const { return status_; }
+
+ private:
+  pid_t pid_;
+  int status_ = 0;
+  bool ended_ = false;
+};
+
 std::string LastLine(const std::string& text) {
   std::size_t end = text.size();
   while (end > 0) {
@@ -124,6 +165,11 @@ std::string LastLine(const std::string& text) {
   return "";
 }
 
+// By a signal that a person or a service sends, and no fault does.
+bool EndedByRequest(int status) {
+  return WIFSIGNALED(status) && (WTERMSIG(status) == SIGINT || WTERMSIG(status) == SIGTERM);
+}
+
 std::string HowItEnded(int status) {
   if (WIFSIGNALED(status)) {
     return fmt::format("crashed (signal {}, {})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
@@ -132,23 +178,19 @@ std::string HowItEnded(int status) {
   return "";
 }
 
-// Reads from the child until it ends or its time is up. Returns its status, or nothing and kills
-// it.
-bool WaitForChild(pid_t child, double limit_s, Pipe* told, Pipe* chatter, ChildOutcome* outcome,
-                  std::string* printed, int* status) {
+// Reads from the child until it ends. False: its time was up, and it was killed.
+bool WaitForChild(Child* child, double limit_s, const StopCheck& stop, Pipe* told, Pipe* chatter,
+                  ChildOutcome* outcome, std::string* printed) {
   const auto deadline = Clock::now() + std::chrono::duration<double>(limit_s);
   while (true) {
-    const pid_t ended = ::waitpid(child, status, WNOHANG);
+    if (stop) stop();
+    const bool ended = child->HasEnded();
     told->TakeInto(&outcome->told);
     chatter->TakeInto(printed);
     if (printed->size() > kChatterKept) printed->erase(0, printed->size() - kChatterKept);
-    if (ended == child) return true;
-    if (ended < 0 && errno != EINTR) {
-      throw Error(fmt::format("a child process: {}", std::strerror(errno)));
-    }
+    if (ended) return true;
     if (Clock::now() > deadline || outcome->told.size() > kMostTold) {
-      ::kill(child, SIGKILL);
-      ::waitpid(child, status, 0);
+      child->Kill();
       return false;
     }
     // Pipes whose child has closed them are -1 here, and then this is a mere pause.
@@ -159,22 +201,24 @@ bool WaitForChild(pid_t child, double limit_s, Pipe* told, Pipe* chatter, ChildO
 
 }  // namespace
 
-ChildOutcome RunInChild(const std::function<void(const Tell&)>& work, double limit_s) {
+ChildOutcome RunInChild(const std::function<void(const Tell&)>& work, double limit_s,
+                        const StopCheck& stop) {
   Pipe told;
   Pipe chatter;
   const pid_t parent = ::getpid();
-  const pid_t child = ::fork();
-  if (child < 0) throw Error(fmt::format("a child process: {}", std::strerror(errno)));
-  if (child == 0) BeChild(work, parent, told.write_end(), chatter.write_end());
+  const pid_t pid = ::fork();
+  if (pid < 0) throw Error(fmt::format("a child process: {}", std::strerror(errno)));
+  if (pid == 0) BeChild(work, parent, told.write_end(), chatter.write_end());
+  Child child(pid);
   told.CloseWriteEnd();
   chatter.CloseWriteEnd();
 
   ChildOutcome outcome;
   std::string printed;
-  int status = 0;
-  const bool in_time = WaitForChild(child, limit_s, &told, &chatter, &outcome, &printed, &status);
+  const bool in_time = WaitForChild(&child, limit_s, stop, &told, &chatter, &outcome, &printed);
+  if (in_time && EndedByRequest(child.status())) throw Interrupted();
   outcome.failure =
-      in_time ? HowItEnded(status) : fmt::format("did not end within {:g} s", limit_s);
+      in_time ? HowItEnded(child.status()) : fmt::format("did not end within {:g} s", limit_s);
   const std::string last_line = LastLine(printed);
   if (!outcome.failure.empty() && !last_line.empty()) {
     outcome.failure += ", its last words: " + last_line;

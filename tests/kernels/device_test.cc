@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -19,6 +21,7 @@
 #include "guarded_child.h"
 #include "opencl_program.h"
 #include "support/error_message.h"
+#include "thicklens/error.h"
 
 namespace thicklens::kernels {
 namespace {
@@ -201,10 +204,73 @@ TEST(RunInChild, DoesNotWaitForGrandchildren) {
 }
 
 TEST(RunInChild, DoesNotInheritSignalHandlersOrBlockedSignals) {
-  const auto before = std::signal(SIGTERM, SIG_IGN);
-  const ChildOutcome outcome = RunInChild([](const Tell&) { ::raise(SIGTERM); }, kLongS);
-  std::signal(SIGTERM, before);
-  EXPECT_THAT(outcome.failure, HasSubstr("crashed (signal 15"));
+  const auto before = std::signal(SIGALRM, SIG_IGN);
+  const ChildOutcome outcome = RunInChild([](const Tell&) { ::raise(SIGALRM); }, kLongS);
+  std::signal(SIGALRM, before);
+  EXPECT_THAT(outcome.failure, HasSubstr("crashed (signal 14"));
+}
+
+// As Ctrl-C in a terminal does, and a service's stop. The child sends the signals itself, so that
+// they come while it works; all in a group of its own, so that nobody else hears them.
+TEST(RunInChild, LeavesRequestsToStopToTheParent) {
+  const ChildOutcome tested = RunInChild(
+      [](const Tell& tell_test) {
+        static std::atomic<int> heard{0};
+        std::signal(SIGINT, [](int) { ++heard; });
+        const pid_t parents_group = ::getpgrp();
+        const ChildOutcome outcome = RunInChild(
+            [parents_group](const Tell& tell) {
+              ::kill(-parents_group, SIGINT);
+              ::raise(SIGINT);
+              ::raise(SIGTERM);
+              tell(::getpgrp() == parents_group ? "in the parent's group" : "went on");
+            },
+            kLongS);
+        tell_test(outcome.told + ", parent heard " + std::to_string(heard) + outcome.failure);
+      },
+      kLongS);
+  EXPECT_EQ(tested.told, "went on, parent heard 1");
+  EXPECT_EQ(tested.failure, "");
+}
+
+TEST(RunInChild, EndsTheChildAndWhatItStartedWhenToldToStop) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  int calls = 0;
+  EXPECT_THROW(RunInChild(
+                   [&ends](const Tell&) {
+                     ::fork();
+                     while (::write(ends[1], "+", 1) == 1) ::pause();
+                   },
+                   kLongS,
+                   [&] {
+                     char both[2];
+                     // Both are there before the end begins.
+                     if (++calls == 3) {
+                       EXPECT_EQ(::read(ends[0], both, 1), 1);
+                       EXPECT_EQ(::read(ends[0], both, 1), 1);
+                       throw Interrupted();
+                     }
+                   }),
+               Interrupted);
+  EXPECT_EQ(calls, 3);
+  // Ends only when nobody has the other end any more.
+  ::close(ends[1]);
+  pollfd hang_up{ends[0], 0, 0};
+  EXPECT_EQ(::poll(&hang_up, 1, 10000), 1) << "what the child started lives on";
+  ::close(ends[0]);
+  EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "the child was not waited for";
+}
+
+TEST(RunInChild, NeverBlamesTheWorkForARequestToStop) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const auto work = [signal](const Tell&) {
+      std::signal(signal, SIG_DFL);
+      ::raise(signal);
+    };
+    EXPECT_THROW(RunInChild(work, kLongS), Interrupted) << signal;
+    EXPECT_THROW(SurveyWith([&](int, const Tell& tell) { work(tell); }, kLongS), Interrupted);
+  }
 }
 
 TEST(Survey, TellsEveryFieldOfADevice) {
@@ -303,6 +369,20 @@ TEST(OpenBackend, AutoIsADeviceWhereThereIsOne) {
   EXPECT_FALSE(backend->description().empty());
   const auto same = OpenBackend(ParseDeviceRequest(backend->name()), nullptr);
   EXPECT_EQ(same->name(), backend->name());
+}
+
+// First the survey is broken off, then the trial of a device.
+TEST(OpenBackend, StopsWhenToldTo) {
+  const auto stop = [] { throw Interrupted(); };
+  if (IsOpenClInUse()) GTEST_SKIP() << "OpenCL is in use: no child is waited for any more";
+  EXPECT_THROW(SurveyDevices(true, stop), Interrupted);
+  std::string notice;
+  EXPECT_THROW(OpenBackend(ParseDeviceRequest("auto"), &notice, stop), Interrupted);
+  EXPECT_FALSE(SurveyDevices().devices.empty());
+  EXPECT_THROW(OpenBackend(ParseDeviceRequest("auto"), &notice, stop), Interrupted);
+  EXPECT_THROW(OpenBackend(ParseDeviceRequest("opencl"), &notice, stop), Interrupted);
+  EXPECT_EQ(notice, "");
+  EXPECT_TRUE(OpenBackend(ParseDeviceRequest("auto"), &notice, [] {})->is_opencl()) << notice;
 }
 
 TEST(OpenBackend, NamesTheDevicesThereAreIfAnotherIsAskedFor) {

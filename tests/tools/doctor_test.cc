@@ -1,7 +1,12 @@
 // thicklens doctor as a person meets it, with drivers that misbehave in all the ways they do.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -175,6 +180,41 @@ TEST_F(DoctorTest, WithADriverWhoseLibraryIsNone) {
   drivers_.Put("broken.icd", drivers_.Put("broken.so", "no library") + "\n");
   const ScopedVariable vendors("OCL_ICD_VENDORS", drivers_.path());
   ExpectNoDevice("error -1001");
+}
+
+// Ctrl-C in a terminal goes to the program and to the child that looks at the drivers: no driver is
+// to blame, and nobody waits for one. Opening a pipe that nobody writes to takes forever.
+TEST_F(DoctorTest, CtrlCWhileADriverIsLoading) {
+  const std::string pipe = drivers_ / "waits.so";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  drivers_.Put("waits.icd", pipe + "\n");
+  const ScopedVariable vendors("OCL_ICD_VENDORS", drivers_.path());
+  const pid_t group = ::getpgrp();
+  ::setpgid(0, 0);
+  ASSERT_EQ(::getpgrp(), ::getpid());
+  const auto before = std::signal(SIGINT, [](int) {});
+
+  ChildProgram program({"doctor", "--json", scratch_ / "doctor.json"}, scratch_.path(), 0);
+  int write_end = -1;
+  while (write_end < 0 && program.Running()) {
+    ::usleep(1000);
+    write_end = ::open(pipe.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+  }
+  ::kill(0, SIGINT);
+  const ProgramResult result = program.Wait();
+  std::signal(SIGINT, before);
+  ::setpgid(0, group);
+
+  ASSERT_GE(write_end, 0) << result.err;
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err, "thicklens: error: interrupted; nothing was written\n");
+  EXPECT_EQ(result.out, "");
+  EXPECT_FALSE(fs::exists(scratch_ / "doctor.json"));
+  // Nobody reads the pipe any more.
+  pollfd readers{write_end, 0, 0};
+  EXPECT_EQ(::poll(&readers, 1, 0), 1);
+  EXPECT_NE(readers.revents & POLLERR, 0);
+  ::close(write_end);
 }
 
 // Two copies of PoCL in one process abort in the compiler library that they share.

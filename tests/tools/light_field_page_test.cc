@@ -359,6 +359,16 @@ TEST_F(LightFieldPageTest, TheCameraInWords) {
   light_field_.camera->calibration->image_distance_mm->sigma = 0;
   EXPECT_THAT(Html(), AllOf(HasSubstr("d1 = 16.216\u00A0mm"), HasSubstr("assumed, not measured"),
                             Not(HasSubstr("calibrated from"))));
+  // Nothing is said of frames where there are none.
+  light_field_.camera->calibration->evidence.frames_used = 0;
+  light_field_.camera->calibration->evidence.method = "simulated";
+  EXPECT_THAT(Html(), AllOf(HasSubstr("(of a simulated camera: true, not measured)."),
+                            Not(HasSubstr("frame"))));
+  light_field_.camera->calibration->evidence.method = "by<hand>";
+  EXPECT_THAT(Html(), AllOf(HasSubstr("(by by&lt;hand&gt;)."), Not(HasSubstr("frame"))));
+  light_field_.camera->calibration->evidence.method = "";
+  EXPECT_THAT(Html(), AllOf(HasSubstr("blur ratio κ = 0.4512\u00A0±\u00A00.0021."),
+                            Not(HasSubstr("frame"))));
   const model::LightField relative = Relative(3, 3);
   input_.light_field = &relative;
   EXPECT_THAT(Html(), AllOf(HasSubstr("There is no camera"), Not(HasSubstr("image distance"))));

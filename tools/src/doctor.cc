@@ -12,6 +12,7 @@
 
 #include "build_info.h"
 #include "commands.h"
+#include "interrupt.h"
 #include "light_field_options.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
@@ -74,10 +75,10 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
   const kernels::DeviceRequest request = kernels::ParseDeviceRequest(options.device);
   try {
     if (request.kind != kernels::DeviceRequest::Kind::kCpu) {
-      findings->survey = kernels::SurveyDevices();
+      findings->survey = kernels::SurveyDevices(false, ThrowIfInterrupted);
     }
     std::string notice;
-    const auto backend = kernels::OpenBackend(request, &notice);
+    const auto backend = kernels::OpenBackend(request, &notice, ThrowIfInterrupted);
     if (!notice.empty()) spdlog::warn("{}", PrintableUtf8(notice));
     findings->notice = notice;
     findings->used = backend->name();
@@ -87,6 +88,8 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
     if (!findings->agreement->agrees) {
       findings->refusal = Disagreement(backend->name(), *findings->agreement);
     }
+  } catch (const Interrupted&) {
+    throw;
   } catch (const Error& error) {
     findings->refusal = error.what();
   }

@@ -86,6 +86,15 @@ std::string WithSigma(const model::Estimate& estimate) {
                      RoundedSigma(estimate.sigma));
 }
 
+// What the calibrated values rest on.
+std::string EvidenceInWords(const model::Evidence& evidence) {
+  if (evidence.method == "assumed") return " (assumed, not measured)";
+  if (evidence.method == "simulated") return " (of a simulated camera: true, not measured)";
+  if (evidence.frames_used > 0)
+    return fmt::format(" (calibrated from {})", Counted(evidence.frames_used, "frame"));
+  return evidence.method.empty() ? "" : fmt::format(" (by {})", PrintableUtf8(evidence.method));
+}
+
 std::string CameraInWords(const model::LightField& light_field) {
   if (!light_field.camera)
     return "There is no camera: distances are disparities, in px from view to view.";
@@ -101,12 +110,8 @@ std::string CameraInWords(const model::LightField& light_field) {
   if (calibration.evidence.focus_depth_mm)
     found.push_back(
         fmt::format("in focus at {}\u00A0mm", WithSigma(*calibration.evidence.focus_depth_mm)));
-  const std::string origin = calibration.evidence.method == "assumed"
-                                 ? " (assumed, not measured)"
-                                 : fmt::format(" (calibrated from {})",
-                                               Counted(calibration.evidence.frames_used, "frame"));
   return fmt::format("Camera {}: {}{}.", PrintableUtf8(camera.name), fmt::join(found, ", "),
-                     found.empty() ? "nothing calibrated" : origin);
+                     found.empty() ? "nothing calibrated" : EvidenceInWords(calibration.evidence));
 }
 
 std::string RunInWords(const LightFieldPageInput& input) {

@@ -2,6 +2,7 @@
 #define THICKLENS_KERNELS_DEVICE_H_
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -48,7 +49,10 @@ struct DeviceSurvey {
 // Lists all devices in a child process (fork), so that a driver that aborts, crashes or hangs
 // cannot take this one down. The result is kept: the child runs once per process, or with `again`.
 // Once this process uses OpenCL, no child can: `again` has no effect then.
-const DeviceSurvey& SurveyDevices(bool again = false);
+//
+// `stop` (may be empty) is called several times a second meanwhile; where the user asked to stop,
+// it throws Interrupted, which ends the child and passes on. Nothing is kept then.
+const DeviceSurvey& SurveyDevices(bool again = false, const std::function<void()>& stop = {});
 
 // Places that compute kernels: a device with its compiled program, or the C++ twin.
 class Backend {
@@ -67,8 +71,9 @@ class Backend {
 // null) why; kOpenCl throws Error with every problem found and, where a program does not build,
 // the build log. A device is tried in a child process with a small kernel before this process
 // touches it (in this process if it uses another device already). Call it before anything else in
-// the process uses OpenCL.
-std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* notice);
+// the process uses OpenCL. `stop`: as of SurveyDevices.
+std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* notice,
+                                     const std::function<void()>& stop = {});
 
 // Largest relative differences between a backend and the twin over all kernels on a small problem
 // with odd sizes, empty rows and borders.
