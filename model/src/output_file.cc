@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fnmatch.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -12,6 +13,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <system_error>
 
 #include "thicklens/error.h"
@@ -92,6 +94,26 @@ fs::path Followed(const fs::path& target) {
   return failure ? target : followed;
 }
 
+Error WouldBeLost(const fs::path& folder, const std::string& name) {
+  return Error(
+      fmt::format("{}: this folder also holds '{}', which would be lost; move it away or choose "
+                  "another name",
+                  folder.string(), name));
+}
+
+// Throws Error for what is in that folder of an output folder and matches none of the patterns.
+void RequireOwn(const fs::path& folder, const std::string& name,
+                const std::vector<std::string>& patterns) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder / name, ignored)) {
+    const std::string inner = name + "/" + entry.path().filename().string();
+    const bool is_own = std::any_of(patterns.begin(), patterns.end(), [&](const auto& pattern) {
+      return ::fnmatch(pattern.c_str(), inner.c_str(), FNM_PATHNAME) == 0;
+    });
+    if (!is_own || fs::is_directory(entry.symlink_status())) throw WouldBeLost(folder, inner);
+  }
+}
+
 // A folder that is there already is replaced only if that can lose nothing of anybody else's.
 void RequireReplaceable(const fs::path& folder, const std::string& marker_file,
                         const std::vector<std::string>& own_entries) {
@@ -109,10 +131,12 @@ void RequireReplaceable(const fs::path& folder, const std::string& marker_file,
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();
     if (std::find(own_entries.begin(), own_entries.end(), name) != own_entries.end()) continue;
-    throw Error(
-        fmt::format("{}: this folder also holds '{}', which would be lost; move it away or "
-                    "choose another name",
-                    folder.string(), name));
+    std::vector<std::string> patterns;  // of what may be in it
+    std::copy_if(own_entries.begin(), own_entries.end(), std::back_inserter(patterns),
+                 [&](const std::string& own) { return own.rfind(name + "/", 0) == 0; });
+    if (patterns.empty() || !fs::is_directory(entry.path(), ignored))
+      throw WouldBeLost(folder, name);
+    RequireOwn(folder, name, patterns);
   }
 }
 

@@ -260,6 +260,40 @@ TEST(OutputFolder, NamesWhatWouldBeLost) {
   EXPECT_TRUE(fs::exists(folder / "out/notes.txt"));
 }
 
+// The same one folder deeper, where the own entries tell the names there.
+TEST(OutputFolder, NamesWhatWouldBeLostOneFolderDeeper) {
+  const std::vector<std::string> own = {kMarker, "views/view_[0-9].png", "views/view_[0-9].tiff"};
+  const auto put_own = [](TemporaryFolder* folder) {
+    folder->Put("out/" + std::string(kMarker));
+    folder->Put("out/views/view_1.png");
+    folder->Put("out/views/view_2.tiff");
+  };
+  {
+    TemporaryFolder folder;
+    put_own(&folder);
+    OutputFolder claimed(folder / "out", kMarker, own);
+    claimed.Write(kMarker, "new");
+    claimed.Commit();
+    EXPECT_FALSE(fs::exists(folder / "out/views"));
+  }
+  for (const char* other : {"notes.txt", "view_12.png", "view_1.png.txt", "view_3.png/mine"}) {
+    TemporaryFolder folder;
+    put_own(&folder);
+    OutputFolder claimed(folder / "out", kMarker, own);
+    const std::string path = folder.Put("out/views/" + std::string(other), "years");
+    const std::string name = std::string(other).substr(0, std::string(other).find('/'));
+    EXPECT_THAT(ErrorOf([&] { claimed.Commit(); }), HasSubstr("'views/" + name + "'"));
+    EXPECT_EQ(ContentOf(path), "years");
+  }
+  TemporaryFolder folder;
+  put_own(&folder);
+  fs::remove_all(folder / "out/views");
+  folder.Put("out/views", "a file of that name");
+  EXPECT_THAT(ErrorOf([&] { OutputFolder out(folder / "out", kMarker, own); }),
+              HasSubstr("'views'"));
+  EXPECT_EQ(ContentOf(folder / "out/views"), "a file of that name");
+}
+
 TEST(OutputFolder, LooksAgainBeforeItReplaces) {
   const TemporaryFolder folder;
   {

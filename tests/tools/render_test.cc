@@ -414,6 +414,55 @@ TEST_F(RenderTest, WrongUsageIsExitCode2) {
   EXPECT_EQ(Run({folder, "--as-captured"}).exit_code, 2);
 }
 
+// What it reads stays as it was, wherever the output is said to go.
+TEST_F(RenderTest, NothingIsWrittenIntoTheLightFieldItself) {
+  const std::string ours = Write("lf", AtRandom(3, 3, 13));
+  const std::string hci = folder_ / "hci";
+  ASSERT_EQ(Run({ours, "--convert", "hci", "-o", hci}).exit_code, 0);
+  const auto refused = [&](const Arguments& arguments, const std::string& why) {
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(why));
+  };
+  const std::string description = ContentOf(ours + "/lightfield.yaml");
+  const std::string view = ContentOf(ours + "/views/view_00_00.tiff");
+  const std::string hci_view = ContentOf(hci + "/input_Cam000.png");
+  const std::string png = folder_ / "photo.png";
+  refused({ours, "--as-captured", "-o", ours + "/views/view_00_00.tiff"},
+          "lies in the light field");
+  refused({ours + "/", "--as-captured", "-o", ours + "/views/../new.png"},
+          "lies in the light field");
+  refused({ours, "--as-captured", "-o", png, "--json", ours + "/lightfield.yaml"},
+          "lies in the light field");
+  refused({ours, "--convert", "hci", "-o", ours + "/views"}, "lies in the light field");
+  refused({hci, "--as-captured", "-o", hci + "/input_Cam000.png"}, "lies in the light field");
+  fs::create_directory_symlink(ours, folder_ / "link");
+  refused({ours, "--as-captured", "-o", folder_ / "link/views/view_00_00.tiff"},
+          "lies in the light field");
+  refused({folder_ / "link", "--as-captured", "-o", ours + "/new.png"}, "lies in the light field");
+  fs::rename(hci, ours + "/inner");
+  refused({ours + "/inner", "--convert", "thicklens", "-o", ours}, "holds the input");
+  EXPECT_EQ(ContentOf(ours + "/lightfield.yaml"), description);
+  EXPECT_EQ(ContentOf(ours + "/views/view_00_00.tiff"), view);
+  EXPECT_EQ(ContentOf(ours + "/inner/input_Cam000.png"), hci_view);
+  EXPECT_FALSE(fs::exists(png));
+  // Beside it, with a name that begins alike.
+  EXPECT_EQ(Run({ours, "--as-captured", "-o", ours + "-photo.png"}).exit_code, 0);
+}
+
+TEST_F(RenderTest, WhatSomebodyPutAmongTheViewsStays) {
+  const std::string ours = Write("lf", AtRandom(3, 3, 14));
+  const std::string out = folder_ / "copy";
+  ASSERT_EQ(Run({ours, "--convert", "thicklens", "-o", out}).exit_code, 0);
+  const std::string notes = folder_.Put("copy/views/notes.txt", "years");
+  const ProgramResult result = Run({ours, "--convert", "thicklens-tiff", "-o", out});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("'views/notes.txt'"));
+  EXPECT_EQ(ContentOf(notes), "years");
+  fs::remove(notes);
+  EXPECT_EQ(Run({ours, "--convert", "thicklens-tiff", "-o", out}).exit_code, 0);
+}
+
 TEST_F(RenderTest, WhatCannotBeRenderedIsToldInOneLine) {
   const std::string folder = Write("lf", AtRandom(3, 4, 9));
   EXPECT_THAT(Failure({folder_ / "none", "--mosaic"}), HasSubstr("does not exist"));

@@ -38,6 +38,53 @@ bool SameFile(const std::string& a, const std::string& b) {
   return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal();
 }
 
+// The whole path, links followed as far as it exists, without a slash at its end.
+fs::path Resolved(const std::string& path) {
+  std::error_code failure;
+  fs::path resolved = fs::weakly_canonical(fs::absolute(path), failure);
+  if (failure) resolved = fs::absolute(path).lexically_normal();
+  return resolved.has_filename() ? resolved : resolved.parent_path();
+}
+
+// Whether `path` is somewhere below that folder.
+bool IsBelow(const std::string& path, const std::string& folder) {
+  if (path.empty() || folder.empty()) return false;
+  const fs::path inner = Resolved(path);
+  const fs::path outer = Resolved(folder);
+  const auto [in_inner, in_outer] =
+      std::mismatch(inner.begin(), inner.end(), outer.begin(), outer.end());
+  return in_outer == outer.end() && in_inner != inner.end();
+}
+
+// Every file in it is part of the light field or belongs beside it, not into it.
+bool IsLightField(const std::string& folder) {
+  std::error_code failure;
+  if (folder.empty() || !fs::is_directory(folder, failure)) return false;
+  if (fs::exists(fs::path(folder) / "lightfield.yaml", failure)) return true;
+  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
+       entry.increment(failure)) {
+    const fs::path name = entry->path().filename();
+    if (name.string().rfind("input_Cam", 0) == 0 && name.extension() == ".png") return true;
+  }
+  return false;
+}
+
+void RequireOutputBesideInput(const std::string& output, const std::string& input) {
+  if (SameFile(output, input))
+    throw UsageError(fmt::format("{}: this input would be overwritten", output));
+  std::error_code ignored;
+  if (IsBelow(output, input) && IsLightField(input)) {
+    throw UsageError(
+        fmt::format("{}: lies in the light field {}, which is an input; choose a name outside of "
+                    "it",
+                    output, input));
+  }
+  if (IsBelow(input, output) && fs::is_directory(output, ignored)) {
+    throw UsageError(
+        fmt::format("{}: this folder holds the input {}; choose another name", output, input));
+  }
+}
+
 }  // namespace
 
 void AddCommonOptions(CLI::App* command, CommonOptions* options) {
@@ -95,10 +142,7 @@ void RequireDistinctFiles(const std::vector<std::string>& outputs,
       if (SameFile(outputs[i], outputs[j]))
         throw UsageError(fmt::format("{}: two outputs have this name", outputs[i]));
     }
-    for (const std::string& input : inputs) {
-      if (SameFile(outputs[i], input))
-        throw UsageError(fmt::format("{}: this input would be overwritten", outputs[i]));
-    }
+    for (const std::string& input : inputs) RequireOutputBesideInput(outputs[i], input);
   }
 }
 

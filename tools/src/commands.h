@@ -41,8 +41,9 @@ void PrintResult(const CommonOptions& options, const std::string& text);
 // Names on stderr, in one line, which numbers of the camera are somebody's assumption.
 void TellAssumedFields(const model::Camera& camera);
 
-// Throws UsageError if two outputs, or an output and an input, are the same file. Empty paths are
-// left out.
+// Throws UsageError if two outputs, or an output and an input, are the same file, if an output lies
+// in an input that is the folder of a light field, or if an output is a folder that holds an input.
+// A folder of frames may well get its results. Empty paths are left out.
 void RequireDistinctFiles(const std::vector<std::string>& outputs,
                           const std::vector<std::string>& inputs);
 

@@ -413,7 +413,14 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
 }
 
 std::vector<std::string> LightFieldEntries() {
-  return {kViewsFolder, kLightFieldMarker, kCameraFile};
+  std::vector<std::string> entries = {kLightFieldMarker, kCameraFile};
+  for (const char* v : {"[0-9][0-9]", "[0-9][0-9][0-9]"}) {
+    for (const char* u : {"[0-9][0-9]", "[0-9][0-9][0-9]"}) {
+      for (const char* format : {"png", "tiff"})
+        entries.push_back(fmt::format("{}/view_{}_{}.{}", kViewsFolder, v, u, format));
+    }
+  }
+  return entries;
 }
 
 std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,

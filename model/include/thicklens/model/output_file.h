@@ -31,7 +31,9 @@ class OutputFile {
 // The same for a folder: files are written into staging_path(), and Commit puts the folder in
 // place, replacing an older one. A folder at the target is replaced only if it is empty, or
 // contains `marker_file` (the sign that this program wrote it) and nothing but `own_entries`, where
-// these are given; else the constructor and Commit throw Error that names what would be lost.
+// these are given; else the constructor and Commit throw Error that names what would be lost. An
+// own entry is the name of a file or folder, the folder with all that is in it, or "FOLDER/PATTERN"
+// for a folder that holds nothing but files whose names match one of its shell patterns.
 class OutputFolder {
  public:
   OutputFolder(const std::string& path, const std::string& marker_file,
