@@ -100,13 +100,22 @@ Eigen::Vector2d AperturePosition(const model::LightField& light_field, int k, in
   return model::ApertureCrossingMm(grid.planes, {0, 0, a * grid.u_step_mm, b * grid.v_step_mm});
 }
 
-double TransmissionAt(const model::LightField& light_field, double radius,
-                      const Eigen::Vector2d& position) {
+// The share that an aperture of that radius leaves of a view's weight, which belongs to the
+// aperture of the capture: T_R/T_r, T the transmission at the view's place. So the captured
+// aperture gives the light field's own weights back, whatever steps they stand on.
+double ShareLeft(const model::LightField& light_field, double radius,
+                 const Eigen::Vector2d& position) {
   // A view on the rim of a disc is inside.
   const Eigen::Vector2d inward = position * (1 - kRounding);
   if (!light_field.camera) return inward.norm() <= radius ? 1 : 0;
-  return model::ApertureTransmission(light_field.camera->psf, light_field.camera->blur_ratio(),
-                                     radius, inward);
+  const model::Camera& camera = *light_field.camera;
+  if (camera.psf == model::Psf::kDisc) {
+    return model::ApertureTransmission(camera.psf, camera.blur_ratio(), radius, inward);
+  }
+  // exp(-|a|^2/2 (1/(kappa R)^2 - 1/(kappa r)^2)); written so that R = r gives 1 exactly.
+  const double ratio = radius / camera.lens.aperture_radius_mm;
+  const double deviations = position.norm() / (camera.blur_ratio() * radius);
+  return radius > 0 ? std::exp(-deviations * deviations / 2 * (1 - ratio * ratio)) : 0.0;
 }
 
 // The same weight for the present views that are nearest to the centre, none for the others.
@@ -221,6 +230,9 @@ model::LinearPicture Photograph(const model::LightField& light_field,
   std::vector<std::vector<float>> irradiance;
   if (falloff && light_field.camera) irradiance = FalloffOfViews(light_field, present, threads);
 
+  // As the rays were taken apart, so they are put together.
+  const kernels::Splat splat =
+      light_field.origin.splat == "nearest" ? kernels::Splat::kNearest : kernels::Splat::kBilinear;
   model::LinearPicture photograph =
       BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
   for (int channel = 0; channel < light_field.channels; ++channel) {
@@ -232,7 +244,7 @@ model::LinearPicture Photograph(const model::LightField& light_field,
         for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
       });
     }
-    const std::vector<float> pixels = kernels->FormPicture(whole, kernels::Splat::kBilinear, rays);
+    const std::vector<float> pixels = kernels->FormPicture(whole, splat, rays);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       photograph.values[i * Index(light_field.channels) + Index(channel)] = pixels[i];
     }
@@ -246,11 +258,19 @@ Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double ra
     throw Error(fmt::format("aperture radius is {} {}: it must be finite and >= 0", radius,
                             light_field.camera ? "mm" : "view steps"));
   }
+  if (light_field.camera &&
+      radius > light_field.camera->lens.aperture_radius_mm * (1 + kRounding)) {
+    throw Error(fmt::format(
+        "aperture radius is {} mm: it must be at most that of the camera, {} mm; light from beyond "
+        "it was never captured",
+        radius, light_field.camera->lens.aperture_radius_mm));
+  }
   Eigen::ArrayXXd weights = Eigen::ArrayXXd::Zero(light_field.v_count, light_field.u_count);
   for (int l = 0; l < light_field.v_count; ++l) {
     for (int k = 0; k < light_field.u_count; ++k) {
       if (!light_field.IsPresent(k, l)) continue;
-      weights(l, k) = TransmissionAt(light_field, radius, AperturePosition(light_field, k, l));
+      weights(l, k) = light_field.weights(l, k) *
+                      ShareLeft(light_field, radius, AperturePosition(light_field, k, l));
     }
   }
   // So narrow a Gaussian that its tail underflows leaves no view either.

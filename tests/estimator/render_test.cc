@@ -248,6 +248,35 @@ TEST(Photograph, RefusesWeightsThatDoNotFit) {
   EXPECT_THAT(error_for(only_absent), HasSubstr("present"));
 }
 
+// A light field that was estimated with whole rays to the nearest pixel is put together so.
+TEST(Photograph, PutsWholeRaysToTheNearestPixelWhereTheEstimateDid) {
+  model::LightField field = RandomField(15, 11, 5, 3, 1, 33);
+  field.landing_step_px = {0.7, -1.35};
+  field.origin.splat = "nearest";
+  const Eigen::ArrayXXd weights = RandomWeights(5, 3, 34);
+  const model::LinearPicture picture = TakePhotograph(field, weights, false);
+  std::vector<double> sum(15 * 11, 0.0);
+  std::vector<double> weight(15 * 11, 0.0);
+  for (int l = 0; l < 3; ++l) {
+    for (int k = 0; k < 5; ++k) {
+      for (int t = 0; t < 11; ++t) {
+        for (int s = 0; s < 15; ++s) {
+          const double x = std::floor(s + 0.7 * (k - 2) + 0.5);
+          const double y = std::floor(t - 1.35 * (l - 1) + 0.5);
+          if (!(x >= 0 && x < 15 && y >= 0 && y < 11)) continue;
+          const auto i = static_cast<std::size_t>(y * 15 + x);
+          sum[i] += weights(l, k) * model::ViewPicture(field, k, l).at(s, t, 0);
+          weight[i] += weights(l, k);
+        }
+      }
+    }
+  }
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    ASSERT_GT(weight[i], 0);
+    EXPECT_NEAR(picture.values[i], sum[i] / weight[i], 1e-6) << i;
+  }
+}
+
 // --- Fall-off, as the estimator uses it.
 
 TEST(RelativeFalloff, IsTheIrradianceOverThatAtThePrincipalPoint) {
@@ -342,24 +371,39 @@ TEST(RelativeFalloff, RefusesWeightsThatDoNotFit) {
 
 // --- Other apertures.
 
-TEST(WeightsForRadius, IsAGaussianOfKappaTimesTheRadius) {
-  for (const model::LightFieldPlanes& planes : {kInFocus, kOffFocus}) {
+TEST(WeightsForRadius, TheCapturedApertureGivesTheOwnWeights) {
+  for (const model::Psf psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
     model::LightField field = RandomField(4, 3, 5, 3, 1, 16);
+    AddCamera(&field, kInFocus, psf);
+    field.weights = model::ApertureWeights(model::ApertureShapeOf(psf), 5, 3);
+    const Eigen::ArrayXXd weights = WeightsForRadius(field, field.camera->lens.aperture_radius_mm);
+    EXPECT_LT((weights - field.weights).abs().maxCoeff(), 1e-12);
+  }
+}
+
+// The blur of a smaller aperture is kappa R. The samples are few, so only nearly: they carry kappa
+// r exactly, and the Gaussian between them is cut at two standard deviations.
+TEST(WeightsForRadius, ASmallerApertureCarriesItsOwnBlur) {
+  for (const model::LightFieldPlanes& planes : {kInFocus, kOffFocus}) {
+    model::LightField field = RandomField(4, 3, 9, 9, 1, 16);
     AddCamera(&field, planes);
-    const double radius_mm = 2.1;
-    const Eigen::ArrayXXd weights = WeightsForRadius(field, radius_mm);
-    EXPECT_NEAR(weights.sum(), 1, 1e-12);
-    // GridOnPlanes takes care that the steps on the aperture are those of the samples.
+    field.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 9, 9);
     const model::ApertureSamples samples =
-        model::SampleAperture(model::Psf::kGaussian, 0.45, 4.46, 5, 3);
-    const double sigma_mm = 0.45 * radius_mm;
-    for (int l = 0; l < 3; ++l) {
-      for (int k = 0; k < 5; ++k) {
-        const double x_mm = (k - 2) * samples.u_step_mm;
-        const double y_mm = (l - 1) * samples.v_step_mm;
-        EXPECT_NEAR(weights(l, k) / weights(1, 2),
-                    std::exp(-(x_mm * x_mm + y_mm * y_mm) / (2 * sigma_mm * sigma_mm)), 1e-7);
+        model::SampleAperture(model::Psf::kGaussian, 0.45, 4.46, 9, 9);
+    double before = 2;
+    for (const double share : {0.9, 0.7, 0.5, 0.35}) {
+      const Eigen::ArrayXXd weights = WeightsForRadius(field, share * 4.46);
+      EXPECT_NEAR(weights.sum(), 1, 1e-12);
+      double moment = 0;
+      for (int l = 0; l < 9; ++l) {
+        for (int k = 0; k < 9; ++k) {
+          moment += weights(l, k) * std::pow((k - 4) * samples.u_step_mm, 2);
+        }
       }
+      const double blur_ratio = std::sqrt(moment) / (0.45 * 4.46);
+      EXPECT_NEAR(blur_ratio, share, 0.05) << share;
+      EXPECT_LT(blur_ratio, before);
+      before = blur_ratio;
     }
   }
 }
@@ -378,6 +422,7 @@ TEST(WeightsForRadius, IsADiscOfTwiceKappaTimesTheRadius) {
       return views;
     };
     const double radius_mm = std::sqrt(squared_steps) * step_mm / (2 * 0.45);
+    if (radius_mm > field.camera->lens.aperture_radius_mm) break;
     const Eigen::ArrayXXd on_rim = WeightsForRadius(field, radius_mm);
     EXPECT_EQ((on_rim > 0).count(), views_within(squared_steps)) << squared_steps;
     EXPECT_NEAR(on_rim.maxCoeff(), 1.0 / views_within(squared_steps), 1e-12);
@@ -423,6 +468,10 @@ TEST(WeightsForRadius, RefusesWhatIsNoRadius) {
   const model::LightField field = RandomField(4, 3, 3, 3, 1, 23);
   EXPECT_THAT(ErrorOf([&] { WeightsForRadius(field, -1); }), HasSubstr("-1 view steps"));
   EXPECT_THAT(ErrorOf([&] { WeightsForRadius(field, std::nan("")); }), HasSubstr("nan"));
+  model::LightField with_camera = field;
+  AddCamera(&with_camera, kInFocus);
+  EXPECT_THAT(ErrorOf([&] { WeightsForRadius(with_camera, 4.5); }),
+              AllOf(HasSubstr("4.5 mm"), HasSubstr("4.46 mm"), HasSubstr("never captured")));
 }
 
 // --- Refocusing.

@@ -185,7 +185,8 @@ std::string ApertureText(const RenderOptions& options, const model::LightField& 
 
 Rendering RenderPhotograph(const RenderOptions& options, const model::LightField& light_field) {
   std::string notice;
-  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice);
+  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
+                                            ThrowIfInterrupted);
   if (!notice.empty()) spdlog::warn("{}", notice);
   spdlog::debug("device: {}", backend->description());
   const auto kernels = backend->NewFloat();

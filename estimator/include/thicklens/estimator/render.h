@@ -16,11 +16,13 @@ model::LinearPicture Photograph(const model::LightField& light_field,
                                 const Eigen::ArrayXXd& weights, bool falloff,
                                 kernels::Kernels<float>* kernels, int threads);
 
-// The weights (sum 1) of an aperture of another radius R over the same views: transmission at the
-// place where each crosses the aperture, kappa R wide (Gaussian) or within 2 kappa R (disc), R in
-// mm. Without a camera there is no kappa: a disc of radius R in view steps. R = 0, and an aperture
-// that meets no view, is the view (or views) nearest to the centre. Views that are not present have
-// no share.
+// The weights of a smaller aperture over the same views, V x U, sum 1: the light field's own ones,
+// those of the captured aperture of radius r, times what radius R leaves of each:
+// exp(-|a|^2/2 (1/(kappa R)^2 - 1/(kappa r)^2)) for a Gaussian, 1 within 2 kappa R for a disc, a
+// the view's place on the aperture; derived here. R = r gives the captured aperture. R is in mm
+// with a camera, and must be at most r; without one the aperture is a disc of R view steps. R = 0,
+// and an aperture that meets no view, is the view (or views) nearest to the centre. Absent views
+// have 0.
 Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius);
 
 // The photograph refocused: views shifted so that points of that disparity (px per view step)
