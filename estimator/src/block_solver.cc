@@ -33,6 +33,14 @@ double SecondsSince(Clock::time_point start) {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
+double LargestDisparityPx(const DisparityMap& map) {
+  double largest = 0;
+  for (const float value : map.disparity) {
+    largest = std::max(largest, static_cast<double>(std::abs(value)));
+  }
+  return largest * map.step.cwiseAbs().maxCoeff();
+}
+
 // A file or field must be named by whoever read it; here the numbers are.
 void CheckInput(const EstimateInput& input) {
   const auto fail = [](const std::string& what) { throw Error("estimate: " + what); };
@@ -60,6 +68,14 @@ void CheckInput(const EstimateInput& input) {
                    [](float value) { return std::isfinite(value); })) {
     fail("the disparity has holes: they must be filled");
   }
+  const double widest_px = LargestDisparityPx(input.disparity);
+  const int size_px = std::max(picture.width_px, picture.height_px);
+  if (!(widest_px <= size_px)) {
+    fail(
+        fmt::format("the largest disparity is {:.4g} px per view step: it must be at most the "
+                    "picture's size, {} px; is its scale right?",
+                    widest_px, size_px));
+  }
   if (input.weights.size() < 2) {
     fail(fmt::format("views are {}x{}: a light field needs at least two", input.weights.cols(),
                      input.weights.rows()));
@@ -70,6 +86,12 @@ void CheckInput(const EstimateInput& input) {
   }
   if (input.grid.has_value() != input.camera.has_value()) {
     fail("a camera and a grid come together");
+  }
+  if (input.grid && input.grid->planes.uv_depth_mm != 0) {
+    fail(fmt::format(
+        "the UV plane lies at depth {} mm: it must be the aperture (0), where a view has one "
+        "transmission for all its rays",
+        input.grid->planes.uv_depth_mm));
   }
   if (input.grid &&
       (input.grid->s_count != picture.width_px || input.grid->t_count != picture.height_px ||
@@ -103,59 +125,166 @@ double ResidentBytes() {
 }
 
 // Bytes of a block's system beside its factor: patterns of its parts and of their sum, values, the
-// matrix, the solver's 64-bit copy of it; H, D, their transposes and the vectors. What malloc
-// cannot use again between blocks comes on top, about a seventh.
+// matrix, the solver's 64-bit copy of it; H, D, their transposes and the vectors.
 double SystemBytes(const kernels::CsrMatrix<double>& matrix) {
   constexpr double kPerEntry = 3 * 4 + 8 + 12 + 16;
   constexpr double kPerRay = 3 * 12 * 4 + 10 * 8;
   return kPerEntry * static_cast<double>(matrix.entries()) + kPerRay * matrix.rows;
 }
-constexpr double kLeftBetweenBlocks = 1.15;
+// What malloc cannot use again between blocks, whose sizes differ, comes on top; measured. UMFPACK
+// tells a bound for the worst pivots, which blocks stay well below.
+double LeftBetweenBlocks(BlockSolver solver) {
+  return solver == BlockSolver::kUmfpack ? 1.1 : 1.35;
+}
 // A thread's stack and heap, and what the BLAS keeps for it.
 constexpr double kBytesPerThread = 12 * kBytesPerMib;
 
-// What the process will hold while blocks of this size are solved on all threads.
+// Pixels of the disparity map that a block looks at, in px per view step of the larger step.
+struct BlockSlopes {
+  double largest_px = 0;  // |m|
+  double range_px = 0;
+  // Taps of the links between neighbouring views that stay in the block: one where m is whole, else
+  // two, none beside an edge of depth. Links make fill.
+  double taps = 0;
+};
+
+BlockSlopes SlopesIn(const DisparityMap& map, const model::PixelRect& rect) {
+  constexpr double kEdgePx = 0.3;
+  constexpr double kWholePx = 1e-6;
+  const double px_per_unit = map.step.cwiseAbs().maxCoeff();
+  const auto at = [&](int x, int y) {
+    return px_per_unit * map.disparity[Index(y) * Index(map.width_px) + Index(x)];
+  };
+  double least_px = at(rect.x, rect.y);
+  double most_px = least_px;
+  double taps = 0;
+  for (int y = rect.y; y < rect.y + rect.height; ++y) {
+    for (int x = rect.x; x < rect.x + rect.width; ++x) {
+      const double m_px = at(x, y);
+      least_px = std::min(least_px, m_px);
+      most_px = std::max(most_px, m_px);
+      if (x + 1 < rect.x + rect.width && std::abs(at(x + 1, y) - m_px) > kEdgePx) continue;
+      if (y + 1 < rect.y + rect.height && std::abs(at(x, y + 1) - m_px) > kEdgePx) continue;
+      const double of_link = std::abs(m_px - std::round(m_px)) < kWholePx ? 1 : 2;
+      taps += of_link * (std::max(0.0, 1 - std::abs(m_px) / rect.width) +
+                         std::max(0.0, 1 - std::abs(m_px) / rect.height));
+    }
+  }
+  return {std::max(std::abs(least_px), std::abs(most_px)), most_px - least_px, taps};
+}
+
+// What the process will hold at most while blocks of a size are solved on all threads: what it
+// holds now, the whole light field twice (on the device and as the result), and for each block at
+// work its system and the peak of its factorisation.
 class MemoryForecast {
  public:
   MemoryForecast(const RayField& rays, const BlockOptions& options, double ridge, int threads,
                  Kernels<double>* kernels)
-      : rays_(rays), options_(options), ridge_(ridge), threads_(threads), kernels_(kernels) {}
+      : rays_(rays), options_(options), ridge_(ridge), threads_(threads), kernels_(kernels) {
+    BlockBytes({0, 0, 1, 1});  // a device's programs are held from their first use on
+    held_bytes_ =
+        ResidentBytes() + 2.0 * sizeof(float) * static_cast<double>(rays_.prior().values.size());
+  }
 
-  // Bytes of the largest number of blocks at work at once, with what is held already and the whole
-  // light field, twice: on the device and as the result.
-  double Bytes(int block_px) const {
-    const model::LinearPicture& picture = rays_.input().picture;
-    const int width_px = std::min(block_px, picture.width_px);
-    const int height_px = std::min(block_px, picture.height_px);
-    // The middle of the picture stands for all: fill depends little on the slopes.
-    const BlockSystem system =
-        MakeBlockSystem(rays_,
-                        rays_.Block((picture.width_px - width_px) / 2,
-                                    (picture.height_px - height_px) / 2, width_px, height_px),
-                        options_, ridge_, kernels_);
-    const double of_factor = NewLinearSolver(options_.solver, options_.stencil == Stencil::kWarp)
-                                 ->PredictBytes(system.matrix);
-    const double of_block =
-        kBytesPerThread + kLeftBetweenBlocks * (SystemBytes(system.matrix) + of_factor);
-    const auto blocks = CutInBlocks(picture.width_px, picture.height_px, block_px).size();
-    const double at_once = std::min<double>(threads_, static_cast<double>(blocks));
-    const double whole = 2.0 * sizeof(float) * static_cast<double>(rays_.prior().values.size());
-    return ResidentBytes() + whole + at_once * of_block;
+  // By the structure of the system of the most demanding of a few blocks.
+  double Bytes(int block_px) {
+    double largest = 0;
+    for (const model::PixelRect& rect : DemandingBlocks(block_px)) {
+      largest = std::max(largest, BlockBytes(rect));
+    }
+    bytes_per_pixel_ = std::max(bytes_per_pixel_, largest / PixelsOf(block_px));
+    return held_bytes_ + AtOnce(block_px) * (kBytesPerThread + largest);
+  }
+
+  // No more than Bytes, without making a system: what H^T H alone holds, where each ray meets those
+  // of all views that land on its pixel, as matrix and as the solver's copy; and what smaller
+  // blocks were found to need for each pixel, since fill grows faster than their number.
+  double LeastBytes(int block_px) const {
+    constexpr double kPerEntry = 12 + 16;
+    const double views = static_cast<double>((rays_.input().weights > 0).count());
+    const double per_pixel = std::max(kPerEntry * views * views, bytes_per_pixel_);
+    return held_bytes_ + AtOnce(block_px) * (kBytesPerThread + per_pixel * PixelsOf(block_px));
   }
 
  private:
+  double PixelsOf(int block_px) const {
+    const model::LinearPicture& picture = rays_.input().picture;
+    return static_cast<double>(std::min(block_px, picture.width_px)) *
+           std::min(block_px, picture.height_px);
+  }
+  double AtOnce(int block_px) const {
+    const model::LinearPicture& picture = rays_.input().picture;
+    const auto blocks = CutInBlocks(picture.width_px, picture.height_px, block_px).size();
+    return std::min<double>(threads_, static_cast<double>(blocks));
+  }
+
+  // Of the blocks of full size: the middle, and those of the largest disparity, the largest range
+  // of it and the most links. Fill is not known before the analysis, but goes with these.
+  std::vector<model::PixelRect> DemandingBlocks(int block_px) const {
+    const EstimateInput& input = rays_.input();
+    const int width_px = std::min(block_px, input.picture.width_px);
+    const int height_px = std::min(block_px, input.picture.height_px);
+    const model::PixelRect middle{(input.picture.width_px - width_px) / 2,
+                                  (input.picture.height_px - height_px) / 2, width_px, height_px};
+    std::vector<model::PixelRect> chosen(4, middle);
+    BlockSlopes most = SlopesIn(input.disparity, middle);
+    const auto keep_larger = [](double value, double* largest, const model::PixelRect& rect,
+                                model::PixelRect* of_largest) {
+      if (!(value > *largest)) return;
+      *largest = value;
+      *of_largest = rect;
+    };
+    for (const model::PixelRect& rect :
+         CutInBlocks(input.picture.width_px, input.picture.height_px, block_px)) {
+      if (rect.width < width_px || rect.height < height_px) continue;
+      const BlockSlopes slopes = SlopesIn(input.disparity, rect);
+      keep_larger(slopes.largest_px, &most.largest_px, rect, &chosen[1]);
+      keep_larger(slopes.range_px, &most.range_px, rect, &chosen[2]);
+      keep_larger(slopes.taps, &most.taps, rect, &chosen[3]);
+    }
+    std::vector<model::PixelRect> different;
+    for (const model::PixelRect& rect : chosen) {
+      const auto is_same = [&](const model::PixelRect& other) {
+        return other.x == rect.x && other.y == rect.y;
+      };
+      if (std::none_of(different.begin(), different.end(), is_same)) different.push_back(rect);
+    }
+    return different;
+  }
+
+  double BlockBytes(const model::PixelRect& rect) const {
+    const BlockSystem system = MakeBlockSystem(
+        rays_, rays_.Block(rect.x, rect.y, rect.width, rect.height), options_, ridge_, kernels_);
+    const double of_factor = NewLinearSolver(options_.solver, options_.stencil == Stencil::kWarp)
+                                 ->PredictBytes(system.matrix);
+    return LeftBetweenBlocks(options_.solver) * (SystemBytes(system.matrix) + of_factor);
+  }
+
   const RayField& rays_;
   const BlockOptions& options_;
   const double ridge_;
   const int threads_;
   Kernels<double>* kernels_;
+  double held_bytes_ = 0;
+  double bytes_per_pixel_ = 0;  // the most of the blocks looked at so far
 };
 
 // Sizes to choose from: multiples of 2, each about a quarter larger than the one before.
 int NextBlockPx(int block_px) { return std::max(block_px + 2, (block_px * 5 / 4) / 2 * 2); }
 
+// The bytes of blocks of this size, or a number above the limit that they need at least. Systems
+// that could not be held are not made: smaller ones tell how much larger ones need.
+double BytesUpTo(double limit, int block_px, int first_px, MemoryForecast* forecast) {
+  for (int px = first_px;; px = std::min(2 * px, block_px)) {
+    const double least = forecast->LeastBytes(block_px);
+    if (least > limit) return least;
+    if (px >= block_px) return forecast->Bytes(block_px);
+    forecast->Bytes(px);
+  }
+}
+
 int ChooseBlockPx(const BlockOptions& options, const model::LinearPicture& picture,
-                  const MemoryForecast& forecast, double* bytes) {
+                  MemoryForecast forecast, double* bytes) {
   const int whole_px = std::max(picture.width_px, picture.height_px);
   if (!options.memory_limit_mib) {
     const int block_px = std::min(options.block_px.value_or(kDefaultBlockPx), whole_px);
@@ -164,12 +293,13 @@ int ChooseBlockPx(const BlockOptions& options, const model::LinearPicture& pictu
   }
   const double limit = *options.memory_limit_mib * kBytesPerMib;
   constexpr int kSmallestPx = 2;
+  constexpr int kFirstLookPx = 8;
   const int first_px = std::min(options.block_px.value_or(kSmallestPx), whole_px);
-  *bytes = forecast.Bytes(first_px);
+  *bytes = BytesUpTo(limit, first_px, std::min(kFirstLookPx, first_px), &forecast);
   if (*bytes > limit) {
     throw Error(fmt::format(
-        "memory limit {:.0f} MiB: blocks of {} px need {:.0f} MiB in all; the limit must be at "
-        "least that{}",
+        "memory limit {:.0f} MiB: blocks of {} px need {:.0f} MiB in all, if not more; the limit "
+        "must be at least that{}",
         *options.memory_limit_mib, first_px, std::ceil(*bytes / kBytesPerMib),
         options.block_px ? ", or the blocks smaller" : ", or the views or threads fewer"));
   }
@@ -177,6 +307,7 @@ int ChooseBlockPx(const BlockOptions& options, const model::LinearPicture& pictu
   int block_px = first_px;
   while (block_px < whole_px) {
     const int next_px = std::min(NextBlockPx(block_px), whole_px);
+    if (forecast.LeastBytes(next_px) > limit) break;
     const double next_bytes = forecast.Bytes(next_px);
     if (next_bytes > limit) break;
     block_px = next_px;

@@ -91,11 +91,12 @@ bool RayField::ShowsSamePoint(int view, double s, double t, double disparity) co
   const int height = input_.picture.height_px;
   const double px_per_unit =
       std::max(std::abs(input_.disparity.step.x()), std::abs(input_.disparity.step.y()));
+  // Before they become integers; NaN is outside, too.
+  if (!(s >= 0 && s <= width - 1 && t >= 0 && t <= height - 1)) return false;
   const int s0 = static_cast<int>(std::floor(s));
   const int t0 = static_cast<int>(std::floor(t));
   const int s1 = s > s0 ? s0 + 1 : s0;
   const int t1 = t > t0 ? t0 + 1 : t0;
-  if (s0 < 0 || t0 < 0 || s1 >= width || t1 >= height) return false;
   const std::vector<float>& map = disparity_[Index(view)];
   for (const int tt : {t0, t1}) {
     for (const int ss : {s0, s1}) {

@@ -30,25 +30,27 @@ model::LightField FrameOf(const EstimateInput& input) {
   return frame;
 }
 
-// The picture as radiance: divided by what the fall-off leaves of a uniform radiance.
-model::LinearPicture RadianceOf(const EstimateInput& input, bool falloff, int threads) {
-  model::LinearPicture radiance = input.picture;
-  if (!falloff || !input.camera) return radiance;
+}  // namespace
+
+model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
+                                    const model::LightFieldGrid& grid, const model::Camera& camera,
+                                    const Eigen::ArrayXXd& weights, int threads) {
   const std::vector<float> share =
-      FalloffOfPicture(*input.grid, *input.camera, input.weights, input.picture.width_px,
-                       input.picture.height_px, threads);
+      FalloffOfPicture(grid, camera, weights, photograph.width_px, photograph.height_px, threads);
+  model::LinearPicture radiance = photograph;
   for (std::size_t i = 0; i < radiance.values.size(); ++i) {
     radiance.values[i] /= share[i / Index(radiance.channels)];
   }
   return radiance;
 }
 
-}  // namespace
-
 model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int threads,
                                  std::vector<std::vector<float>>* disparity) {
   model::LightField warped = FrameOf(input);
-  const model::LinearPicture radiance = RadianceOf(input, falloff, threads);
+  const model::LinearPicture radiance =
+      falloff && input.camera
+          ? WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, threads)
+          : input.picture;
   const int views = warped.u_count * warped.v_count;
   if (disparity != nullptr) disparity->resize(Index(views));
   model::ParallelFor(views, threads, [&](int view) {

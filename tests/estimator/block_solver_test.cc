@@ -62,8 +62,8 @@ EstimateInput MakeInput(const MadeUp& made_up) {
   return input;
 }
 
-// A camera whose grid has neither ST in the plane of focus nor UV on the aperture: rays land
-// between the pixels.
+// A camera whose grid may have ST elsewhere than in the plane of focus: then rays land between the
+// pixels.
 EstimateInput MakeCameraInput(const MadeUp& made_up, const model::LightFieldPlanes& planes,
                               double depth_mm, double slope_mm_per_px) {
   model::Camera camera;
@@ -273,7 +273,7 @@ TEST(BlockSolver, SolvesItWithACamera) {
 }
 
 TEST(BlockSolver, SolvesItOnPlanesWhereRaysLandBetweenPixels) {
-  const EstimateInput input = MakeCameraInput({}, {100, 500}, 700, 10);
+  const EstimateInput input = MakeCameraInput({}, {0, 500}, 700, 10);
   ASSERT_GT(std::abs(WarpedLightField(input, true, 1).landing_step_px.x()), 0.2);
   ExpectDenseSolution(input, OneBlock());
 }
@@ -434,6 +434,11 @@ TEST(BlockSolver, RefusesWhatCannotBeMeant) {
   input.picture.values[3] = std::numeric_limits<float>::infinity();
   EXPECT_THAT(message(input, {}), HasSubstr("not finite"));
   input = good;
+  input.disparity.disparity[3] = 12.5F;
+  EXPECT_THAT(message(input, {}), AllOf(HasSubstr("12.5 px per view step"), HasSubstr("12 px")));
+  input = MakeCameraInput({}, {100, 500}, 700, 10);
+  EXPECT_THAT(message(input, {}), AllOf(HasSubstr("UV plane"), HasSubstr("100 mm")));
+  input = good;
   input.picture.channels = 2;
   EXPECT_THAT(message(input, {}), HasSubstr("2 channels"));
 }
@@ -458,6 +463,12 @@ TEST(BlockSolver, TheMemoryLimitChoosesTheBlocks) {
   EstimateByBlocks(input, options, Twin().get(), &summary);
   EXPECT_EQ(summary.block_px, 64);
   const double all = summary.predicted_memory_mib;
+  // Known to be too much from smaller blocks.
+  options.block_px = 64;
+  options.memory_limit_mib = 0.7 * all;
+  EXPECT_THAT(ErrorOf([&] { EstimateByBlocks(input, options, Twin().get(), &summary); }),
+              AllOf(HasSubstr("blocks of 64 px need"), HasSubstr("or the blocks smaller")));
+  options.memory_limit_mib.reset();
   options.block_px = 4;
   EstimateByBlocks(input, options, Twin().get(), &summary);
   EXPECT_EQ(summary.block_px, 4);
@@ -493,7 +504,7 @@ TEST(BlockSolver, ProgressCountsBlocksAndMayStop) {
 
 // Rays that land beside the picture are in no block.
 TEST(BlockSolver, RaysBesideThePictureKeepThePrior) {
-  const EstimateInput input = MakeCameraInput({}, {100, 500}, 700, 10);
+  const EstimateInput input = MakeCameraInput({}, {0, 500}, 700, 10);
   EstimateSummary summary;
   const model::LightField found = EstimateByBlocks(input, {}, Twin().get(), &summary);
   const model::LightField prior = WarpedLightField(input, true, 1);

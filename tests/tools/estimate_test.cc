@@ -284,6 +284,37 @@ TEST_F(EstimateTest, SettingsThatCannotBe) {
   }
 }
 
+// What is given and not used would leave a person with a wrong idea of the result.
+TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
+  const Arguments relative = AsDisparity(Picture(), Disparity());
+  EXPECT_THAT(Refusal(With(relative, {"--st-depth-mm", "700"}), 2), HasSubstr("--camera"));
+  EXPECT_THAT(Refusal(With(relative, {"--sparse"}), 2), HasSubstr("--aperture-of"));
+  EXPECT_THAT(Refusal(With(relative, {"--grid", "9"}), 2), HasSubstr("--aperture-of"));
+  EXPECT_THAT(Refusal(With(relative, {"--aperture-of", "x", "--aperture-shape", "disc"}), 2),
+              HasSubstr("exclude"));
+  EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--camera", Camera(),
+                       "--transfer", "linear"},
+                      2),
+              HasSubstr("--transfer"));
+  EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "100x3"}, 2),
+              HasSubstr("from 1 to 99"));
+}
+
+TEST_F(EstimateTest, DepthFarFromFocusIsTold) {
+  const Arguments camera = {"--depth-kind", "z",       "--depth-unit", "mm",       "--camera",
+                            Camera(),       "--views", "3x3",          "--device", "cpu"};
+  const ProgramResult far = Run(With({Picture(), Depth([](int, int) { return 4000; })}, camera));
+  EXPECT_EQ(far.exit_code, 0) << far.err;
+  EXPECT_THAT(far.err, AllOf(HasSubstr("4000 mm"), HasSubstr("800 mm"), HasSubstr("depth-unit")));
+  const ProgramResult near = Run(With({Picture(), Depth([](int, int) { return 900; })}, camera));
+  EXPECT_THAT(near.err, ::testing::Not(HasSubstr("depth-unit")));
+}
+
+TEST_F(EstimateTest, DisparityBeyondThePicture) {
+  EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()), {"--disparity-scale", "1e6"})),
+              AllOf(HasSubstr("px per view step"), HasSubstr("36 px")));
+}
+
 TEST_F(EstimateTest, AFolderWithOtherThingsIsLeftAlone) {
   folder_.Put("lf/thesis.txt", "years of work");
   const ProgramResult result = Run(AsDisparity(Picture(), Disparity()));
@@ -296,6 +327,48 @@ TEST_F(EstimateTest, AFailingRunLeavesTheOlderLightField) {
   const std::string before = ContentOf(Output() + "/lightfield.yaml");
   EXPECT_EQ(Run(With(AsDisparity(Picture(), Disparity()), {"--ridge", "0"})).exit_code, 1);
   EXPECT_EQ(ContentOf(Output() + "/lightfield.yaml"), before);
+}
+
+TEST_F(EstimateTest, TheMemoryLimitHolds) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer needs memory of its own";
+#endif
+  // The middle is flat and in focus: only the sides tell how much memory blocks need.
+  constexpr int kWide = 144;
+  constexpr int kHigh = 96;
+  model::StoredPicture picture{kWide, kHigh, 1, 8, {}};
+  model::RawDepthMap map{kWide, kHigh, {}, false};
+  for (int i = 0; i < kWide * kHigh; ++i) {
+    picture.values.push_back(static_cast<std::uint16_t>(i * 7919 % 256));
+    const double beside = std::max(0.0, std::abs(i % kWide - kWide / 2) - 36.0);
+    map.values.push_back(static_cast<float>(2.5 * beside / 36));
+  }
+  const Arguments good = With(AsDisparity(folder_.Put("slanted.png", EncodePng(picture)),
+                                          folder_.Put("slanted.pfm", EncodePfm(map))),
+                              {"--threads", "2"});
+  const std::string json = folder_ / "estimate.json";
+  const auto summary_of = [&](const Arguments& more) {
+    const ProgramResult result = Run(With(With(good, {"--json", json}), more));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(ContentOf(json));
+  };
+  for (const std::string solver : {"umfpack", "cholmod", "eigen"}) {
+    if (!estimator::IsBuiltIn(estimator::BlockSolverFromName(solver))) continue;
+    SCOPED_TRACE(solver);
+    // As much as 16 px need binds, and is enough for them, whatever the program holds here.
+    const nlohmann::json free = summary_of({"--block-solver", solver});
+    EXPECT_LE(free["peak_rss_mib"].get<double>(), free["predicted_memory_mib"].get<double>());
+    const int limit_mib = static_cast<int>(free["predicted_memory_mib"].get<double>()) + 4;
+    const nlohmann::json bound =
+        summary_of({"--block-solver", solver, "--memory-limit", std::to_string(limit_mib)});
+    EXPECT_GE(bound["block_px"], 10);
+    EXPECT_LE(bound["block_px"], 24);
+    EXPECT_LE(bound["peak_rss_mib"].get<double>(), limit_mib);
+  }
+  fs::remove_all(Output());
+  // Refused before a system is made that would not fit.
+  EXPECT_THAT(Refusal(With(good, {"--block-px", "144", "--memory-limit", "150"})),
+              AllOf(HasSubstr("memory limit 150 MiB"), HasSubstr("blocks of 144 px")));
 }
 
 TEST_F(EstimateTest, AnInterruptLeavesNothing) {
@@ -356,6 +429,47 @@ TEST_F(EstimateTest, SlowARealRoomOfAKinect) {
                                     .Wait();
   ASSERT_EQ(compare.exit_code, 0) << compare.err;
   EXPECT_GT(nlohmann::json::parse(ContentOf(compared))["psnr_db"].get<double>(), 45);
+}
+
+// A flat scene in the plane of focus of a wide camera: all views alike, the photograph sharp but
+// dark in the corners. Warping it must not be blamed for the fall-off.
+TEST_F(EstimateTest, TheBaselineIsRadianceToo) {
+  model::Camera camera = model::ParseCamera(CameraYaml(kWidth, kHeight), "wide");
+  camera.sensor.pixel_pitch_mm = 0.4;
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  model::LightField truth = model::MakeLightField(kWidth, kHeight, 3, 3, 3);
+  truth.grid = grid;
+  truth.camera = camera;
+  truth.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
+  const model::LinearPicture view = model::ToLinear(RandomPicture(3, 8), truth.transfer);
+  for (int l = 0; l < 3; ++l) {
+    for (int k = 0; k < 3; ++k) model::SetView(&truth, k, l, view);
+  }
+  const std::string folder = folder_ / "truth";
+  model::OutputFolder output(folder, kLightFieldMarker, LightFieldEntries());
+  WriteLightField(truth, ViewFormat::kTiff, &output);
+  output.Commit();
+
+  const std::string photo = folder_ / "photo.png";
+  const ProgramResult render = ChildProgram({"render", folder, "--as-captured", "--bits", "16",
+                                             "--device", "cpu", "-o", photo},
+                                            scratch_.path(), 0)
+                                   .Wait();
+  ASSERT_EQ(render.exit_code, 0) << render.err;
+  const std::string depth = Depth([](int, int) { return 800; });
+  const auto dibr_db = [&](const Arguments& more) {
+    const std::string json = folder_ / "compared.json";
+    const ProgramResult result =
+        ChildProgram(With({"compare", folder, folder, "--dibr", photo, depth, "--depth-kind", "z",
+                           "--depth-unit", "mm", "--json", json},
+                          more),
+                     scratch_.path(), 0)
+            .Wait();
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(ContentOf(json))["dibr"]["mean"]["psnr_db"].get<double>();
+  };
+  EXPECT_GT(dibr_db({}), 60);
+  EXPECT_LT(dibr_db({"--without", "falloff"}), 35);
 }
 
 // The road of a light field with true views, at 3 x 3 on a part of a real one.

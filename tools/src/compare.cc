@@ -23,6 +23,7 @@
 #include "option_values.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
+#include "thicklens/estimator/estimate.h"
 #include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
@@ -40,6 +41,7 @@ struct CompareOptions {
   ReadingOptions reading;
   std::vector<std::string> dibr_paths;  // none, or the photograph and its depth map
   DepthOptions depth;
+  std::vector<std::string> without;  // effects that the photograph of --dibr lacks
 };
 
 bool IsFolder(const std::string& path) {
@@ -162,6 +164,11 @@ std::optional<estimator::DibrInput> ReadDibr(const CompareOptions& options, cons
                             PrintableUtf8(options.dibr_paths.front()), dibr.photograph.width_px,
                             dibr.photograph.height_px, reference.s_count, reference.t_count));
   }
+  // Views are radiance, a photograph is not: its fall-off would count as an error of the warp.
+  if (reference.camera && options.without.empty()) {
+    dibr.photograph = estimator::WithoutFalloff(dibr.photograph, *reference.grid, *reference.camera,
+                                                reference.weights, options.common.threads);
+  }
   model::RawDepthMap map = ReadDepthMap(map_path);
   if (IsToCrop(crop, map.width_px, map.height_px))
     map = NamingTheFile(map_path, [&] { return model::CropDepth(map, *crop); });
@@ -217,8 +224,14 @@ void AddDibrOptions(CLI::App* command, CompareOptions* options) {
           ->expected(2)
           ->type_name("PHOTO DEPTH");
   AddDepthOptions(command, &options->depth);
+  command
+      ->add_option("--without", options->without,
+                   "Effects that the photograph of --dibr does not have: falloff")
+      ->check(CLI::IsMember({"falloff"}))
+      ->delimiter(',')
+      ->type_name("EFFECT");
   for (const char* name :
-       {"--depth-kind", "--depth-unit", "--disparity-scale", "--disparity-offset"}) {
+       {"--depth-kind", "--depth-unit", "--disparity-scale", "--disparity-offset", "--without"}) {
     command->get_option(name)->needs(dibr);
   }
 }

@@ -45,8 +45,8 @@ struct EstimateCommandOptions {
   int grid = 0;
   bool sparse = false;
   std::string sensor_origin;
-  std::optional<double> uv_depth_mm, plane_spacing_mm;
-  std::string transfer = "srgb";
+  std::optional<double> st_depth_mm;
+  std::string transfer;  // empty: sRGB, or the camera's
   std::string solver = "blocks";
   std::string block_solver = estimator::BlockSolverName(estimator::DefaultBlockSolver());
   std::string stencil = "warp";
@@ -105,10 +105,7 @@ Eigen::ArrayXXd ViewWeights(const EstimateCommandOptions& options,
 // The camera behind a picture, which may be a part of its sensor, and of that the crop.
 std::optional<model::Camera> CameraFor(const EstimateCommandOptions& options, int width_px,
                                        int height_px, const std::optional<model::PixelRect>& crop) {
-  if (options.camera_path.empty()) {
-    if (!options.sensor_origin.empty()) throw UsageError("--sensor-origin needs a --camera");
-    return std::nullopt;
-  }
+  if (options.camera_path.empty()) return std::nullopt;
   model::Camera camera = model::ReadCamera(options.camera_path);
   TellAssumedFields(camera);
   if (!options.sensor_origin.empty()) {
@@ -128,41 +125,64 @@ std::optional<model::Camera> CameraFor(const EstimateCommandOptions& options, in
   return crop ? model::CropCamera(camera, *crop) : camera;
 }
 
-// The default planes put ST into the plane of focus and UV on the aperture.
+// UV on the aperture, where each view has one transmission; ST in the plane of focus unless a
+// depth is given.
 model::LightFieldGrid GridFor(const EstimateCommandOptions& options, const model::Camera& camera,
                               const Eigen::ArrayXXd& weights) {
   const model::ApertureSamples samples =
       model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
-  model::LightFieldPlanes planes;
-  planes.uv_depth_mm = options.uv_depth_mm.value_or(0);
-  if (options.plane_spacing_mm) {
-    planes.plane_spacing_mm = *options.plane_spacing_mm;
-  } else if (options.uv_depth_mm) {
-    planes.plane_spacing_mm = camera.focus_depth_mm() - planes.uv_depth_mm;
-  } else {
-    planes.plane_spacing_mm =
-        model::DefaultGrid(camera, samples.u_count, samples.v_count).planes.plane_spacing_mm;
-  }
+  model::LightFieldPlanes planes =
+      model::DefaultGrid(camera, samples.u_count, samples.v_count).planes;
+  if (options.st_depth_mm) planes.plane_spacing_mm = *options.st_depth_mm;
   return model::GridOnPlanes(camera, planes, samples);
 }
 
-// Picture and depth are cut alike; one that has the crop's size already was cut before.
+// Picture and depth are cut alike. Where only one of them has the crop's size, it was cut before.
 void CutToCrop(const EstimateCommandOptions& options, const std::optional<model::PixelRect>& crop,
                model::StoredPicture* picture, model::RawDepthMap* map) {
   if (!crop) return;
-  const auto is_cut = [&](int width_px, int height_px) {
-    return width_px == crop->width && height_px == crop->height;
+  const auto was_cut = [&](int width_px, int height_px, const std::string& path) {
+    const bool cut = width_px == crop->width && height_px == crop->height &&
+                     (picture->width_px != map->width_px || picture->height_px != map->height_px);
+    if (cut) spdlog::warn("{}: has the size of --crop and is taken as it is", path);
+    return cut;
   };
-  if (is_cut(picture->width_px, picture->height_px)) {
-    spdlog::warn("{}: has the size of --crop and is taken as it is", options.picture_path);
-  } else {
-    *picture = model::CropPicture(*picture, *crop);
+  const bool cut_picture = !was_cut(picture->width_px, picture->height_px, options.picture_path);
+  const bool cut_map = !was_cut(map->width_px, map->height_px, options.depth_path);
+  if (cut_picture) *picture = model::CropPicture(*picture, *crop);
+  if (cut_map) *map = model::CropDepth(*map, *crop);
+}
+
+// Nothing that is given is left out without a word.
+void CheckUsage(const EstimateCommandOptions& options) {
+  ViewCounts(options.views);
+  CropRect(options.crop);
+  const auto needs = [](bool given, bool met, const std::string& what) {
+    if (given && !met) throw UsageError(what);
+  };
+  const bool camera = !options.camera_path.empty();
+  const bool aperture_of = !options.aperture_of.empty();
+  needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
+  needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
+  needs(!options.transfer.empty(), !camera,
+        "--transfer is for pictures without a --camera, which says it");
+  needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
+  needs(!options.aperture_shape.empty(), !aperture_of,
+        "--aperture-shape and --aperture-of exclude each other");
+}
+
+// A depth far from what the camera is focused at is possible, but more often its unit is wrong.
+void TellUnlikelyDepth(const EstimateCommandOptions& options, const model::Camera& camera,
+                       const model::DepthStatistics& depth) {
+  constexpr double kUsual = 4;
+  const double focus_depth_mm = camera.focus_depth_mm();
+  if (depth.median_mm <= kUsual * focus_depth_mm && depth.median_mm >= focus_depth_mm / kUsual) {
+    return;
   }
-  if (is_cut(map->width_px, map->height_px)) {
-    spdlog::warn("{}: has the size of --crop and is taken as it is", options.depth_path);
-  } else {
-    *map = model::CropDepth(*map, *crop);
-  }
+  spdlog::warn(
+      "{}: the median depth is {:.6g} mm, the camera is focused at {:.6g} mm; is --depth-unit "
+      "right?",
+      options.depth_path, depth.median_mm, focus_depth_mm);
 }
 
 struct Prepared {
@@ -185,8 +205,10 @@ Prepared Prepare(const EstimateCommandOptions& options) {
   Prepared prepared;
   estimator::EstimateInput& input = prepared.input;
   input.camera = CameraFor(options, full_width_px, full_height_px, crop);
-  input.transfer = input.camera ? input.camera->sensor.transfer
-                                : model::TransferCurve::FromName(options.transfer);
+  input.transfer =
+      input.camera
+          ? input.camera->sensor.transfer
+          : model::TransferCurve::FromName(options.transfer.empty() ? "srgb" : options.transfer);
   input.picture = model::ToLinear(stored, input.transfer);
   input.weights = ViewWeights(options, input.camera);
   if (input.weights.size() < 2) {
@@ -203,6 +225,9 @@ Prepared Prepare(const EstimateCommandOptions& options) {
                                 input.picture.height_px, input.camera ? &*input.camera : nullptr,
                                 input.grid ? &*input.grid : nullptr);
   input.disparity = prepared.depth.disparity;
+  if (prepared.depth.depth && options.depth.kind != "disparity") {
+    TellUnlikelyDepth(options, *input.camera, *prepared.depth.depth);
+  }
   return prepared;
 }
 
@@ -332,7 +357,8 @@ CommandResult Estimate(const EstimateCommandOptions& options) {
   ThrowIfInterrupted();
 
   std::string notice;
-  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice);
+  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
+                                            ThrowIfInterrupted);
   if (!notice.empty()) spdlog::warn("{}", notice);
   spdlog::debug("device: {}", backend->description());
 
@@ -385,9 +411,9 @@ void AddInputOptions(CLI::App* command, EstimateCommandOptions* options) {
   AddCropOption(command, &options->crop);
   command
       ->add_option("--transfer", options->transfer,
-                   "Without a camera: how light became stored values: linear, srgb or gamma-2.2")
+                   "Without a camera: how light became stored values: linear, srgb (default) or "
+                   "gamma-2.2")
       ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
-      ->capture_default_str()
       ->type_name("NAME");
 }
 
@@ -403,14 +429,9 @@ void AddLightFieldOptions(CLI::App* command, EstimateCommandOptions* options) {
       ->type_name("N");
   command->add_flag("--sparse", options->sparse, "Of --aperture-of: any set of views may be there");
   command
-      ->add_option("--uv-depth-mm", options->uv_depth_mm,
-                   "Depth zl of the UV plane; default 0, the aperture")
-      ->check(Finite())
-      ->type_name("MM");
-  command
-      ->add_option("--plane-spacing-mm", options->plane_spacing_mm,
-                   "From the UV plane on to the ST plane, d0; default: ST is the plane of focus")
-      ->check(Finite())
+      ->add_option("--st-depth-mm", options->st_depth_mm,
+                   "Depth of the ST plane (UV is the aperture); default: the plane of focus")
+      ->check(Between(0, 1e9, "millimetres"))
       ->type_name("MM");
   command->add_option("--without", options->without, "Effects to leave out: falloff")
       ->check(CLI::IsMember({"falloff"}))
@@ -477,6 +498,7 @@ void AddEstimateCommand(CLI::App* program, CommandAction* action) {
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {
+      CheckUsage(*options);
       RequireDistinctFiles(
           {options->common.json_path, options->output_folder},
           {options->picture_path, options->depth_path, options->camera_path, options->aperture_of});

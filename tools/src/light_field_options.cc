@@ -68,13 +68,17 @@ void AddViewsOption(CLI::App* command, ViewsOption* option, const std::string& h
   command->add_option("--views", option->text, help)->type_name("UxV");
 }
 
+// One way; the number of rays is far beyond any memory before.
+constexpr int kMaxViews = 99;
+
 std::pair<int, int> ViewCounts(const ViewsOption& option) {
   if (option.text.empty()) return {0, 0};
   const std::string form = "UxV (views across and down, e.g. 7x7)";
   const std::vector<int> counts = SplitPixels("--views", option.text, 'x', form);
-  if (counts.size() != 2 || counts[0] < 1 || counts[1] < 1) {
-    throw UsageError(
-        fmt::format("--views: {}, each above 0, is expected, found '{}'", form, option.text));
+  if (counts.size() != 2 || counts[0] < 1 || counts[1] < 1 || counts[0] > kMaxViews ||
+      counts[1] > kMaxViews) {
+    throw UsageError(fmt::format("--views: {}, each from 1 to {}, is expected, found '{}'", form,
+                                 kMaxViews, option.text));
   }
   return {counts[0], counts[1]};
 }

@@ -82,7 +82,9 @@ struct EstimateSummary {
   double relative_residual = 0;  // the largest
   double setup_seconds = 0;      // geometry of the views, the prior, choice of the block size
   double solve_seconds = 0;
-  double predicted_memory_mib = 0;  // of the largest block, all threads, with the light field
+  // Most that the whole process is expected to hold, with a margin: what it held before, the light
+  // field, and on each thread a block as large as the most demanding of a few that were analysed.
+  double predicted_memory_mib = 0;
   int threads = 0;
   std::string device;
 };
@@ -98,6 +100,12 @@ struct EstimateSummary {
 // rcond below the limit (naming the block), and a memory limit that no block fits.
 model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& options,
                                    kernels::Backend* backend, EstimateSummary* summary);
+
+// A photograph as radiance: divided by what the irradiance fall-off of (12) leaves of a uniform
+// radiance at each of its pixels.
+model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
+                                    const model::LightFieldGrid& grid, const model::Camera& camera,
+                                    const Eigen::ArrayXXd& weights, int threads);
 
 // The picture warped to every view: the prior of the estimate, and the baseline DIBR.
 model::LightField WarpedLightField(const EstimateInput& input, bool falloff, int threads);
