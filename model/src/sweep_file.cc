@@ -149,15 +149,6 @@ void ReadOffset(const YamlNode& root, SweepFile* sweep) {
   }
 }
 
-Estimate FloorOfCalibration(const YamlNode& node) {
-  const std::string path = node.ResolvePath(node.Text());
-  const Camera camera = ReadCamera(path);
-  if (!camera.calibration || !camera.calibration->blur_floor_px) {
-    throw node.ErrorHere(fmt::format("{} holds no calibration.blur_floor_px", path));
-  }
-  return *camera.calibration->blur_floor_px;
-}
-
 void ReadFloor(const YamlNode& root, SweepFile* sweep) {
   const auto node = root.Find("blur_floor_px");
   if (!node) return;
@@ -174,7 +165,8 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
         "one of {value, sigma}, {from, to} and {from_calibration} is expected, not a mixture");
   }
   if (file) {
-    sweep->floor.given_px = FloorOfCalibration(*file);
+    const std::string place = file->ErrorHere("").what();
+    TakeFloorOfCalibration(file->ResolvePath(file->Text()), place, sweep);
   } else if (is_interval) {
     sweep->floor.from_px = node->At("from").NonNegativeNumber();
     sweep->floor.to_px = node->At("to").NonNegativeNumber();
@@ -275,8 +267,8 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "readings_unit", "reading_sigma_mm", "offset_mm",
-                    "direction", "target", "blur_floor_px", "roi_px", "frames", "frames_csv",
-                    "frames_dir", "frames_glob"});
+                    "direction", "target", "target_period_mm", "blur_floor_px", "roi_px", "frames",
+                    "frames_csv", "frames_dir", "frames_glob"});
   SweepFile sweep;
   sweep.source = path;
   const YamlNode camera = root.At("camera");
@@ -304,6 +296,8 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
       if (name == SweepTargetName(kind)) sweep.target = kind;
     }
   }
+  if (const auto period = root.Find("target_period_mm"))
+    sweep.target_period_mm = period->PositiveNumber();
   ReadFloor(root, &sweep);
   if (const auto roi = root.Find("roi_px")) {
     const auto numbers = roi->ElementsExactly(4);
@@ -314,6 +308,57 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
   ReadFrames(root, mm_per_unit, &sweep);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
+}
+
+void TakeFloorOfCalibration(const std::string& camera_path, const std::string& place,
+                            SweepFile* sweep) {
+  Camera camera;
+  try {
+    camera = ReadCamera(camera_path);
+  } catch (const Error& error) {
+    throw Error(place + error.what());
+  }
+  if (!camera.calibration) {
+    throw Error(fmt::format(
+        "{}{} holds no calibration: a camera that thicklens calibrate has written is expected",
+        place, camera_path));
+  }
+  const std::string& method = camera.calibration->evidence.method;
+  if (method == "assumed" || method == "source-recipe") {
+    throw Error(fmt::format(
+        "{}{}: calibration.evidence.method is '{}', which measures no floor: calibrate on a sweep "
+        "of a knife edge",
+        place, camera_path, method));
+  }
+  if (!camera.calibration->blur_floor_px) {
+    throw Error(fmt::format(
+        "{}{} holds no calibration.blur_floor_px: its sweep did not determine the floor, one of a "
+        "knife edge does",
+        place, camera_path));
+  }
+  sweep->floor = {};
+  sweep->floor.given_px = *camera.calibration->blur_floor_px;
+  sweep->floor_origin = FloorOrigin{place, camera_path, camera.lens, camera.sensor.pixel_pitch_mm};
+}
+
+void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera) {
+  if (!sweep.floor_origin) return;
+  const FloorOrigin& origin = *sweep.floor_origin;
+  const auto require_same = [&](const char* field, double theirs, double ours) {
+    // The same number may have been written with other digits.
+    if (std::abs(theirs - ours) <= 1e-6 * std::max(std::abs(theirs), std::abs(ours))) return;
+    throw Error(fmt::format(
+        "{}{} has {} {}, the camera '{}' of this sweep {}: a blur floor holds for one lens, "
+        "aperture and pixel pitch",
+        origin.place, origin.camera_path, field, theirs, camera.name, ours));
+  };
+  const ThickLens& a = origin.lens;
+  const ThickLens& b = camera.lens;
+  require_same("lens.front_focal_length_mm", a.front_focal_length_mm, b.front_focal_length_mm);
+  require_same("lens.rear_focal_length_mm", a.rear_focal_length_mm, b.rear_focal_length_mm);
+  require_same("lens.lens_thickness_mm", a.lens_thickness_mm, b.lens_thickness_mm);
+  require_same("lens.aperture_radius_mm", a.aperture_radius_mm, b.aperture_radius_mm);
+  require_same("sensor.pixel_pitch_mm", origin.pixel_pitch_mm, camera.sensor.pixel_pitch_mm);
 }
 
 SweepFile SweepFromFolder(const std::string& folder, const std::string& readings_csv,
@@ -350,6 +395,7 @@ std::string SweepToYaml(const SweepFile& sweep) {
   }
   text("direction", BenchDirectionName(sweep.direction));
   text("target", SweepTargetName(sweep.target));
+  if (sweep.target_period_mm) number("target_period_mm", *sweep.target_period_mm);
   if (sweep.floor.given_px) {
     estimate("blur_floor_px", *sweep.floor.given_px);
   } else if (sweep.floor.from_px) {

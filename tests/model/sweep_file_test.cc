@@ -12,6 +12,7 @@
 #include "support/temporary_folder.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/sweep_simulator.h"
+#include "thicklens/model/yaml_reader.h"
 
 namespace thicklens::model {
 namespace {
@@ -247,27 +248,92 @@ TEST_F(SweepFolder, Floor) {
   EXPECT_THAT(error("[0, 1]"), HasSubstr("blur_floor_px"));
 }
 
+// A camera file with this lens, pitch and `calibration` (a flow map, or nothing).
+std::string CameraText(double focal_mm, double radius_mm, double pitch_mm,
+                       const std::string& calibration) {
+  const std::string f = YamlNumber(focal_mm);
+  return "schema: thicklens/camera/1\nname: edge\n"
+         "lens: {front_focal_length_mm: " +
+         f + ", rear_focal_length_mm: " + f +
+         ", lens_thickness_mm: 0, aperture_radius_mm: " + YamlNumber(radius_mm) +
+         "}\nsensor: {width_px: 9, height_px: 9, pixel_pitch_mm: " + YamlNumber(pitch_mm) +
+         ", principal_point_px: [4, 4], transfer: linear}\n" +
+         (calibration.empty() ? "" : "calibration: " + calibration + "\n");
+}
+
+constexpr char kMeasuredFloor[] =
+    "{blur_floor_px: {value: 0.52, sigma: 0.01}, evidence: {method: joint}}";
+constexpr char kFloorFromEdge[] = "blur_floor_px: {from_calibration: edge/camera.yaml}\n";
+
 TEST_F(SweepFolder, FloorOfAnotherCalibration) {
   const std::string camera =
-      "schema: thicklens/camera/1\nname: c\n"
-      "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, "
-      "aperture_radius_mm: 9}\n"
-      "sensor: {width_px: 9, height_px: 9, pixel_pitch_mm: 0.005, principal_point_px: [4, 4], "
-      "transfer: linear}\n";
-  folder_.Put(
-      "edge/camera.yaml",
-      camera +
-          "calibration: {blur_floor_px: {value: 0.52, sigma: 0.01}, evidence: {method: joint}}\n");
-  const Estimate floor = Read(frames_ + "blur_floor_px: {from_calibration: edge/camera.yaml}\n")
-                             .floor.given_px.value();
+      folder_.Put("edge/camera.yaml", CameraText(50, 9, 0.005, kMeasuredFloor));
+  const SweepFile sweep = Read(frames_ + kFloorFromEdge);
+  const Estimate floor = sweep.floor.given_px.value();
   EXPECT_EQ(floor.value, 0.52);
   EXPECT_EQ(floor.sigma, 0.01);
-  folder_.Put("edge/camera.yaml", camera);
-  EXPECT_THAT(ErrorWith(frames_ + "blur_floor_px: {from_calibration: edge/camera.yaml}\n"),
-              AllOf(HasSubstr("s.yaml:4:"), HasSubstr("no calibration.blur_floor_px")));
+  EXPECT_EQ(sweep.floor_origin.value().camera_path, camera);
   EXPECT_THAT(
       ErrorWith(frames_ + "blur_floor_px: {from_calibration: edge/camera.yaml, value: 1}\n"),
       HasSubstr("not a mixture"));
+  EXPECT_FALSE(Read(frames_ + "blur_floor_px: 0.5\n").floor_origin);
+}
+
+TEST_F(SweepFolder, AFloorThatWasNotMeasuredIsRefused) {
+  const auto error = [&](const std::string& calibration) {
+    folder_.Put("edge/camera.yaml", CameraText(50, 9, 0.005, calibration));
+    return ErrorWith(frames_ + kFloorFromEdge);
+  };
+  const std::string place = "s.yaml:4:35: blur_floor_px.from_calibration: ";
+  EXPECT_THAT(error(""),
+              AllOf(HasSubstr(place), HasSubstr("edge/camera.yaml holds no calibration:")));
+  EXPECT_THAT(error("{blur_ratio: 0.4, evidence: {method: joint}}"),
+              AllOf(HasSubstr(place), HasSubstr("no calibration.blur_floor_px")));
+  for (const std::string method : {"assumed", "source-recipe"}) {
+    EXPECT_THAT(error("{blur_floor_px: 0.5, evidence: {method: " + method + "}}"),
+                AllOf(HasSubstr(place), HasSubstr("method is '" + method + "'")));
+  }
+  EXPECT_THAT(error("{blur_floor_px: -1, evidence: {method: joint}}"),
+              AllOf(HasSubstr(place), HasSubstr("camera.yaml:5:30: calibration.blur_floor_px")));
+  EXPECT_THAT(ErrorWith(frames_ + "blur_floor_px: {from_calibration: none.yaml}\n"),
+              AllOf(HasSubstr(place), HasSubstr("none.yaml")));
+}
+
+TEST_F(SweepFolder, AFloorOfAnotherCameraIsRefused) {
+  const auto camera = [](double focal_mm, double radius_mm, double pitch_mm) {
+    return ParseCamera(CameraText(focal_mm, radius_mm, pitch_mm, ""), "c.yaml");
+  };
+  folder_.Put("edge/camera.yaml", CameraText(50, 9, 0.005, kMeasuredFloor));
+  const SweepFile sweep = Read(frames_ + kFloorFromEdge);
+  const auto error = [&](const Camera& used) {
+    return ErrorOf([&] { RequireFloorOfCamera(sweep, used); });
+  };
+  RequireFloorOfCamera(sweep, camera(50, 9, 0.005));
+  RequireFloorOfCamera(sweep, camera(50.000001, 9, 0.005));
+  EXPECT_THAT(
+      error(camera(50, 9, 0.006)),
+      AllOf(HasSubstr("s.yaml:4:35: blur_floor_px.from_calibration: "),
+            HasSubstr("sensor.pixel_pitch_mm 0.005"), HasSubstr("'edge' of this sweep 0.006")));
+  EXPECT_THAT(error(camera(35, 9, 0.005)),
+              AllOf(HasSubstr("lens.front_focal_length_mm 50"), HasSubstr("this sweep 35:")));
+  EXPECT_THAT(error(camera(50, 4.5, 0.005)), HasSubstr("lens.aperture_radius_mm 9"));
+  Camera other = camera(50, 9, 0.005);
+  other.lens.lens_thickness_mm = 3;
+  EXPECT_THAT(error(other), HasSubstr("lens.lens_thickness_mm 0"));
+  other = camera(50, 9, 0.005);
+  other.lens.rear_focal_length_mm = 66;
+  EXPECT_THAT(error(other), HasSubstr("lens.rear_focal_length_mm 50"));
+  // A floor that is stated belongs to the camera that it is stated for.
+  RequireFloorOfCamera(Read(frames_ + "blur_floor_px: 0.5\n"), camera(35, 9, 0.005));
+}
+
+TEST_F(SweepFolder, PeriodOfTheTarget) {
+  EXPECT_FALSE(Read(frames_).target_period_mm);
+  EXPECT_EQ(Read(frames_ + "target_period_mm: 5.0\n").target_period_mm.value(), 5);
+  EXPECT_THAT(ErrorWith(frames_ + "target_period_mm: 0\n"),
+              HasSubstr("s.yaml:4:19: target_period_mm: must be > 0"));
+  EXPECT_THAT(ErrorWith(frames_ + "target_period_px: 5\n"),
+              HasSubstr("this field is 'target_period_mm'"));
 }
 
 TEST_F(SweepFolder, RoiDirectionTarget) {
@@ -307,6 +373,7 @@ TEST_F(SweepFolder, YamlComesBack) {
       Read(frames_ +
            "roi_px: [1, 2, 30, 40]\ndirection: toward\ntarget: texture\nreading_sigma_mm: 0.1\n");
   sweep.offset_mm = Estimate{1.0 / 3, 1e-300};
+  sweep.target_period_mm = 5.0 / 3;
   sweep.camera_path = "cam: 1.yaml";
   sweep.frames = {{"a.png", 1.0 / 3}, {"q/[1], {2}: #3.png", -1e-17}};
   for (const int kind : {0, 1, 2}) {
@@ -322,6 +389,7 @@ TEST_F(SweepFolder, YamlComesBack) {
     EXPECT_EQ(back.offset_mm.value().sigma, 1e-300);
     EXPECT_EQ(back.direction, BenchDirection::kToward);
     EXPECT_EQ(back.target, SweepTarget::kTexture);
+    EXPECT_EQ(back.target_period_mm, sweep.target_period_mm);
     EXPECT_EQ(back.roi.height, 40);
     EXPECT_TRUE(back.reading_sigma_stated);
     EXPECT_EQ(back.floor.given_px.has_value(), kind == 1);

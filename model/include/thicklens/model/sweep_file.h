@@ -23,6 +23,15 @@ struct FloorKnowledge {
   std::optional<double> from_px, to_px;  // both or none
 };
 
+// Where a given floor comes from, if from another calibration. It is a floor of this lens on these
+// pixels and of no other.
+struct FloorOrigin {
+  std::string place;  // "sweep.yaml:4:17: blur_floor_px.from_calibration: ", for messages
+  std::string camera_path;
+  ThickLens lens;
+  double pixel_pitch_mm = 0;
+};
+
 struct RegionOfInterest {
   int x = 0, y = 0, width = 0, height = 0;  // px; width 0: the whole field
 };
@@ -43,6 +52,8 @@ struct SweepFile {
   BenchDirection direction = BenchDirection::kAway;
   SweepTarget target = SweepTarget::kAuto;
   FloorKnowledge floor;
+  std::optional<FloorOrigin> floor_origin;
+  std::optional<double> target_period_mm;  // of a periodic target (docs/file-formats.md)
   RegionOfInterest roi;
   std::vector<SweepFrame> frames;  // in the file's order
 };
@@ -51,6 +62,16 @@ struct SweepFile {
 // row without a file, a picture in `frames_dir` (or of `frames_glob`) without a row, duplicate rows
 // and rows that are no numbers. What was taken for granted is told in `notices`.
 SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
+
+// Takes value and sigma of calibration.blur_floor_px of a camera file into `sweep`. Throws Error
+// where the file holds none that was measured; `place` (where the path was given, with ": " at its
+// end) begins the message.
+void TakeFloorOfCalibration(const std::string& camera_path, const std::string& place,
+                            SweepFile* sweep);
+
+// Throws Error if the floor was taken from the calibration of another lens or pixel pitch than
+// `camera` has.
+void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera);
 
 // A sweep out of a folder and a table, all else at its default: `thicklens calibrate DIR
 // --readings`.
