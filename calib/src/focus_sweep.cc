@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <memory>
+#include <mutex>
 #include <set>
 
 #include "thicklens/error.h"
@@ -16,8 +19,36 @@ bool Fail(std::string* why, const std::string& message) {
   return false;
 }
 
+using DecodeTable = std::vector<float>;
+
+DecodeTable MakeDecodeTable(const model::TransferCurve& transfer, std::size_t levels) {
+  DecodeTable table(levels);
+  for (std::size_t i = 0; i < levels; ++i) {
+    table[i] = static_cast<float>(
+        transfer.Decode(static_cast<double>(i) / static_cast<double>(levels - 1)));
+  }
+  return table;
+}
+
+// From stored values to linear light; kept for the next frame, which mostly comes from the same
+// camera.
+std::shared_ptr<const DecodeTable> DecodeTableOf(const model::TransferCurve& transfer,
+                                                 std::size_t levels) {
+  struct Kept {
+    model::TransferCurve transfer;
+    std::shared_ptr<const DecodeTable> table;
+  };
+  static std::mutex mutex;
+  static Kept kept_bytes, kept_words;
+  const std::lock_guard<std::mutex> lock(mutex);
+  Kept& kept = levels == 256 ? kept_bytes : kept_words;
+  if (!kept.table || !(kept.transfer == transfer))
+    kept = {transfer, std::make_shared<const DecodeTable>(MakeDecodeTable(transfer, levels))};
+  return kept.table;
+}
+
 template <typename Value>
-void DecodeInto(const cv::Mat& stored, const std::vector<float>& decode, cv::Mat* grey) {
+void DecodeGrey(const cv::Mat& stored, const DecodeTable& decode, cv::Mat* grey) {
   const int channels = stored.channels();
   for (int y = 0; y < stored.rows; ++y) {
     const auto* in = stored.ptr<Value>(y);
@@ -27,6 +58,16 @@ void DecodeInto(const cv::Mat& stored, const std::vector<float>& decode, cv::Mat
                    ? decode[in[0]]
                    : 0.2126F * decode[in[0]] + 0.7152F * decode[in[1]] + 0.0722F * decode[in[2]];
     }
+  }
+}
+
+template <typename Value>
+void DecodeChannel(const cv::Mat& stored, int channel, const DecodeTable& decode, cv::Mat* light) {
+  const int channels = stored.channels();
+  for (int y = 0; y < stored.rows; ++y) {
+    const auto* in = stored.ptr<Value>(y) + channel;
+    auto* out = light->ptr<float>(y);
+    for (int x = 0; x < stored.cols; ++x, in += channels) out[x] = decode[*in];
   }
 }
 
@@ -44,6 +85,9 @@ bool FocusSweep::IsValid(std::string* why) const {
     return Fail(why, fmt::format("offset_mm must be finite with sigma >= 0, found {} +- {}",
                                  offset_mm->value, offset_mm->sigma));
   }
+  if (target_period_mm && !(*target_period_mm > 0 && std::isfinite(*target_period_mm))) {
+    return Fail(why, fmt::format("target_period_mm must be > 0, found {}", *target_period_mm));
+  }
   for (const model::SweepFrame& frame : frames) {
     if (!std::isfinite(frame.reading_mm)) {
       return Fail(why, fmt::format("{}: reading_mm must be finite", frame.image));
@@ -59,6 +103,7 @@ bool FocusSweep::IsValid(std::string* why) const {
 }
 
 FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& camera) {
+  model::RequireFloorOfCamera(file, camera);
   FocusSweep sweep;
   sweep.camera = camera;
   sweep.frames = file.frames;
@@ -67,6 +112,7 @@ FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& cam
   sweep.direction = file.direction;
   sweep.target = file.target;
   sweep.floor = file.floor;
+  sweep.target_period_mm = file.target_period_mm;
   sweep.roi = file.roi;
   return sweep;
 }
@@ -91,19 +137,34 @@ cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t ind
 
 cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index) {
   const cv::Mat region = RegionOf(stored, sweep, index);
-  const std::size_t levels = region.depth() == CV_8U ? 256 : 65536;
-  std::vector<float> decode(levels);
-  for (std::size_t i = 0; i < levels; ++i) {
-    decode[i] = static_cast<float>(sweep.camera.sensor.transfer.Decode(
-        static_cast<double>(i) / static_cast<double>(levels - 1)));
-  }
+  const bool bytes = region.depth() == CV_8U;
+  const auto decode = DecodeTableOf(sweep.camera.sensor.transfer, bytes ? 256 : 65536);
   cv::Mat grey(region.size(), CV_32F);
-  if (region.depth() == CV_8U) {
-    DecodeInto<std::uint8_t>(region, decode, &grey);
+  if (bytes) {
+    DecodeGrey<std::uint8_t>(region, *decode, &grey);
   } else {
-    DecodeInto<std::uint16_t>(region, decode, &grey);
+    DecodeGrey<std::uint16_t>(region, *decode, &grey);
   }
   return grey;
+}
+
+cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index,
+                      int channel) {
+  const cv::Mat region = RegionOf(stored, sweep, index);
+  const int colours = region.channels() == 4 ? 3 : region.channels();
+  if (channel < 0 || channel >= colours) {
+    throw Error(fmt::format("{}: channel {} is asked for; the picture has {}, counted from 0",
+                            sweep.frames[index].image, channel, colours));
+  }
+  const bool bytes = region.depth() == CV_8U;
+  const auto decode = DecodeTableOf(sweep.camera.sensor.transfer, bytes ? 256 : 65536);
+  cv::Mat light(region.size(), CV_32F);
+  if (bytes) {
+    DecodeChannel<std::uint8_t>(region, channel, *decode, &light);
+  } else {
+    DecodeChannel<std::uint16_t>(region, channel, *decode, &light);
+  }
+  return light;
 }
 
 }  // namespace thicklens::calib

@@ -3,93 +3,39 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "edge_pixels.h"
+#include "pile_up.h"
 
 namespace thicklens::calib {
 namespace {
 
-struct PileUp {
-  double fraction = 0;
-  double level = 0;  // stored value, in units of full scale
-};
-
-// Clipping anywhere: the brightest value that the channel uses holds many pixels while the values
-// just below hold few of them. A camera may clip below full scale (one at 240 to 248 of 255).
-PileUp BrightPileUp(const std::vector<double>& histogram, double total) {
-  const std::size_t top = histogram.size() - 1;
-  if (histogram[top] > 0.001 * total) return {histogram[top] / total, 1};
-  // JPEG and a colour matrix smear the clipped value over some neighbours: the brightest 1/64 of
-  // the range that is in use is compared with the three stretches of that width below it.
-  const std::size_t width = std::max<std::size_t>(1, histogram.size() / 64);
-  double above = 0;
-  std::size_t end = histogram.size();
-  while (end > width && above + histogram[end - 1] < 0.0005 * total) above += histogram[--end];
-  if (end < 4 * width) return {};
-  const auto sum = [&](std::size_t from, std::size_t to) {
-    return std::accumulate(histogram.begin() + static_cast<std::ptrdiff_t>(from),
-                           histogram.begin() + static_cast<std::ptrdiff_t>(to), 0.0);
-  };
-  const double bright = sum(end - width, end);
-  const double below = sum(end - 4 * width, end - width) / 3;
-  if (!(bright > 4 * below)) return {};
-  // A plateau of the target is spread by noise to both sides of its middle; clipping cuts the upper
-  // side off.
-  const auto value_at = [&](double fraction) {
-    double count = 0;
-    std::size_t value = end - width;
-    while (value + 1 < end && count + histogram[value] < fraction * bright)
-      count += histogram[value++];
-    return static_cast<double>(value);
-  };
-  const double upper = value_at(0.95) - value_at(0.5);
-  const double lower = value_at(0.5) - value_at(0.05);
-  if (upper > 0 && upper > 0.5 * lower) return {};
-  return {bright / total, static_cast<double>(end - 1) / static_cast<double>(top)};
-}
-
-PileUp Saturation(const cv::Mat& stored, double noise_sigma) {
-  const bool bytes = stored.depth() == CV_8U;
-  const std::size_t levels = bytes ? 256 : 65536;
-  const int channels = stored.channels() == 4 ? 3 : stored.channels();
-  PileUp worst;
-  for (int c = 0; c < channels; ++c) {
-    std::vector<double> histogram(levels, 0);
-    for (int y = 0; y < stored.rows; ++y) {
-      for (int x = 0; x < stored.cols; ++x) {
-        const int i = x * stored.channels() + c;
-        histogram[bytes ? stored.ptr<std::uint8_t>(y)[i] : stored.ptr<std::uint16_t>(y)[i]] += 1;
-      }
-    }
-    PileUp found = BrightPileUp(histogram, static_cast<double>(stored.total()));
-    // Where the noise is below the steps of the file, every plateau piles up on one value: only
-    // full scale counts there.
-    if (found.level < 1 && !(noise_sigma * static_cast<double>(levels - 1) > 0.5)) found = {};
-    if (found.fraction > worst.fraction) worst = found;
-  }
-  return worst;
-}
+constexpr int kBlock = 16;  // px, side of the blocks in which noise and mosaic are looked for
 
 // Standard deviation of a pixel: in 16 x 16 blocks the rms of (p00 - p10 - p01 + p11)/2, which
 // cancels any slope; of these the 25th percentile, where the target is flat.
 double NoiseSigma(const cv::Mat& grey) {
-  constexpr int kBlock = 16;
   std::vector<double> blocks;
   for (int y0 = 0; y0 + kBlock < grey.rows; y0 += kBlock) {
     for (int x0 = 0; x0 + kBlock < grey.cols; x0 += kBlock) {
-      double sum = 0;
+      std::array<float, kBlock> sums{};  // per column, so that a row is one vector operation
       for (int y = y0; y < y0 + kBlock; ++y) {
-        const auto* a = grey.ptr<float>(y);
-        const auto* b = grey.ptr<float>(y + 1);
-        for (int x = x0; x < x0 + kBlock; ++x) {
-          const double d = 0.5 * (a[x] - a[x + 1] - b[x] + b[x + 1]);
-          sum += d * d;
+        const auto* a = grey.ptr<float>(y) + x0;
+        const auto* b = grey.ptr<float>(y + 1) + x0;
+        for (std::size_t x = 0; x < kBlock; ++x) {
+          const float d = 0.5F * (a[x] - a[x + 1] - b[x] + b[x + 1]);
+          sums[x] += d * d;
         }
       }
+      const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);
       blocks.push_back(std::sqrt(sum / (kBlock * kBlock)));
     }
   }
@@ -97,6 +43,124 @@ double NoiseSigma(const cv::Mat& grey) {
   const auto quarter = blocks.begin() + static_cast<std::ptrdiff_t>(blocks.size() / 4);
   std::nth_element(blocks.begin(), quarter, blocks.end());
   return *quarter;
+}
+
+// How far the mean of each of the four sub-lattices of 2 x 2 px lies from the block's, relative.
+template <typename Value>
+std::array<double, 4> LatticeDeviations(const cv::Mat& stored, int y0, int x0, double* mean) {
+  std::array<std::array<std::uint32_t, kBlock>, 2> columns{};  // of even and odd rows
+  for (int y = 0; y < kBlock; ++y) {
+    const auto* row = stored.ptr<Value>(y0 + y) + x0;
+    auto& sums = columns[static_cast<std::size_t>(y % 2)];
+    for (std::size_t x = 0; x < kBlock; ++x) sums[x] += row[x];
+  }
+  std::array<double, 4> lattices{};
+  for (std::size_t x = 0; x < kBlock; ++x) {
+    lattices[x % 2] += columns[0][x];
+    lattices[2 + x % 2] += columns[1][x];
+  }
+  const double sum = std::accumulate(lattices.begin(), lattices.end(), 0.0);
+  *mean = sum / (kBlock * kBlock);
+  for (double& lattice : lattices) lattice = sum > 0 ? 4 * lattice / sum - 1 : 0;
+  return lattices;
+}
+
+// A colour filter over the pixels makes one of the four sub-lattices of 2 x 2 px brighter or darker
+// all over the frame. A texture does that in one block or other, to either side; a period of
+// exactly 2 px all over the frame is beyond what a lens resolves.
+template <typename Value>
+bool HasColourFilter(const cv::Mat& stored) {
+  constexpr double kLeastDeviation = 0.04;  // gains of a sensor's own columns differ by 0.01
+  constexpr double kPersistent = 0.9;       // of the blocks
+  const double full_scale = std::numeric_limits<Value>::max();
+  std::array<std::vector<double>, 4> deviations;
+  for (int y0 = 0; y0 + kBlock <= stored.rows; y0 += kBlock) {
+    for (int x0 = 0; x0 + kBlock <= stored.cols; x0 += kBlock) {
+      double mean = 0;
+      const auto block = LatticeDeviations<Value>(stored, y0, x0, &mean);
+      if (!(mean > 0.02 * full_scale && mean < 0.98 * full_scale)) continue;
+      for (std::size_t k = 0; k < block.size(); ++k) deviations[k].push_back(block[k]);
+    }
+  }
+  if (deviations[0].size() < 16) return false;
+  for (std::vector<double>& of_lattice : deviations) {
+    const double typical = Median(of_lattice);
+    if (!(std::abs(typical) > kLeastDeviation)) continue;
+    const auto same = std::count_if(of_lattice.begin(), of_lattice.end(), [&](double d) {
+      return d * typical > 0 && std::abs(d) > 0.5 * kLeastDeviation;
+    });
+    if (static_cast<double>(same) > kPersistent * static_cast<double>(of_lattice.size()))
+      return true;
+  }
+  return false;
+}
+
+bool IsMosaic(const cv::Mat& stored) {
+  if (stored.channels() != 1) return false;
+  return stored.depth() == CV_8U ? HasColourFilter<std::uint8_t>(stored)
+                                 : HasColourFilter<std::uint16_t>(stored);
+}
+
+// Eight bytes at a time through the multiply and shift of splitmix64; the last ones of a row padded
+// with zeros.
+std::uint64_t ContentHash(const cv::Mat& stored) {
+  std::uint64_t hash = 0;
+  const auto mix = [&hash](std::uint64_t word) {
+    hash = (hash ^ word) * 0x9E3779B97F4A7C15U;
+    hash ^= hash >> 32;
+  };
+  mix(static_cast<std::uint64_t>(stored.rows));
+  mix(static_cast<std::uint64_t>(stored.cols));
+  mix(static_cast<std::uint64_t>(stored.type()));
+  const std::size_t row_bytes = static_cast<std::size_t>(stored.cols) * stored.elemSize();
+  for (int y = 0; y < stored.rows; ++y) {
+    const auto* row = stored.ptr<std::uint8_t>(y);
+    for (std::size_t i = 0; i < row_bytes; i += sizeof(std::uint64_t)) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, row + i, std::min(sizeof word, row_bytes - i));
+      mix(word);
+    }
+  }
+  return hash;
+}
+
+// Gaussian smoothing by a sigma of many pixels: on the picture shrunk by whole blocks to a sigma of
+// 5 to 10 blocks, enlarged again by straight lines.
+cv::Mat WidelySmoothed(const cv::Mat& grey, double sigma_px) {
+  int shrink = 1;
+  while (sigma_px / (2 * shrink) >= 5) shrink *= 2;
+  if (shrink == 1) return Smoothed(grey, sigma_px);
+  // Mirrored as far as the kernel reaches, so that the borders are those of the whole frame.
+  const auto margin = [&](int length_px) {
+    const int reach_px = std::min(static_cast<int>(std::ceil(5 * sigma_px)), length_px - 1);
+    return (reach_px + shrink - 1) / shrink * shrink;
+  };
+  const int left = margin(grey.cols), top = margin(grey.rows);
+  const auto rest = [&](int length_px) { return (shrink - length_px % shrink) % shrink; };
+  cv::Mat padded, small, wide;
+  cv::copyMakeBorder(grey, padded, top, top + rest(grey.rows), left, left + rest(grey.cols),
+                     cv::BORDER_REFLECT_101);
+  cv::resize(padded, small, padded.size() / shrink, 0, 0, cv::INTER_AREA);
+  // The mean over a block of n px is a blur of variance (n^2 - 1)/12; straight lines between points
+  // n px apart, taken at n places between them, are on the average one of n^2/6 + 1/12.
+  const double variance_px2 = sigma_px * sigma_px - 0.25 * shrink * shrink;
+  cv::resize(Smoothed(small, std::sqrt(variance_px2) / shrink), wide, padded.size(), 0, 0,
+             cv::INTER_LINEAR);
+  return wide(cv::Rect(left, top, grey.cols, grey.rows));
+}
+
+// White noise n, averaged over 4 x 4 px and smoothed by a Gaussian of one of those: n/4/(2
+// sqrt(pi)).
+double CoarseTexture(const cv::Mat& grey, const cv::Mat& slow, double noise_sigma) {
+  constexpr int kShrink = 4;
+  if (grey.cols < 8 * kShrink || grey.rows < 8 * kShrink) return 0;
+  cv::Mat coarse;
+  cv::resize(grey - slow, coarse, cv::Size(grey.cols / kShrink, grey.rows / kShrink), 0, 0,
+             cv::INTER_AREA);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(Smoothed(coarse, 1), mean, deviation);
+  const double noise = std::max(noise_sigma, 1e-6) / kShrink / (2 * std::sqrt(CV_PI));
+  return deviation[0] / noise;
 }
 
 }  // namespace
@@ -110,19 +174,26 @@ FrameStatistics MeasureFrame(const cv::Mat& stored, const cv::Mat& linear_grey) 
   result.mean_linear = cv::mean(linear_grey)[0];
   result.noise_sigma = NoiseSigma(linear_grey);
 
-  const PileUp saturation = Saturation(stored, result.noise_sigma);
-  result.saturated_fraction = saturation.fraction;
-  result.saturation_level = saturation.level * full_scale;
+  const PileUps pile_ups = FindPileUps(stored, result.noise_sigma);
+  result.saturated_fraction = pile_ups.bright.fraction;
+  result.saturation_level = pile_ups.bright.level * full_scale;
+  result.black_fraction = pile_ups.dark.fraction;
+  result.black_level = std::round(pile_ups.dark.level * full_scale);
+  result.black_is_one_side =
+      result.black_fraction > 0 && DarkIsOneSide(stored, pile_ups.dark.level);
+  result.is_mosaic = IsMosaic(stored);
+  result.content_hash = ContentHash(stored);
 
   const cv::Mat smoothed = Smoothed(linear_grey, 1);
   result.top_gradient = Quantile(CentralGradient(smoothed).magnitude, 0.995);
   if (result.mean_linear > 0) {
     // What a lamp, a vignette or a shadow does over a sizeable part of the field is no texture.
-    const cv::Mat slow =
-        Smoothed(linear_grey, std::max(4.0, std::min(linear_grey.cols, linear_grey.rows) / 25.0));
+    const cv::Mat slow = WidelySmoothed(
+        linear_grey, std::max(4.0, std::min(linear_grey.cols, linear_grey.rows) / 25.0));
     cv::Scalar mean, deviation;
     cv::meanStdDev(smoothed - slow, mean, deviation);
     result.contrast = deviation[0] / result.mean_linear;
+    result.coarse_texture = CoarseTexture(linear_grey, slow, result.noise_sigma);
   }
   return result;
 }
@@ -133,14 +204,26 @@ std::optional<std::string> RejectionReason(const FrameStatistics& frame, double 
     return fmt::format("dark: mean {:.3f} of full scale, at least {:.3f} is needed",
                        frame.mean_stored, options.min_mean_stored);
   }
+  if (frame.is_mosaic) {
+    return "raw mosaic: develop it first (the pixels of a colour filter stand side by side in one "
+           "channel)";
+  }
   if (!(frame.saturated_fraction <= options.max_saturated_fraction)) {
     return fmt::format("saturated: {:.0f} % of the pixels pile up at {:.0f}, at most {:.0f} % may",
                        100 * frame.saturated_fraction, frame.saturation_level,
                        100 * options.max_saturated_fraction);
   }
+  if (!options.edge_target && !frame.black_is_one_side &&
+      !(frame.black_fraction <= options.max_black_fraction)) {
+    return fmt::format(
+        "black: {:.0f} % of the pixels pile up at {:.0f}, at most {:.0f} % may unless the target "
+        "is an edge: expose longer or lower the camera's black level",
+        100 * frame.black_fraction, frame.black_level, 100 * options.max_black_fraction);
+  }
   // White noise of standard deviation n, smoothed by sigma 1 px: derivative n/sqrt(8 pi) per axis.
   const double noise_gradient = frame.noise_sigma / std::sqrt(8 * CV_PI);
-  if (!(frame.top_gradient > options.min_gradient_to_noise * noise_gradient)) {
+  if (!(frame.top_gradient > options.min_gradient_to_noise * noise_gradient) &&
+      !(frame.coarse_texture > options.min_coarse_texture)) {
     return fmt::format(
         "no texture above the noise: steepest gradients {:.1f} x the noise's, {:.1f} is needed",
         noise_gradient > 0 ? frame.top_gradient / noise_gradient : 0.0,

@@ -27,13 +27,15 @@ struct FocusSweep {
   model::BenchDirection direction = model::BenchDirection::kAway;
   model::SweepTarget target = model::SweepTarget::kAuto;
   model::FloorKnowledge floor;
+  std::optional<double> target_period_mm;  // of a periodic target
   model::RegionOfInterest roi;
 
   // True if a calibration can be attempted: frames, distinct readings, a possible camera.
   bool IsValid(std::string* why) const;
 };
 
-// A FocusSweep from its description; `read_frame` is left to the caller.
+// A FocusSweep from its description; `read_frame` is left to the caller. Throws Error if the
+// description takes its floor from the calibration of another camera.
 FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& camera);
 
 // The region of interest of a frame as stored. Throws Error naming the frame if its size is not the
@@ -42,6 +44,11 @@ cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t ind
 
 // The same as linear grey light in [0, 1], CV_32F (.2126 R + .7152 G + .0722 B).
 cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
+
+// One channel of it: 0 red, 1 green, 2 blue; of a frame with one channel 0 alone. Throws Error
+// naming the frame if it has no such channel.
+cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index,
+                      int channel);
 
 }  // namespace thicklens::calib
 

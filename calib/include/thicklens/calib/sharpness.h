@@ -2,6 +2,7 @@
 #define THICKLENS_CALIB_SHARPNESS_H_
 
 #include <opencv2/core/mat.hpp>
+#include <vector>
 
 namespace thicklens::calib {
 
@@ -23,6 +24,12 @@ struct SharpnessIndex {
 // cites (Wang, Tian, Liang & Shi 2008) could not be had: this reading is inferred from the name.
 // `grey` is CV_32F.
 SharpnessIndex MeanEdgeSlope(const cv::Mat& grey, const SharpnessOptions& options);
+
+// The same for several thresholds at once, in the time that the lowest takes;
+// options.edge_threshold is not looked at. The index of a frame divided by its mean m at a
+// threshold t is the frame's own at t m, divided by m.
+std::vector<SharpnessIndex> MeanEdgeSlopes(const cv::Mat& grey, const SharpnessOptions& options,
+                                           const std::vector<double>& thresholds);
 
 }  // namespace thicklens::calib
 
