@@ -1,0 +1,288 @@
+#include <ceres/tiny_solver.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "edge_profile.h"
+#include "step_fit.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr int kFewestPixels = 60;
+constexpr int kSeedPixels = 1500;
+constexpr int kMostPixels = 16000;
+// A sag beyond this part of the edge's length is a curve, not an edge bent by distortion.
+constexpr double kLargestSag = 0.02;
+
+// Level planes count in units of the contrast's 200th part, so that the solver's absolute
+// tolerances mean the same for every frame.
+enum Parameter {
+  kShift,
+  kTurn,
+  kSag,
+  kVariance,
+  kDark,
+  kRise = kDark + 3,
+  kParameters = kRise + 3
+};
+using Parameters = Eigen::Matrix<double, kParameters, 1>;
+
+// The grey of the pixels of a strip (derived here):
+//   I = D + C E(d), d = x cos a + y sin a - shift - sag (t^2/T^2 - 1/3),
+// D (dark) and C (bright less dark) planes in x and y, t along the edge, T half its length, E the
+// profile for the direction a and the blur's variance.
+class EdgeModel {
+ public:
+  using Scalar = double;
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };
+
+  EdgeModel(const FeaturePixels& pixels, const Strip& strip, double unit, model::Psf psf,
+            double floor_px)
+      : pixels_(pixels), strip_(strip), unit_(unit), psf_(psf), floor_px_(floor_px) {}
+
+  int NumResiduals() const { return static_cast<int>(pixels_.size()); }
+
+  bool operator()(const double* p, double* residuals, double* jacobian) const {
+    const double angle = strip_.normal_rad + p[kTurn];
+    const double c = std::cos(angle), s = std::sin(angle);
+    const double widest_px2 = 4 * strip_.half_width_px * strip_.half_width_px;
+    const EdgeProfile profile(psf_, std::min(p[kVariance], widest_px2), floor_px_, angle);
+    const auto n = static_cast<Eigen::Index>(pixels_.size());
+    Eigen::Map<Eigen::MatrixXd> j(jacobian, jacobian != nullptr ? n : 0,
+                                  jacobian != nullptr ? static_cast<Eigen::Index>(kParameters) : 0);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto pixel = static_cast<std::size_t>(i);
+      const double x = pixels_.x_px[pixel], y = pixels_.y_px[pixel];
+      const double along = y * c - x * s;
+      const double bow = Bow(along);
+      const EdgeProfile::Value e = profile.At(x * c + y * s - p[kShift] - p[kSag] * bow);
+      const double u = x * PlaneScale(), v = y * PlaneScale();
+      const double rise = p[kRise] + p[kRise + 1] * u + p[kRise + 2] * v;
+      residuals[i] = p[kDark] + p[kDark + 1] * u + p[kDark + 2] * v + rise * e.level -
+                     pixels_.grey[pixel] / unit_;
+      if (jacobian == nullptr) continue;
+      j(i, kShift) = -rise * e.slope;
+      j(i, kTurn) = rise * e.slope * along;
+      j(i, kSag) = -rise * e.slope * bow;
+      j(i, kVariance) = rise * e.per_variance;
+      j(i, kDark) = 1;
+      j(i, kDark + 1) = u;
+      j(i, kDark + 2) = v;
+      j(i, kRise) = e.level;
+      j(i, kRise + 1) = e.level * u;
+      j(i, kRise + 2) = e.level * v;
+    }
+    return true;
+  }
+
+  // Distance from the edge, px, and level between its planes, of one pixel.
+  Eigen::Vector2d Normalised(const double* p, std::size_t pixel) const {
+    const double angle = strip_.normal_rad + p[kTurn];
+    const double c = std::cos(angle), s = std::sin(angle);
+    const double x = pixels_.x_px[pixel], y = pixels_.y_px[pixel];
+    const double u = x * PlaneScale(), v = y * PlaneScale();
+    const double rise = p[kRise] + p[kRise + 1] * u + p[kRise + 2] * v;
+    const double dark = p[kDark] + p[kDark + 1] * u + p[kDark + 2] * v;
+    return {x * c + y * s - p[kShift] - p[kSag] * Bow(y * c - x * s),
+            (pixels_.grey[pixel] / unit_ - dark) / rise};
+  }
+
+ private:
+  double Bow(double along) const {
+    const double t = along / strip_.half_length_px;
+    return t * t - 1.0 / 3;
+  }
+  double PlaneScale() const { return 1 / std::max(strip_.half_width_px, strip_.half_length_px); }
+
+  const FeaturePixels& pixels_;
+  Strip strip_;
+  double unit_;
+  model::Psf psf_;
+  double floor_px_;
+};
+
+// One fit after the other, each in a strip that suits what the one before has found.
+class Fit {
+ public:
+  Fit(const cv::Mat& grey, const EdgeFeature& feature, model::Psf psf, double floor_px)
+      : grey_(grey), feature_(feature), psf_(psf), floor_px_(floor_px) {}
+
+  std::optional<EdgeSpreadFit> Run(bool want_profile) {
+    if (!EndsAreInside() || !Seed()) return std::nullopt;
+    // The second round in the right width moves the blur by less than its error; the third sees all
+    // pixels.
+    for (const int most : {2 * kSeedPixels, kMostPixels}) {
+      const double sigma_px = SigmaOf(parameters_[kVariance]);
+      if (!(feature_.half_width_px >= LeastHalfWidthPx(sigma_px))) return std::nullopt;
+      if (!Gather(std::min(feature_.half_width_px, StripHalfWidthPx(sigma_px)), most)) {
+        return std::nullopt;
+      }
+      Solve();
+      if (!IsPlausible()) return std::nullopt;
+    }
+    return Result(want_profile);
+  }
+
+ private:
+  // Sub-pixel ends may lie on the outermost pixels' far sides.
+  bool EndsAreInside() const {
+    const Eigen::Vector2d along(-std::sin(feature_.angle_rad), std::cos(feature_.angle_rad));
+    for (const double sign : {-1.0, 1.0}) {
+      const Eigen::Vector2d end = feature_.centre_px + sign * feature_.half_length_px * along;
+      if (!(end.x() >= -1 && end.y() >= -1 && end.x() <= grey_.cols && end.y() <= grey_.rows)) {
+        return false;
+      }
+    }
+    return feature_.half_width_px >= 2 && feature_.half_length_px >= 2;
+  }
+
+  bool Gather(double half_width_px, int most) {
+    // The shift and the turn found so far become the new middle line; the planes are linear and
+    // need no start.
+    const double angle = feature_.angle_rad + parameters_[kTurn];
+    feature_.centre_px += parameters_[kShift] * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    feature_.angle_rad = angle;
+    parameters_[kShift] = parameters_[kTurn] = 0;
+    strip_ = {feature_.centre_px, angle, half_width_px, feature_.half_length_px};
+    pixels_ = GatherPixels(grey_, strip_, most);
+    return pixels_.size() >= kFewestPixels && pixels_.coverage > 0.5 && StartLevels();
+  }
+
+  // The means of the two sides, and whether they differ and are numbers at all.
+  bool StartLevels() {
+    double sum[2] = {0, 0}, count[2] = {0, 0};
+    const double c = std::cos(strip_.normal_rad), s = std::sin(strip_.normal_rad);
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+      const double d = pixels_.x_px[i] * c + pixels_.y_px[i] * s;
+      if (std::abs(d) < strip_.half_width_px / 2) continue;
+      const int side = d > 0 ? 1 : 0;
+      sum[side] += pixels_.grey[i];
+      ++count[side];
+    }
+    if (!(count[0] > 0 && count[1] > 0)) return false;
+    const double dark = sum[0] / count[0], rise = sum[1] / count[1] - dark;
+    if (!(rise > 0) || !std::isfinite(rise)) return false;
+    unit_ = rise / 200;
+    parameters_.segment<6>(kDark).setZero();
+    parameters_[kDark] = dark / unit_;
+    parameters_[kRise] = rise / unit_;
+    return true;
+  }
+
+  double Solve() {
+    ceres::TinySolver<EdgeModel> solver;
+    solver.options.max_num_iterations = 30;
+    solver.options.function_tolerance = 1e-3;  // of a cost where noise is about 1 a pixel
+    const EdgeModel model(pixels_, strip_, unit_, psf_, floor_px_);
+    solver.Solve(model, &parameters_);
+    return solver.summary.final_cost;
+  }
+
+  // From several blurs, because a start that is far too sharp sees no slope of its cost.
+  bool Seed() {
+    parameters_.setZero();
+    const double width_px = std::min(feature_.half_width_px, 48.0);
+    if (!Gather(width_px, kSeedPixels)) return false;
+    const Parameters levels = parameters_;
+    Parameters best = levels;
+    double best_cost = std::numeric_limits<double>::infinity();
+    for (const double sigma_px : {2.0, 0.7, 7.0}) {
+      if (sigma_px > 1 && sigma_px > width_px / 2) continue;
+      parameters_ = levels;
+      parameters_[kVariance] = sigma_px * sigma_px;
+      const double cost = Solve();
+      if (!(cost < best_cost) || !IsPlausible()) continue;
+      best_cost = cost;
+      best = parameters_;
+      // Within 3 % of the contrast there is no other valley.
+      if (std::sqrt(2 * cost / static_cast<double>(pixels_.size())) < 6) break;
+    }
+    parameters_ = best;
+    return std::isfinite(best_cost);
+  }
+
+  bool IsPlausible() const {
+    const double width_px = feature_.half_width_px;
+    return parameters_.allFinite() && parameters_[kRise] > 0 && parameters_[kVariance] > -1 &&
+           std::abs(parameters_[kShift]) < width_px && std::abs(parameters_[kTurn]) < 0.3 &&
+           SigmaOf(parameters_[kVariance]) < width_px &&
+           std::abs(parameters_[kSag]) < 0.1 + kLargestSag * 2 * feature_.half_length_px;
+  }
+
+  std::optional<EdgeSpreadFit> Result(bool want_profile) const {
+    const EdgeModel model(pixels_, strip_, unit_, psf_, floor_px_);
+    const auto n = static_cast<Eigen::Index>(pixels_.size());
+    Eigen::VectorXd residual(n);
+    Eigen::MatrixXd jacobian(n, static_cast<Eigen::Index>(kParameters));
+    model(parameters_.data(), residual.data(), jacobian.data());
+    const EdgeProfile profile(psf_, parameters_[kVariance], floor_px_,
+                              strip_.normal_rad + parameters_[kTurn]);
+    std::vector<double> bright(pixels_.size());
+    std::vector<Eigen::Vector2d> points(pixels_.size());
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+      points[i] = model.Normalised(parameters_.data(), i);
+      bright[i] = profile.At(points[i].x()).level;
+    }
+    const FitQuality quality = JudgeFit(pixels_, residual, bright, kParameters);
+    if (!IsStep(quality, parameters_[kRise])) return std::nullopt;
+    const Eigen::MatrixXd covariance = FitCovariance(jacobian, residual, quality.clumping);
+    if (covariance.size() == 0) return std::nullopt;
+    const BlurSigma blur =
+        SigmaWithError(parameters_[kVariance], std::sqrt(covariance(kVariance, kVariance)));
+    if (!IsDetermined(blur)) return std::nullopt;
+
+    EdgeSpreadFit fit;
+    fit.feature = feature_;
+    const double angle = strip_.normal_rad + parameters_[kTurn];
+    fit.feature.angle_rad = std::remainder(angle, 2 * CV_PI);
+    fit.feature.centre_px += (parameters_[kShift] - parameters_[kSag] / 3) *
+                             Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    const bool is_across_x = std::abs(std::cos(angle)) >= std::abs(std::sin(angle));
+    (is_across_x ? fit.across_x : fit.across_y) = blur;
+    fit.chi2_per_dof = quality.chi2_per_dof;
+    if (want_profile) FillProfile(points, profile, &fit);
+    return fit;
+  }
+
+  // Means over a quarter pixel.
+  void FillProfile(const std::vector<Eigen::Vector2d>& points, const EdgeProfile& profile,
+                   EdgeSpreadFit* fit) const {
+    constexpr double kBinPx = 0.25;
+    const int half = static_cast<int>(strip_.half_width_px / kBinPx);
+    const auto bins = static_cast<std::size_t>(2 * half + 1);
+    std::vector<Eigen::Vector3d> sums(bins, Eigen::Vector3d::Zero());
+    for (const Eigen::Vector2d& point : points) {
+      const int bin = static_cast<int>(std::lround(point.x() / kBinPx)) + half;
+      if (bin < 0 || bin > 2 * half) continue;
+      sums[static_cast<std::size_t>(bin)] += Eigen::Vector3d(point.x(), point.y(), 1);
+    }
+    for (const Eigen::Vector3d& sum : sums) {
+      if (!(sum.z() > 0)) continue;
+      fit->distance_px.push_back(sum.x() / sum.z());
+      fit->level.push_back(sum.y() / sum.z());
+      fit->fitted.push_back(profile.At(sum.x() / sum.z()).level);
+    }
+  }
+
+  const cv::Mat& grey_;
+  EdgeFeature feature_;
+  model::Psf psf_;
+  double floor_px_;
+  Strip strip_;
+  FeaturePixels pixels_;
+  double unit_ = 1;
+  Parameters parameters_;
+};
+
+}  // namespace
+
+std::optional<EdgeSpreadFit> FitEdge(const cv::Mat& grey, const EdgeFeature& feature,
+                                     model::Psf psf, double floor_px, bool want_profile) {
+  return Fit(grey, feature, psf, floor_px).Run(want_profile);
+}
+
+}  // namespace thicklens::calib
