@@ -2,69 +2,121 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
+#include "edge_pixels.h"
+#include "radial_distortion.h"
+#include "registration.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::calib {
 namespace {
 
-// More pixels than this would cost time and tell nothing more about the scale.
-constexpr int kRegistrationSizePx = 1024;
+constexpr double kSmallestScale = 0.1, kLargestScale = 10;
+constexpr std::size_t kFirstWave = 4;
+constexpr std::size_t kEnoughToLearn = 5;
+// Steps of the ladder are half of what a registration finds its way over.
+constexpr double kRung = 1.1;
+constexpr int kRungs = 12;  // up, and as many down: 1.1^12 = 3.1
+// Relative change of the image height at the corner that a lens is expected to have at most.
+constexpr double kLikelyDistortion = 0.02;
 
-cv::Mat ForRegistration(const FocusSweep& sweep, std::size_t index) {
-  const cv::Mat grey = LinearGrey(sweep.read_frame(index), sweep, index);
-  const double shrink = static_cast<double>(kRegistrationSizePx) / std::max(grey.cols, grey.rows);
-  if (!(shrink < 1)) return grey;
-  cv::Mat small;
-  cv::resize(grey, small, cv::Size(), shrink, shrink, cv::INTER_AREA);
-  return small;
-}
-
-// Predicts the scale at a reading from what has been registered so far.
+// Predicts the scale at a reading: 1/scale is a straight line. It is drawn through the frames as
+// they are registered, by medians, so that neither a wrong reading, the reference's included, nor a
+// registration that went wrong moves it.
 class ScalePrediction {
  public:
-  ScalePrediction(const FocusSweep& sweep, std::size_t reference, std::optional<double> offset_mm)
-      : reference_reading_mm_(sweep.frames[reference].reading_mm),
-        sign_(model::DirectionSign(sweep.direction)) {
-    if (offset_mm) reference_depth_mm_ = *offset_mm + sign_ * reference_reading_mm_;
+  ScalePrediction(const FocusSweep& sweep, std::size_t reference,
+                  std::optional<double> known_offset_mm) {
+    const double reading_mm = sweep.frames[reference].reading_mm;
+    const double sign = model::DirectionSign(sweep.direction);
+    const double depth_mm = known_offset_mm ? *known_offset_mm + sign * reading_mm : 0;
+    if (depth_mm > 0) slope_ = sign / depth_mm;
+    intercept_ = 1 - slope_ * reading_mm;
+    is_known_ = depth_mm > 0;
   }
 
   double At(double reading_mm) const {
-    if (reference_depth_mm_ > 0) {
-      const double depth_mm = reference_depth_mm_ + sign_ * (reading_mm - reference_reading_mm_);
-      return std::clamp(reference_depth_mm_ / std::max(depth_mm, 1e-9), 0.05, 20.0);
-    }
-    return 1 / std::max(0.05, 1 + slope_ * (reading_mm - reference_reading_mm_));
+    const double inverse = intercept_ + slope_ * reading_mm;
+    return std::clamp(inverse > 0 ? 1 / inverse : kLargestScale, kSmallestScale, kLargestScale);
   }
 
-  // 1/scale is a straight line through 1 at the reference; its slope by the median over the samples
-  // is not moved by a registration that went wrong.
   void Learn(const std::vector<ScaleSample>& samples) {
-    if (reference_depth_mm_ > 0) return;
+    if (samples.size() < (is_known_ ? kEnoughToLearn : 2)) return;
     std::vector<double> slopes;
-    for (const ScaleSample& s : samples) {
-      const double step_mm = s.reading_mm - reference_reading_mm_;
-      if (step_mm != 0) slopes.push_back((1 / s.scale - 1) / step_mm);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const double step_mm = samples[i].reading_mm - samples[j].reading_mm;
+        if (step_mm != 0) slopes.push_back((1 / samples[i].scale - 1 / samples[j].scale) / step_mm);
+      }
     }
     if (slopes.empty()) return;
-    std::sort(slopes.begin(), slopes.end());
-    slope_ = slopes[slopes.size() / 2];
+    slope_ = Median(slopes);
+    std::vector<double> intercepts;
+    for (const ScaleSample& s : samples) intercepts.push_back(1 / s.scale - slope_ * s.reading_mm);
+    intercept_ = Median(intercepts);
   }
 
  private:
-  double reference_reading_mm_;
-  double sign_;
-  double reference_depth_mm_ = 0;  // 0: unknown, the slope is learnt
-  double slope_ = 0;
+  double slope_ = 0, intercept_ = 1;  // of 1/scale against the reading
+  bool is_known_ = false;
 };
+
+// Starts from the scale expected, then from others, the nearest first.
+std::optional<FreeRegistration> RegisterAnyhow(const cv::Mat& reference, const cv::Mat& frame,
+                                               double expected, cv::Point2d centre) {
+  if (auto found = RegisterFreely(reference, frame, expected, centre)) return found;
+  for (int rung = 1; rung <= kRungs; ++rung) {
+    for (const double start : {std::pow(kRung, rung), std::pow(kRung, -rung)}) {
+      if (std::abs(std::log(start / expected)) < 0.3 * std::log(kRung)) continue;
+      if (auto found = RegisterFreely(reference, frame, start, centre)) return found;
+    }
+  }
+  return std::nullopt;
+}
+
+// Radial distortion is common to all frames, so that all together know it better than each.
+void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& registrations,
+                       std::vector<ScaleSample>* samples) {
+  const double likely = kLikelyDistortion / (corner_px * corner_px);
+  double k = 0, variance = likely * likely;
+  if (const auto fitted = FitRadialDistortion(*samples)) {
+    // Weighed against the expectation that there is none.
+    const double part = variance / (variance + fitted->sigma * fitted->sigma);
+    k = part * fitted->value;
+    variance = part * fitted->sigma * fitted->sigma;
+  }
+  for (std::size_t i = 0; i < samples->size(); ++i) {
+    ScaleSample& sample = (*samples)[i];
+    const double response = CubicPerDistortion(sample.scale);
+    sample.registration = registrations[i].WithCubic(
+        k * response,
+        std::min(std::sqrt(variance) * std::abs(response), registrations[i].free.cubic_sigma));
+    sample.scale = sample.registration.scale;
+  }
+}
 
 }  // namespace
 
-std::vector<ScaleSample> TrackScale(const FocusSweep& sweep, const std::vector<std::size_t>& frames,
-                                    std::size_t reference, std::optional<double> known_offset_mm,
-                                    int threads, const std::function<void()>& tick) {
-  const cv::Mat reference_grey = ForRegistration(sweep, reference);
+cv::Point2d RegionCentre(const FocusSweep& sweep) {
+  const Eigen::Vector2d& axis = sweep.camera.sensor.principal_point_px;
+  return {axis.x() - sweep.roi.x, axis.y() - sweep.roi.y};
+}
+
+double RegionCornerRadiusPx(const FocusSweep& sweep) {
+  const cv::Point2d centre = RegionCentre(sweep);
+  const bool is_whole = !(sweep.roi.width > 0);
+  const double right = (is_whole ? sweep.camera.sensor.width_px : sweep.roi.width) - 1;
+  const double bottom = (is_whole ? sweep.camera.sensor.height_px : sweep.roi.height) - 1;
+  return std::hypot(std::max(centre.x, right - centre.x), std::max(centre.y, bottom - centre.y));
+}
+
+std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
+                                    const std::function<cv::Mat(std::size_t)>& read_grey,
+                                    const std::vector<std::size_t>& frames, std::size_t reference,
+                                    std::optional<double> known_offset_mm, int threads,
+                                    const std::function<void()>& tick) {
+  const cv::Mat reference_grey = read_grey(reference);
+  const cv::Point2d centre = RegionCentre(sweep);
   const double reference_reading_mm = sweep.frames[reference].reading_mm;
   std::vector<std::size_t> order;
   for (const std::size_t frame : frames) {
@@ -76,29 +128,31 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep, const std::vector<s
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return distance_mm(a) < distance_mm(b); });
 
-  std::vector<ScaleSample> samples = {{reference, reference_reading_mm, 1.0}};
+  std::vector<ScaleSample> samples = {{reference, reference_reading_mm, 1.0, {}}};
+  std::vector<FreeRegistration> registrations(1);
   ScalePrediction prediction(sweep, reference, known_offset_mm);
   std::size_t done = 0;
   // Waves that double: within one, every start comes from the law of the waves before.
-  std::size_t wave = known_offset_mm ? order.size() : 2;
   while (done < order.size()) {
-    const std::size_t count = std::min(wave, order.size() - done);
-    std::vector<std::optional<double>> scales(count);
+    const std::size_t count = std::min(std::max(kFirstWave, done), order.size() - done);
+    std::vector<std::optional<FreeRegistration>> found(count);
     model::ParallelFor(static_cast<int>(count), threads, [&](int i) {
       const std::size_t frame = order[done + static_cast<std::size_t>(i)];
-      scales[static_cast<std::size_t>(i)] =
-          RegisterScale(reference_grey, ForRegistration(sweep, frame),
-                        prediction.At(sweep.frames[frame].reading_mm));
+      found[static_cast<std::size_t>(i)] = RegisterAnyhow(
+          reference_grey, read_grey(frame), prediction.At(sweep.frames[frame].reading_mm), centre);
       tick();
     });
     for (std::size_t i = 0; i < count; ++i) {
+      if (!found[i]) continue;
       const std::size_t frame = order[done + i];
-      if (scales[i]) samples.push_back({frame, sweep.frames[frame].reading_mm, *scales[i]});
+      const Registration alone = found[i]->WithCubic(0, 0);
+      samples.push_back({frame, sweep.frames[frame].reading_mm, alone.scale, alone});
+      registrations.push_back(*found[i]);
     }
     prediction.Learn(samples);
     done += count;
-    wave = std::max<std::size_t>(wave, done / 2);
   }
+  TakeOutDistortion(RegionCornerRadiusPx(sweep), registrations, &samples);
   return samples;
 }
 

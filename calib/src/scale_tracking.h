@@ -2,6 +2,7 @@
 #define THICKLENS_CALIB_SRC_SCALE_TRACKING_H_
 
 #include <functional>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
 
@@ -11,11 +12,20 @@ namespace thicklens::calib {
 
 // Registers the frames of a sweep to one reference, from the nearest readings outward: the law
 // found so far says where the next registration starts, so that a periodic target cannot catch it a
-// period off. `known_offset_mm` starts it off where the bench zero is given. `tick` is called once
-// a frame.
-std::vector<ScaleSample> TrackScale(const FocusSweep& sweep, const std::vector<std::size_t>& frames,
-                                    std::size_t reference, std::optional<double> known_offset_mm,
-                                    int threads, const std::function<void()>& tick);
+// period off. Where that fails (a wrong reading), a ladder of scales is tried. `known_offset_mm`
+// starts it off where the bench zero is given. `read_grey` gives the linear grey light of a frame
+// (CV_32F) and is called from several threads; `tick` is called once a frame. Radial distortion
+// that the frames show together is taken out of the scales, and what is not known of it goes into
+// their errors.
+std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
+                                    const std::function<cv::Mat(std::size_t)>& read_grey,
+                                    const std::vector<std::size_t>& frames, std::size_t reference,
+                                    std::optional<double> known_offset_mm, int threads,
+                                    const std::function<void()>& tick);
+
+// Where the optical axis meets the region of interest, and how far its farthest corner is.
+cv::Point2d RegionCentre(const FocusSweep& sweep);
+double RegionCornerRadiusPx(const FocusSweep& sweep);
 
 }  // namespace thicklens::calib
 

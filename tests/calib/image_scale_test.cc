@@ -1,74 +1,18 @@
+// The laws by which the image scale can go with the readings, on samples that are made up.
 #include "thicklens/calib/image_scale.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <random>
-
-#include "simulated_sweep.h"
 
 namespace thicklens::calib {
 namespace {
 
 using model::BenchDirection;
 using ::testing::HasSubstr;
-using thicklens::testing::SweepCase;
-
-// 360 to 440 mm in steps of 10 mm, 400 mm in the middle, without drift or with some.
-std::vector<cv::Mat> Frames(std::uint64_t seed, double drift_sigma_px) {
-  model::SweepSimulationOptions options = SweepCase("iii", 256, seed);
-  options.drift_sigma_px = drift_sigma_px;
-  options.first_depth_mm = 360;
-  options.step_mm = 10;
-  options.frame_count = 9;
-  const auto rendered = thicklens::testing::Simulate(options);
-  std::vector<cv::Mat> frames;
-  for (std::size_t i = 0; i < rendered.stored->size(); ++i)
-    frames.push_back(LinearGrey((*rendered.stored)[i], rendered.sweep, i));
-  return frames;
-}
-constexpr std::size_t kMiddle = 4;
-double TrueScale(std::size_t frame) { return 400 / (360 + 10 * static_cast<double>(frame)); }
-
-TEST(RegisterScale, FindsTheScaleOfARenderedFrame) {
-  for (const std::uint64_t seed : {1U, 2U}) {
-    const auto frames = Frames(seed, 1.5);  // the target moves sideways
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      if (i == kMiddle) continue;
-      // Started 1 % off.
-      const auto scale = RegisterScale(frames[kMiddle], frames[i], TrueScale(i) * 1.01);
-      ASSERT_TRUE(scale) << i;
-      EXPECT_NEAR(*scale, TrueScale(i), 1e-3) << "frame " << i;
-    }
-  }
-}
-
-TEST(RegisterScale, ALampThatChangesDoesNotMatter) {
-  const auto frames = Frames(3, 0);
-  const auto scale = RegisterScale(frames[kMiddle], 0.4 * frames[6] + 0.05, TrueScale(6));
-  ASSERT_TRUE(scale);
-  EXPECT_NEAR(*scale, TrueScale(6), 1e-3);
-}
-
-TEST(RegisterScale, RejectsAnUnrelatedPicture) {
-  std::vector<cv::Mat> pictures;
-  for (std::uint64_t seed = 10; seed < 15; ++seed) pictures.push_back(Frames(seed, 0)[kMiddle]);
-  for (const cv::Mat& reference : pictures) {
-    for (const cv::Mat& frame : pictures) {
-      EXPECT_EQ(RegisterScale(reference, frame, 1).has_value(), reference.data == frame.data);
-    }
-  }
-}
-
-TEST(RegisterScale, RejectsAPictureStretchedOneWay) {
-  const cv::Mat reference = Frames(4, 0)[kMiddle];
-  cv::Mat stretched;
-  cv::warpAffine(reference, stretched, cv::Matx23d(1.04, 0, -5, 0, 1, 0), reference.size(),
-                 cv::INTER_CUBIC, cv::BORDER_REFLECT);
-  EXPECT_FALSE(RegisterScale(reference, stretched, 1.02));
-}
 
 // 1/scale = (offset + sign reading)/z_reference, with errors of the readings.
 std::vector<ScaleSample> Samples(double offset_mm, BenchDirection direction, int count,
@@ -80,8 +24,11 @@ std::vector<ScaleSample> Samples(double offset_mm, BenchDirection direction, int
   for (int i = 0; i < count; ++i) {
     const double depth_mm = 340 + 120.0 * i / (count - 1);
     const double reading_mm = sign * (depth_mm - offset_mm);
-    samples.push_back({static_cast<std::size_t>(i), reading_mm + reading_sigma_mm * noise(random),
-                       400 / depth_mm});
+    ScaleSample sample;
+    sample.frame = static_cast<std::size_t>(i);
+    sample.reading_mm = reading_mm + reading_sigma_mm * noise(random);
+    sample.scale = sample.registration.scale = 400 / depth_mm;
+    samples.push_back(sample);
   }
   return samples;
 }
@@ -91,6 +38,7 @@ TEST(FitScaleLaw, IsExactOnExactSamplesInBothDirections) {
     for (const double offset_mm : {-37.5, 0.0, 106.5}) {
       const ScaleLaw law = FitScaleLaw(Samples(offset_mm, direction, 21, 0, 1), 10, 0, direction);
       ASSERT_TRUE(law.done) << law.message;
+      EXPECT_EQ(law.kind, ScaleKind::kInverseDepth);
       EXPECT_NEAR(law.offset_mm.value, offset_mm, 1e-9);
       EXPECT_NEAR(law.reference_depth_mm, 400, 1e-9);
       EXPECT_EQ(law.frames_used, 21);
@@ -130,24 +78,157 @@ TEST(FitScaleLaw, AFewWrongReadingsDoNotMoveIt) {
   EXPECT_EQ(law.frames_used, 27);
 }
 
+// Scales with errors of their own, told of them.
+void AddScaleErrors(double sigma, unsigned seed, std::vector<ScaleSample>* samples) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 1);
+  for (ScaleSample& s : *samples) {
+    s.scale *= 1 + sigma * noise(random);
+    s.registration.scale = s.scale;
+    s.registration.scale_sigma = sigma * s.scale;
+  }
+}
+
+TEST(FitScaleLaw, ScalesWeighByTheirOwnErrors) {
+  // Every other scale is bad and says so.
+  constexpr int kRuns = 60;
+  double told = 0, untold = 0;
+  for (unsigned run = 0; run < kRuns; ++run) {
+    auto samples = Samples(20, BenchDirection::kAway, 31, 0.02, 200 + run);
+    std::mt19937 random(run);
+    std::normal_distribution<double> noise(0, 1);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double sigma = i % 2 == 0 ? 1e-5 : 1e-3;
+      samples[i].scale *= 1 + sigma * noise(random);
+      samples[i].registration.scale_sigma = sigma * samples[i].scale;
+    }
+    const ScaleLaw law = FitScaleLaw(samples, 15, 0.02, BenchDirection::kAway);
+    ASSERT_TRUE(law.done) << law.message;
+    told += std::pow(law.offset_mm.value - 20, 2);
+    for (ScaleSample& s : samples) s.registration.scale_sigma = 0;
+    untold +=
+        std::pow(FitScaleLaw(samples, 15, 0.02, BenchDirection::kAway).offset_mm.value - 20, 2);
+  }
+  EXPECT_LT(told, 0.3 * untold);
+}
+
+TEST(FitScaleLaw, SigmaCoversTheErrorsOfTheScales) {
+  double squares = 0;
+  constexpr int kRuns = 100;
+  for (unsigned run = 0; run < kRuns; ++run) {
+    auto samples = Samples(20, BenchDirection::kAway, 31, 0.01, 300 + run);
+    AddScaleErrors(3e-4, 400 + run, &samples);
+    const ScaleLaw law = FitScaleLaw(samples, 15, 0.01, BenchDirection::kAway);
+    ASSERT_TRUE(law.done) << law.message;
+    squares += std::pow((law.offset_mm.value - 20) / law.offset_mm.sigma, 2) / kRuns;
+  }
+  EXPECT_GT(std::sqrt(squares), 0.5);
+  EXPECT_LT(std::sqrt(squares), 1.2);
+}
+
+TEST(FitScaleLaw, OneReadingMayBeWrongByAnyAmount) {
+  const auto right = Samples(20, BenchDirection::kAway, 21, 0.05, 11);
+  const ScaleLaw clean = FitScaleLaw(right, 10, 0.05, BenchDirection::kAway);
+  for (const double error_mm : {-1e6, -300.0, -1.0, 3.0, 50.0, 1e4}) {
+    for (const std::size_t frame : {std::size_t{0}, std::size_t{10}, std::size_t{20}}) {
+      auto samples = right;
+      samples[frame].reading_mm += error_mm;
+      const ScaleLaw law = FitScaleLaw(samples, 10, 0.05, BenchDirection::kAway);
+      ASSERT_TRUE(law.done) << error_mm << ": " << law.message;
+      EXPECT_NEAR(law.offset_mm.value, clean.offset_mm.value, 1.5 * clean.offset_mm.sigma);
+      EXPECT_EQ(law.frames_used, 20) << error_mm;
+      EXPECT_LT(law.reading_rms_mm, 0.1);
+    }
+  }
+}
+
+TEST(FitScaleLaw, AFifthOfTheFramesMayBeWrong) {
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    auto samples = Samples(20, BenchDirection::kAway, 30, 0.05, 30 + seed);
+    const ScaleLaw clean = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+    std::mt19937 random(seed);
+    std::vector<std::size_t> order(samples.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::shuffle(order.begin(), order.end(), random);
+    std::uniform_real_distribution<double> wrong(5, 80);
+    for (std::size_t i = 0; i < 6; ++i) samples[order[i]].reading_mm += wrong(random);
+    const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway);
+    ASSERT_TRUE(law.done) << law.message;
+    EXPECT_NEAR(law.offset_mm.value, clean.offset_mm.value, 3 * law.offset_mm.sigma);
+    EXPECT_EQ(law.frames_used, 24);
+  }
+}
+
+// The readings of a bench, in any other order than the frames'.
+TEST(FitScaleLaw, ReadingsInARandomOrderFollowNoLaw) {
+  for (const int count : {7, 15, 41, 131}) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      auto samples = Samples(20, BenchDirection::kAway, count, 0.05, seed);
+      AddScaleErrors(3e-5, seed, &samples);
+      std::vector<double> readings;
+      for (const ScaleSample& s : samples) readings.push_back(s.reading_mm);
+      std::mt19937 random(seed);
+      std::shuffle(readings.begin(), readings.end(), random);
+      for (std::size_t i = 0; i < samples.size(); ++i) samples[i].reading_mm = readings[i];
+      const ScaleLaw law = FitScaleLaw(samples, 0, 0.05, BenchDirection::kAway);
+      EXPECT_FALSE(law.done);
+      EXPECT_EQ(law.kind, ScaleKind::kUnknown) << count << " frames, seed " << seed;
+      EXPECT_THAT(law.message, HasSubstr("does not follow the readings"));
+      EXPECT_FALSE(law.distortion_at_corner);
+    }
+  }
+}
+
 TEST(FitScaleLaw, RefusesAConstantScale) {
-  auto samples = Samples(0, BenchDirection::kAway, 21, 0, 1);
-  std::mt19937 random(2);
-  std::normal_distribution<double> noise(1, 2e-5);
-  for (ScaleSample& s : samples) s.scale = noise(random);
-  const ScaleLaw law = FitScaleLaw(samples, 10, 0.05, BenchDirection::kAway);
+  for (const double sigma : {0.0, 2e-5, 1e-4}) {
+    auto samples = Samples(0, BenchDirection::kAway, 21, 0, 1);
+    for (ScaleSample& s : samples) s.scale = 1;
+    AddScaleErrors(sigma, 2, &samples);
+    samples[5].scale = 1.3;  // a registration that failed
+    const ScaleLaw law = FitScaleLaw(samples, 10, 0.05, BenchDirection::kAway);
+    EXPECT_FALSE(law.done);
+    EXPECT_EQ(law.kind, ScaleKind::kConstant) << law.message;
+    EXPECT_THAT(law.message, HasSubstr("does not change with the reading"));
+    EXPECT_THAT(law.message, HasSubstr("state offset_mm"));
+  }
+}
+
+// Half a millimetre at 2 m changes the scale by 2.5e-4, which errors of 3e-4 hide.
+TEST(FitScaleLaw, TooShortARangeTellsNothing) {
+  std::vector<ScaleSample> samples;
+  for (std::size_t i = 0; i < 9; ++i) {
+    ScaleSample sample;
+    sample.frame = i;
+    sample.reading_mm = 2000 + 0.0625 * static_cast<double>(i);
+    sample.scale = 2000.25 / sample.reading_mm;
+    samples.push_back(sample);
+  }
+  AddScaleErrors(3e-4, 4, &samples);
+  const ScaleLaw law = FitScaleLaw(samples, 4, 0.001, BenchDirection::kAway);
   EXPECT_FALSE(law.done);
-  EXPECT_THAT(law.message, HasSubstr("does not change with the reading"));
+  EXPECT_EQ(law.kind, ScaleKind::kUnknown);
+  EXPECT_THAT(law.message, HasSubstr("too little to tell"));
+  EXPECT_THAT(law.message, HasSubstr("extend the sweep"));
+  // Without the errors it is seen for what it is.
+  for (ScaleSample& s : samples) {
+    s.scale = 2000.25 / s.reading_mm;
+    s.registration.scale_sigma = 1e-6;
+  }
+  const ScaleLaw clear = FitScaleLaw(samples, 4, 0.0001, BenchDirection::kAway);
+  EXPECT_EQ(clear.kind, ScaleKind::kInverseDepth);
+  EXPECT_GT(clear.offset_mm.sigma, 50);
 }
 
 TEST(FitScaleLaw, RefusesAReversedScaleAndNamesTheDirection) {
   const ScaleLaw away = FitScaleLaw(Samples(700, BenchDirection::kToward, 21, 0.05, 1), 10, 0.05,
                                     BenchDirection::kAway);
   EXPECT_FALSE(away.done);
+  EXPECT_EQ(away.kind, ScaleKind::kReversed);
   EXPECT_THAT(away.message, HasSubstr("direction must be 'toward', not 'away'"));
   const ScaleLaw toward = FitScaleLaw(Samples(0, BenchDirection::kAway, 21, 0.05, 1), 10, 0.05,
                                       BenchDirection::kToward);
   EXPECT_FALSE(toward.done);
+  EXPECT_EQ(toward.kind, ScaleKind::kReversed);
   EXPECT_THAT(toward.message, HasSubstr("direction must be 'away', not 'toward'"));
 }
 
@@ -158,11 +239,16 @@ TEST(FitScaleLaw, RefusesScalesThatScatterWithoutALaw) {
   std::vector<ScaleSample> samples;
   for (std::size_t i = 0; i < 41; ++i) {
     const double reading_mm = 320 + 4.0 * static_cast<double>(i);
-    samples.push_back({i, reading_mm, 400 / reading_mm * std::exp(wrong(random))});
+    ScaleSample sample;
+    sample.frame = i;
+    sample.reading_mm = reading_mm;
+    sample.scale = 400 / reading_mm * std::exp(wrong(random));
+    samples.push_back(sample);
   }
   const ScaleLaw law = FitScaleLaw(samples, 20, 0.07, model::BenchDirection::kAway);
   EXPECT_FALSE(law.done);
-  EXPECT_THAT(law.message, HasSubstr("not found reliably"));
+  EXPECT_EQ(law.kind, ScaleKind::kUnknown);
+  EXPECT_THAT(law.message, HasSubstr("does not follow the readings"));
 }
 
 TEST(FitScaleLaw, RefusesFewerThanFive) {
@@ -172,6 +258,59 @@ TEST(FitScaleLaw, RefusesFewerThanFive) {
   EXPECT_THAT(law.message, HasSubstr("measured on 4 frames, 5 are needed"));
   EXPECT_TRUE(
       FitScaleLaw(Samples(0, BenchDirection::kAway, 5, 0, 1), 2, 0.05, BenchDirection::kAway).done);
+}
+
+TEST(FitScaleLaw, RefusesFewerThanFiveDifferentReadings) {
+  auto samples = Samples(0, BenchDirection::kAway, 12, 0, 1);
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i].reading_mm = 100 + double(i % 4);
+  const ScaleLaw law = FitScaleLaw(samples, 2, 0.05, BenchDirection::kAway);
+  EXPECT_FALSE(law.done);
+  EXPECT_THAT(law.message, HasSubstr("5 are needed at different readings"));
+}
+
+// Cubic terms by the closed form k (1 - 1/s^2), with errors and wrong ones among them.
+TEST(FitScaleLaw, ReportsTheDistortionOfTheCorner) {
+  constexpr double kCornerPx = 360, kDistortion = -0.012;
+  const double k = kDistortion / (kCornerPx * kCornerPx);
+  double squares = 0;
+  constexpr int kRuns = 40;
+  for (unsigned run = 0; run < kRuns; ++run) {
+    auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 500 + run);
+    std::mt19937 random(run);
+    std::normal_distribution<double> noise(0, 1);
+    for (ScaleSample& s : samples) {
+      s.registration.cubic_sigma = 0.05 * std::abs(k);
+      s.registration.cubic = k * (1 - 1 / (s.scale * s.scale)) + 0.05 * std::abs(k) * noise(random);
+    }
+    samples[3].registration.cubic *= -20;
+    const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway, kCornerPx);
+    ASSERT_TRUE(law.done && law.distortion_at_corner) << law.message;
+    EXPECT_NEAR(law.distortion_at_corner->value, kDistortion, 0.25 * std::abs(kDistortion));
+    squares +=
+        std::pow((law.distortion_at_corner->value - kDistortion) / law.distortion_at_corner->sigma,
+                 2) /
+        kRuns;
+    EXPECT_FALSE(FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway).distortion_at_corner);
+  }
+  EXPECT_GT(std::sqrt(squares), 0.5);
+  EXPECT_LT(std::sqrt(squares), 1.3);
+}
+
+// What is not known of the distortion is not known of the offset either.
+TEST(FitScaleLaw, UncertainDistortionWidensTheOffset) {
+  auto samples = Samples(20, BenchDirection::kAway, 31, 0.05, 9);
+  double narrow_mm = 0;
+  for (const double corner_sigma : {1e-5, 3e-2}) {
+    for (ScaleSample& s : samples) s.registration.cubic_sigma = corner_sigma / (360 * 360);
+    const ScaleLaw law = FitScaleLaw(samples, 15, 0.05, BenchDirection::kAway, 360);
+    ASSERT_TRUE(law.done);
+    if (corner_sigma < 1e-3) {
+      narrow_mm = law.offset_mm.sigma;
+    } else {
+      EXPECT_GT(law.offset_mm.sigma, 3 * narrow_mm);
+      EXPECT_FALSE(law.distortion_at_corner);
+    }
+  }
 }
 
 }  // namespace
