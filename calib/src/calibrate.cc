@@ -11,11 +11,17 @@
 #include <numeric>
 #include <set>
 
-#include "blur_fit.h"
+#include "blur_measurement.h"
 #include "edge_pixels.h"
+#include "field_map.h"
 #include "focus_solution.h"
+#include "frame_store.h"
+#include "reading_gates.h"
 #include "scale_tracking.h"
 #include "sharpness_peak.h"
+#include "source_recipe.h"
+#include "systematic_parts.h"
+#include "target_period.h"
 #include "thicklens/calib/edge_blur.h"
 #include "thicklens/calib/sharpness.h"
 #include "thicklens/error.h"
@@ -30,13 +36,8 @@ constexpr double kEdgeThreshold = 0.25;
 // Fewer edges than this and a contrast below this part of the median: the target is not to be seen.
 constexpr int kFewestEdges = 12;
 constexpr double kFaintContrast = 0.5;
-// |d reading/d variance - 1| below this: the target's edges stand alone, readings are absolute.
-constexpr double kIsolatedEdges = 0.08;
-constexpr double kStatedEdges = 0.2;  // the same where the target is stated to be an edge
-// What the meter itself is good for, relative to the variance it measures.
-constexpr double kAbsoluteMeterError = 0.01;
-constexpr double kRelativeMeterError = 0.03;
-
+// Unless it still shows where the noise is averaged out.
+constexpr double kClearTexture = 3;
 // Files are named as the table of readings names them, not by where they lie on this machine.
 std::string FileName(const std::string& image) {
   return std::filesystem::path(image).filename().string();
@@ -45,7 +46,7 @@ std::string FileName(const std::string& image) {
 class Calibrator {
  public:
   Calibrator(const FocusSweep& sweep, const CalibrationOptions& options)
-      : sweep_(sweep), options_(options) {
+      : sweep_(sweep), options_(options), store_(sweep) {
     total_steps_ = 4 * static_cast<int>(sweep.frames.size());
     for (const model::SweepFrame& frame : sweep.frames) {
       FrameMeasurement measurement;
@@ -58,10 +59,9 @@ class Calibrator {
   Calibration Run() {
     const auto begin = std::chrono::steady_clock::now();
     if (MeasureAndGate() && MeasureSharpness() && FindDepths()) {
-      RunSourceRecipe();
+      result_.source = RunSourceRecipe(sweep_.camera, result_.frames, used_);
       FitPeak();
-      MeasureBlur();
-      SolveFocus(sweep_, blur_samples_, absolute_, reference_, &result_);
+      MeasureAndSolve();
     }
     result_.frames_used =
         result_.blur.done ? result_.blur.frames_used : static_cast<int>(used_.size());
@@ -92,9 +92,7 @@ class Calibrator {
     });
   }
 
-  cv::Mat Grey(std::size_t frame) const {
-    return LinearGrey(sweep_.read_frame(frame), sweep_, frame);
-  }
+  cv::Mat Grey(std::size_t frame) { return store_.Grey(frame); }
 
   // Absolute gates on every frame, then the blank gate against the median of those that passed.
   bool MeasureAndGate() {
@@ -102,21 +100,22 @@ class Calibrator {
     if (!HasEnoughFrames(sweep_, &why)) return Refuse(why);
     model::ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
       const auto index = static_cast<std::size_t>(i);
-      const cv::Mat stored = sweep_.read_frame(index);
       result_.frames[index].statistics =
-          MeasureFrame(RegionOf(stored, sweep_, index), LinearGrey(stored, sweep_, index));
+          MeasureFrame(RegionOf(store_.Stored(index), sweep_, index), store_.Grey(index));
       Tick();
     });
+    GateOptions gates = options_.gates;
+    gates.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
     std::vector<double> contrasts;
     for (const FrameMeasurement& frame : result_.frames) {
-      if (!RejectionReason(frame.statistics, 0, options_.gates))
+      if (!RejectionReason(frame.statistics, 0, gates))
         contrasts.push_back(frame.statistics.contrast);
     }
     const double median_contrast = Median(contrasts);
     used_.resize(sweep_.frames.size());
     std::iota(used_.begin(), used_.end(), std::size_t{0});
     const auto reason = [&](std::size_t i) {
-      return RejectionReason(result_.frames[i].statistics, median_contrast, options_.gates);
+      return RejectionReason(result_.frames[i].statistics, median_contrast, gates);
     };
     return KeepOnly([&](std::size_t i) { return !reason(i); },
                     [&](std::size_t i) { return *reason(i); });
@@ -132,14 +131,12 @@ class Calibrator {
     ForEachUsed([&](std::size_t i) {
       FrameMeasurement& frame = result_.frames[i];
       const cv::Mat grey = Grey(i);
-      SharpnessOptions raw;
-      raw.edge_threshold = kEdgeThreshold * steepest;
-      frame.mean_edge_slope = MeanEdgeSlope(grey, raw).mean_edge_slope;
-      SharpnessOptions normalised;
-      normalised.edge_threshold = kEdgeThreshold * steepest_relative;
-      const SharpnessIndex index = MeanEdgeSlope(grey / frame.statistics.mean_linear, normalised);
-      frame.normalised_edge_slope = index.mean_edge_slope;
-      frame.edge_count = index.edge_count;
+      const double mean = frame.statistics.mean_linear;
+      const std::vector<SharpnessIndex> indices = MeanEdgeSlopes(
+          grey, {}, {kEdgeThreshold * steepest, kEdgeThreshold * steepest_relative * mean});
+      frame.mean_edge_slope = indices[0].mean_edge_slope;
+      frame.normalised_edge_slope = indices[1].mean_edge_slope / mean;
+      frame.edge_count = indices[1].edge_count;
       if (const auto blur = MeasureSourceEdgeBlur(grey))
         frame.source_blur_sigma_px = blur->sigma_px;
     });
@@ -158,7 +155,8 @@ class Calibrator {
     const auto shows_target = [&](std::size_t i) {
       const FrameMeasurement& frame = result_.frames[i];
       return frame.edge_count >= kFewestEdges ||
-             frame.statistics.contrast >= kFaintContrast * median_contrast;
+             frame.statistics.contrast >= kFaintContrast * median_contrast ||
+             frame.statistics.coarse_texture >= kClearTexture;
     };
     return KeepOnly(shows_target, [&](std::size_t i) {
       return fmt::format(
@@ -210,14 +208,28 @@ class Calibrator {
   bool FindDepths() {
     std::optional<double> known_mm;
     if (sweep_.offset_mm) known_mm = sweep_.offset_mm->value;
-    const auto samples =
-        TrackScale(sweep_, used_, reference_, known_mm, options_.threads, [this] { Tick(); });
-    for (const ScaleSample& sample : samples)
+    const std::vector<ScaleSample> samples = TrackScale(
+        sweep_, [this](std::size_t frame) { return Grey(frame); }, used_, reference_, known_mm,
+        options_.threads, [this] { Tick(); });
+    for (const ScaleSample& sample : samples) {
       result_.frames[sample.frame].image_scale = sample.scale;
+      result_.frames[sample.frame].image_scale_sigma = sample.registration.scale_sigma;
+    }
     result_.scale = FitScaleLaw(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
-                                sweep_.direction);
-    for (const ScaleSample& sample : samples)
+                                sweep_.direction, RegionCornerRadiusPx(sweep_));
+    if (const auto reason = ReasonAgainstScales(sweep_, result_.frames, used_, result_.scale))
+      return Refuse(*reason);
+    RejectUnregistered(samples);
+    RejectWrongReadings(sweep_, samples, result_.scale, &result_.frames);
+    if (!KeepOnly([&](std::size_t i) { return result_.frames[i].rejection.empty(); },
+                  [&](std::size_t i) { return result_.frames[i].rejection; }))
+      return false;
+    for (const ScaleSample& sample : samples) {
+      if (!result_.frames[sample.frame].rejection.empty()) continue;
+      scales_.push_back(sample);
       result_.frames[sample.frame].in_scale_fit = result_.scale.done;
+    }
+    ReplaceReference();
     if (sweep_.offset_mm) {
       result_.bench_offset_mm =
           Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
@@ -227,11 +239,71 @@ class Calibrator {
     } else {
       return Refuse("offset_mm is unknown and was not found: " + result_.scale.message);
     }
+    WarnOfDistortion();
+    slip_ = FindSlip(scales_, result_.scale);
     const double sign = model::DirectionSign(sweep_.direction);
     for (FrameMeasurement& frame : result_.frames) {
       frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
     }
     return RejectImpossibleDepths();
+  }
+
+  // The sharpest frame may be the one whose reading is wrong: the next sharpest takes its place,
+  // and what was registered to the one is said of the other.
+  //   p = c + t_i + s_i R_i (p_0 - c) for the frame and for the new reference r gives
+  //   scale s_i/s_r, rotation R_i R_r^-1, shift t_i - (s_i/s_r) R_i R_r^-1 t_r.
+  void ReplaceReference() {
+    if (result_.frames[reference_].rejection.empty()) return;
+    const ScaleSample* next = nullptr;
+    for (const ScaleSample& sample : scales_) {
+      if (next == nullptr || result_.frames[sample.frame].normalised_edge_slope >
+                                 result_.frames[next->frame].normalised_edge_slope)
+        next = &sample;
+    }
+    if (next == nullptr) {
+      reference_ = used_.front();
+      return;
+    }
+    const Registration base = next->registration;
+    reference_ = next->frame;
+    for (ScaleSample& sample : scales_) {
+      Registration& r = sample.registration;
+      const double ratio = r.scale / base.scale;
+      const double angle = r.rotation_rad - base.rotation_rad;
+      const double c = std::cos(angle), s = std::sin(angle);
+      const Eigen::Vector2d turned(c * base.shift_px.x() - s * base.shift_px.y(),
+                                   s * base.shift_px.x() + c * base.shift_px.y());
+      r.shift_px -= ratio * turned;
+      r.scale = ratio;
+      r.scale_x /= base.scale_x;
+      r.scale_y /= base.scale_y;
+      r.rotation_rad = angle;
+      sample.scale = ratio;
+    }
+  }
+
+  // Where the others follow a law, a frame that does not register shows something else.
+  void RejectUnregistered(const std::vector<ScaleSample>& samples) {
+    if (!result_.scale.done) return;
+    std::set<std::size_t> registered;
+    for (const ScaleSample& sample : samples) registered.insert(sample.frame);
+    for (const std::size_t i : used_) {
+      if (registered.count(i) > 0) continue;
+      result_.frames[i].rejection =
+          fmt::format("does not show the target of {}: the two cannot be registered",
+                      FileName(result_.frames[reference_].image));
+    }
+  }
+
+  void WarnOfDistortion() {
+    const auto& distortion = result_.scale.distortion_at_corner;
+    if (!distortion || !(std::abs(distortion->value) > std::max(0.005, 4 * distortion->sigma)))
+      return;
+    result_.warnings.push_back(
+        fmt::format("the pictures are distorted: {:+.1f} +- {:.1f} % at the corner ({}); undistort "
+                    "them first, depth and blur are those of an undistorted camera",
+                    100 * distortion->value, 100 * distortion->sigma,
+                    distortion->value > 0 ? "pincushion" : "barrel"));
   }
 
   // Nearer than the front focal point no image forms: such a frame shows something else, such as
@@ -264,35 +336,6 @@ class Calibrator {
     }
   }
 
-  // Supplement, section 5: the sharpest raw frame is taken for the plane of focus, kappa is the
-  // mean of sigma/r_defocus. Erratum of the source: the sharpest raw frame is not the plane of
-  // focus (lamp, magnification and floor pull it), and the mean of ratios is dominated by frames
-  // near focus.
-  void RunSourceRecipe() {
-    SourceRecipe& recipe = result_.source;
-    const std::size_t sharpest =
-        *std::max_element(used_.begin(), used_.end(), [&](std::size_t a, std::size_t b) {
-          return result_.frames[a].mean_edge_slope < result_.frames[b].mean_edge_slope;
-        });
-    const model::ThickLens& lens = sweep_.camera.lens;
-    recipe.sharpest_frame = static_cast<int>(sharpest);
-    recipe.focus_depth_mm = result_.frames[sharpest].depth_mm;
-    recipe.image_distance_mm = model::ImageDistanceMm(lens, recipe.focus_depth_mm);
-    double sum = 0;
-    for (const std::size_t i : used_) {
-      const FrameMeasurement& frame = result_.frames[i];
-      const double radius_px = model::BlurRadiusMm(lens, recipe.image_distance_mm, frame.depth_mm) /
-                               sweep_.camera.sensor.pixel_pitch_mm;
-      // The sharpest frame itself has r_defocus = 0 by construction (up to rounding).
-      if (frame.depth_mm == recipe.focus_depth_mm || !(frame.source_blur_sigma_px > 0)) continue;
-      sum += frame.source_blur_sigma_px / radius_px;
-      ++recipe.ratio_frames;
-    }
-    if (recipe.ratio_frames > 0) recipe.blur_ratio = sum / recipe.ratio_frames;
-    recipe.done = recipe.ratio_frames > 0;
-    recipe.message = recipe.done ? "done" : "no frame away from focus has measurable edges";
-  }
-
   void FitPeak() {
     std::vector<SharpnessSample> samples;
     for (const std::size_t i : used_) {
@@ -309,67 +352,95 @@ class Calibrator {
     return noises[noises.size() / 10];
   }
 
-  // A stated target decides; what the meter says of it may contradict, and is told.
-  bool ReadingsAreAbsolute(const std::optional<double>& slope) {
-    const double off = slope ? std::abs(*slope - 1) : 1;
-    switch (sweep_.target) {
-      case model::SweepTarget::kTexture:
-        return false;
-      case model::SweepTarget::kPrintedEdge:
-      case model::SweepTarget::kKnifeEdge:
-        if (off < kStatedEdges) return true;
-        result_.warnings.push_back(
-            fmt::format("the target is stated as {}, but the blur meter does not find isolated "
-                        "edges with a Gaussian blur in the sharpest "
-                        "frame: it is treated as a texture",
-                        model::SweepTargetName(sweep_.target)));
-        return false;
-      default:
-        return off < kIsolatedEdges;
+  void MeasureAndSolve() {
+    const double start_mm = result_.sharpness.done ? result_.sharpness.focus_depth_mm
+                                                   : result_.frames[reference_].depth_mm;
+    BlurTask task(sweep_, store_);
+    task.frames = used_;
+    task.reference = reference_;
+    task.scales = scales_;
+    task.law =
+        result_.scale.kind == ScaleKind::kConstant ? BlurLaw::kTelecentric : BlurLaw::kPerspective;
+    task.scale_follows_readings = result_.scale.done;
+    task.offset_mm = {result_.bench_offset_mm->value, result_.bench_offset_mm->sigma};
+    task.reading_sigma_mm = sweep_.reading_sigma_mm;
+    task.reading_sigma_is_known = sweep_.reading_sigma_mm > 0;
+    if (!task.reading_sigma_is_known && result_.scale.done) {
+      // Nobody stated it, but the scale law has measured it.
+      task.reading_sigma_mm = result_.scale.reading_rms_mm;
+    }
+    const auto [nearest, farthest] = DepthRange();
+    task.start_focus_depth_mm = std::clamp(start_mm, nearest, farthest);
+    task.pixel_noise = SweepNoise();
+    task.threads = options_.threads;
+    task.tick = [this] { Tick(); };
+    BlurEvidence evidence = MeasureBlur(task);
+    BlurFitResult fit;
+    SolveFocus(sweep_, &evidence, &fit, &result_);
+    CheckMagnification();
+    if (slip_ && result_.outcome != Outcome::kRefused) {
+      const FrameMeasurement& frame = result_.frames[slip_->frame];
+      result_.warnings.push_back(fmt::format(
+          "the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} (reading {} "
+          "mm) "
+          "on: check the clamp and the table of readings there",
+          slip_->jump_mm.value, slip_->jump_mm.sigma, FileName(frame.image), frame.reading_mm));
+      WidenFocus("jump of the readings", std::abs(slip_->jump_mm.value),
+                 "find what slipped, or take the sweep again", sweep_.camera.lens, &result_);
+    }
+    if (options_.map_field && result_.outcome != Outcome::kRefused)
+      MapField(sweep_, evidence, fit, &store_, &result_);
+  }
+
+  // m = f1 D/(f2 z) on the sensor over the target, so D = m z f2/f1.
+  void CheckMagnification() {
+    if (!sweep_.target_period_mm || !result_.image_distance_mm) return;
+    const std::optional<PeriodEstimate> period = MeasurePeriodPx(Grey(reference_));
+    if (!period) {
+      result_.warnings.push_back(
+          "target_period_mm is stated, but the sharpest frame shows no period to compare with");
+      return;
+    }
+    const model::ThickLens& lens = sweep_.camera.lens;
+    const double depth_mm = result_.frames[reference_].depth_mm;
+    const double rear_mm = period->period_px * sweep_.camera.sensor.pixel_pitch_mm /
+                           *sweep_.target_period_mm * depth_mm * lens.rear_focal_length_mm /
+                           lens.front_focal_length_mm;
+    MagnificationCheck check;
+    check.period_px = period->period_px;
+    check.period_mm = *sweep_.target_period_mm;
+    check.image_distance_mm = {lens.lens_thickness_mm + rear_mm,
+                               rear_mm * std::hypot(period->sigma_px / period->period_px,
+                                                    result_.bench_offset_mm->sigma / depth_mm)};
+    result_.magnification = check;
+    const double apart_mm = check.image_distance_mm.value - result_.image_distance_mm->value;
+    const double sigma_mm =
+        std::hypot(check.image_distance_mm.sigma, result_.image_distance_mm->sigma);
+    if (std::abs(apart_mm) > 3 * sigma_mm) {
+      result_.warnings.push_back(fmt::format(
+          "the image scale of the target puts d1 at {:.4g} +- {:.2g} mm, {:+.1f} % from the focus: "
+          "focal length, pixel pitch, target_period_mm or the readings are off by as much",
+          check.image_distance_mm.value, check.image_distance_mm.sigma,
+          100 * apart_mm / result_.image_distance_mm->value));
     }
   }
 
-  void MeasureBlur() {
-    const cv::Mat reference = Grey(reference_);
-    const double noise = SweepNoise();
-    const std::optional<double> slope = EdgeMeterSlope(reference, noise, sweep_.camera.psf);
-    absolute_ = ReadingsAreAbsolute(slope);
-    const cv::Point2d centre(sweep_.camera.sensor.principal_point_px.x() - sweep_.roi.x,
-                             sweep_.camera.sensor.principal_point_px.y() - sweep_.roi.y);
-    std::mutex mutex;
-    ForEachUsed([&](std::size_t i) {
-      const FrameMeasurement& frame = result_.frames[i];
-      BlurSample sample;
-      sample.frame = i;
-      sample.reading_mm = frame.reading_mm;
-      std::optional<EdgeVariance> blur;
-      if (absolute_) {
-        blur = MeasureEdgeVariance(Grey(i));
-      } else {
-        if (i == reference_) return;  // relative to itself it says nothing
-        sample.relative_scale = result_.frames[reference_].depth_mm / frame.depth_mm;
-        blur = MeasureAddedVariance(reference, Grey(i), sample.relative_scale, centre, noise,
-                                    sweep_.camera.psf);
-      }
-      if (!blur) return;
-      sample.variance_px2 = blur->variance_px2;
-      sample.error_px2 =
-          std::hypot(blur->error_px2, (absolute_ ? kAbsoluteMeterError : kRelativeMeterError) *
-                                          std::abs(blur->variance_px2));
-      const std::lock_guard<std::mutex> lock(mutex);
-      blur_samples_.push_back(sample);
-    });
-    std::sort(blur_samples_.begin(), blur_samples_.end(),
-              [](const BlurSample& a, const BlurSample& b) { return a.frame < b.frame; });
+  std::pair<double, double> DepthRange() const {
+    const auto [low, high] =
+        std::minmax_element(used_.begin(), used_.end(), [&](std::size_t a, std::size_t b) {
+          return result_.frames[a].depth_mm < result_.frames[b].depth_mm;
+        });
+    return {result_.frames[*low].depth_mm, result_.frames[*high].depth_mm};
   }
 
   const FocusSweep& sweep_;
   const CalibrationOptions& options_;
+  FrameStore store_;
   Calibration result_;
-  std::vector<std::size_t> used_;  // frames that passed the gates
-  std::size_t reference_ = 0;      // the sharpest of them, normalised
-  bool absolute_ = false;          // the target's edges stand alone
-  std::vector<BlurSample> blur_samples_;
+  std::vector<std::size_t> used_;    // frames that passed the gates
+  std::size_t reference_ = 0;        // the sharpest of them, normalised
+  std::vector<ScaleSample> scales_;  // registered frames
+  std::optional<Slip> slip_;
   std::mutex progress_mutex_;
   int steps_done_ = 0;
   int total_steps_ = 0;
@@ -424,44 +495,6 @@ Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options
   if (!options.IsValid(&why)) throw Error("calibration options: " + why);
   if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
   return Calibrator(sweep, options).Run();
-}
-
-model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& calibration,
-                               bool use_source_recipe) {
-  model::Camera result = camera;
-  model::CameraCalibration found;
-  found.evidence.frames_used = calibration.frames_used;
-  for (const FrameMeasurement& frame : calibration.frames) {
-    if (!frame.rejection.empty())
-      found.evidence.frames_rejected.push_back({FileName(frame.image), frame.rejection});
-  }
-  const auto estimate = [](const std::optional<Result>& r) -> std::optional<model::Estimate> {
-    if (!r) return std::nullopt;
-    return model::Estimate{r->value, r->sigma};
-  };
-  found.bench_offset_mm = estimate(calibration.bench_offset_mm);
-  if (use_source_recipe) {
-    found.evidence.method = "source-recipe";
-    found.image_distance_mm = model::Estimate{calibration.source.image_distance_mm, 0};
-    found.blur_ratio = model::Estimate{calibration.source.blur_ratio, 0};
-    found.evidence.focus_depth_mm = model::Estimate{calibration.source.focus_depth_mm, 0};
-  } else {
-    found.evidence.method = "joint-blur-fit";
-    const auto& left_open = calibration.blur.undetermined;
-    const auto is_fixed = [&](const char* name) {
-      return std::find(left_open.begin(), left_open.end(), name) == left_open.end();
-    };
-    if (is_fixed("image_distance_mm"))
-      found.image_distance_mm = estimate(calibration.image_distance_mm);
-    if (is_fixed("blur_ratio")) found.blur_ratio = estimate(calibration.blur_ratio);
-    if (is_fixed("blur_floor_px")) found.blur_floor_px = estimate(calibration.blur_floor_px);
-    found.covariance_order = calibration.covariance_order;
-    found.covariance = calibration.covariance;
-    found.evidence.focus_depth_mm = estimate(calibration.focus_depth_mm);
-    found.evidence.chi2_per_dof = calibration.blur.chi2_per_dof;
-  }
-  result.calibration = found;
-  return result;
 }
 
 }  // namespace thicklens::calib

@@ -2,70 +2,60 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 
 #include "edge_pixels.h"
+#include "systematic_parts.h"
 
 namespace thicklens::calib {
 namespace {
 
 // A lens floor that nobody measured: between a perfect lens and a soft one, px.
 constexpr double kUnknownFloorFromPx = 0;
-constexpr double kUnknownFloorToPx = 0.7;
-// What the meter's own calibration is good for, relative to kappa (docs/calibration.md).
-constexpr double kAbsoluteRatioError = 0.015;
-constexpr double kRelativeRatioError = 0.05;
-// Weight of the robust loss below which a frame is told: six standard deviations off.
-constexpr double kOutlierWeight = 0.15;
-constexpr std::size_t kFewestOnASide = 8;
-constexpr double kSmallestRatio = 0.1, kLargestRatio = 0.8;
+constexpr double kUnknownFloorToPx = 1.0;
+// Weight of the robust loss below which a frame is told.
+constexpr double kOutlierWeight = 0.6;
+constexpr double kSmallestRatio = 0.2, kLargestRatio = 0.8;
+// Beyond these a lens is unusual: the full aperture gives .5 by second moment.
+constexpr double kLowRatio = 0.35, kHighRatio = 0.65;
+constexpr std::size_t kFewestFrames = 5;
+// A frame whose spectrum scatters by so much more than the others' shows something else.
+constexpr double kScatterOfDamage = 30;
 
 // What may be assumed of the variance at focus: a value, or only an interval.
 struct FloorChoice {
   std::optional<model::Estimate> variance_px2;  // nothing: fitted freely
-  std::optional<Eigen::Vector2d> interval_px2;  // (lo, hi): not known better
-  bool target_softness = false;
-  bool is_measured = false;  // the fit measures the lens floor itself
+  FloorInterval interval_px2;                   // (lo, hi): not known better
+  bool is_measured = false;                     // the fit measures the lens floor itself
 };
 
 class Solution {
  public:
-  Solution(const FocusSweep& sweep, const std::vector<BlurSample>& samples, bool absolute,
-           std::size_t reference, Calibration* calibration)
-      : sweep_(sweep), samples_(samples), absolute_(absolute), result_(*calibration) {
-    setup_.lens = sweep.camera.lens;
-    setup_.pixel_pitch_mm = sweep.camera.sensor.pixel_pitch_mm;
-    setup_.offset_mm = {result_.bench_offset_mm->value, result_.bench_offset_mm->sigma};
-    setup_.direction = sweep.direction;
-    setup_.reading_sigma_mm = sweep.reading_sigma_mm;
-    if (sweep.reading_sigma_mm == 0 && result_.scale.done) {
-      // Nobody stated it, but the scale law has measured it.
-      setup_.reading_sigma_mm = result_.scale.reading_rms_mm;
-    }
-    setup_.reference_reading_mm = sweep.frames[reference].reading_mm;
-    setup_.start_focus_depth_mm = result_.sharpness.done ? result_.sharpness.focus_depth_mm
-                                                         : result_.frames[reference].depth_mm;
-    setup_.start_focus_depth_mm = std::clamp(setup_.start_focus_depth_mm, Nearest(), Farthest());
-  }
+  Solution(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
+           Calibration* calibration)
+      : sweep_(sweep), evidence_(*evidence), fit_(*fit), result_(*calibration) {}
 
   void Run() {
+    if (evidence_.setup.meters.empty()) return Refuse(evidence_.message);
+    if (!ThrowOut()) return;
     const FloorChoice choice = ChooseFloor();
-    setup_.floor_variance_px2 = choice.variance_px2;
-    setup_.target_softness = choice.target_softness;
-    const BlurFitResult fit = FitBlur(samples_, setup_);
-    result_.blur.message = fit.message;
-    if (!fit.done) return Refuse(fit.message);
-    result_.blur.done = true;
-    result_.blur.chi2_per_dof = fit.chi2_per_dof;
-    FillFrames(fit);
-    FillValues(fit);
-    if (!IsPlausible(fit)) return;
-    AddSystematic(choice);
-    FillFloor(choice, fit);
-    FillCovariance(fit);
+    evidence_.setup.floor_variance_px2 = choice.variance_px2;
+    fit_ = FitBlur(evidence_.setup);
+    result_.blur.message = fit_.message;
+    if (!fit_.done) return Refuse(fit_.message);
+    FillBlur();
+    FillFrames();
+    FillValues();
+    if (!IsPlausible()) return;
+    FitSides(evidence_, fit_, &result_);
+    AddSystematicParts(sweep_, evidence_, fit_, choice.interval_px2, &result_);
+    FillFloor(choice);
+    FillCovariance();
+    NameUnused();
     Decide();
   }
 
@@ -73,26 +63,27 @@ class Solution {
   void Refuse(const std::string& reason) {
     result_.outcome = Outcome::kRefused;
     result_.reason = reason;
+    if (result_.scale.kind == ScaleKind::kConstant) result_.reason += "; " + result_.scale.message;
     result_.image_distance_mm.reset();
     result_.focus_depth_mm.reset();
     result_.blur_ratio.reset();
     result_.blur_floor_px.reset();
   }
 
-  double Nearest() const {
-    return Extreme([](double a, double b) { return std::min(a, b); });
+  FrameMeasurement& Frame(std::size_t fit_frame) {
+    return result_.frames[evidence_.frames[fit_frame]];
   }
-  double Farthest() const {
-    return Extreme([](double a, double b) { return std::max(a, b); });
-  }
-  template <typename Pick>
-  double Extreme(const Pick& pick) const {
-    double found = 0;
-    for (const FrameMeasurement& frame : result_.frames) {
-      if (frame.rejection.empty())
-        found = found == 0 ? frame.depth_mm : pick(found, frame.depth_mm);
+  double DepthMm(std::size_t fit_frame) { return Frame(fit_frame).depth_mm; }
+
+  // Readings in the fit, nearest and farthest, as depths.
+  std::pair<double, double> DepthRange() {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
+      if (!Frame(f).rejection.empty()) continue;
+      low = std::min(low, DepthMm(f));
+      high = std::max(high, DepthMm(f));
     }
-    return found;
+    return {low, high};
   }
 
   double StepMm() const {
@@ -105,136 +96,290 @@ class Solution {
     return Median(steps);
   }
 
+  // ---- frames that do not follow ----
+  // On the target any blur follows a parabola in depth, whatever floor and texture: what lies far
+  // off it has a wrong reading or is damaged.
+  bool ThrowOut() {
+    RejectScattered();
+    for (BlurSamples& meter : evidence_.setup.meters) RejectOffParabola(meter);
+    for (BlurSamples& meter : evidence_.setup.meters) DropRejected(&meter);
+    std::size_t most = 0;
+    for (const BlurSamples& meter : evidence_.setup.meters)
+      most = std::max(most, meter.frames.size());
+    if (most >= kFewestFrames) return true;
+    Refuse(
+        fmt::format("the blur of {} frames follows one law, {} are needed", most, kFewestFrames));
+    return false;
+  }
+
+  void RejectScattered() {
+    std::vector<double> ratios;
+    for (const double r : evidence_.frame_noise_ratios) {
+      if (r > 0) ratios.push_back(r);
+    }
+    if (ratios.empty()) return;
+    const double typical = Median(ratios);
+    for (std::size_t f = 0; f < evidence_.frame_noise_ratios.size(); ++f) {
+      const double ratio = evidence_.frame_noise_ratios[f] / typical;
+      if (!(ratio > kScatterOfDamage)) continue;
+      Frame(f).rejection = fmt::format(
+          "does not show what the others show: its spectrum lies {:.0f} times farther off than "
+          "theirs (smeared, shifted within the exposure, something in front of the target, or so "
+          "far out of "
+          "focus that the blur law does not hold)",
+          std::sqrt(ratio));
+    }
+  }
+
+  void RejectOffParabola(const BlurSamples& meter) {
+    const auto n = static_cast<Eigen::Index>(meter.frames.size());
+    Eigen::VectorXd depths(n);
+    for (Eigen::Index i = 0; i < n; ++i)
+      depths[i] = DepthMm(meter.frames[static_cast<std::size_t>(i)]);
+    const Parabola parabola =
+        FitParabola(depths, meter.variances_px2, meter.covariance.diagonal().cwiseSqrt(),
+                    evidence_.setup.reading_sigma_mm);
+    if (!parabola.done) return;
+    const double range_mm = depths.maxCoeff() - depths.minCoeff();
+    const double sign = model::DirectionSign(sweep_.direction);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      FrameMeasurement& frame = Frame(meter.frames[s]);
+      if (parabola.follows[s] || !frame.rejection.empty()) continue;
+      const double off = parabola.residuals_px2[i] / parabola.sigmas_px2[i];
+      // Written minus believed: the blur is that of depth + residual/slope.
+      const double error_mm = -sign * parabola.residuals_px2[i] / parabola.Slope(depths[i]);
+      if (std::abs(error_mm) < range_mm) {
+        frame.reading_error_mm = error_mm;
+        frame.rejection = fmt::format(
+            "reading off by {:.1f} mm, or frame damaged: its blur lies {:.0f} standard "
+            "deviations off the others' law",
+            error_mm, std::abs(off));
+      } else {
+        frame.rejection = fmt::format(
+            "frame damaged: its blur lies {:.0f} standard deviations off the others' law",
+            std::abs(off));
+      }
+    }
+  }
+
+  void DropRejected(BlurSamples* meter) {
+    std::vector<Eigen::Index> kept;
+    BlurSamples rest = *meter;
+    rest.frames.clear();
+    for (std::size_t i = 0; i < meter->frames.size(); ++i) {
+      if (!Frame(meter->frames[i]).rejection.empty()) continue;
+      kept.push_back(static_cast<Eigen::Index>(i));
+      rest.frames.push_back(meter->frames[i]);
+    }
+    rest.variances_px2 = meter->variances_px2(kept);
+    rest.covariance = meter->covariance(kept, kept);
+    *meter = std::move(rest);
+  }
+
+  // ---- the floor ----
   // In one sweep the lens floor and the softness of the target are told apart only by what is known
   // of the target: a knife edge has none, a print may have all of it. On a texture the floor cannot
-  // be found at all (DESIGN 3.7).
+  // be found at all.
   FloorChoice ChooseFloor() {
     FloorChoice choice;
     const model::FloorKnowledge& known = sweep_.floor;
-    const bool knife_edge = absolute_ && sweep_.target == model::SweepTarget::kKnifeEdge;
-    choice.target_softness = absolute_ && !knife_edge;
     if (known.given_px) {
-      const double floor_px = known.given_px->value;
-      choice.variance_px2 =
-          model::Estimate{floor_px * floor_px, 2 * floor_px * known.given_px->sigma};
-    } else if (knife_edge) {
+      const double px = known.given_px->value;
+      choice.variance_px2 = model::Estimate{px * px, 2 * px * known.given_px->sigma};
+    } else if (known.from_px) {
+      choice.interval_px2 =
+          Eigen::Vector2d(*known.from_px * *known.from_px, *known.to_px * *known.to_px);
+    } else if (MeasuresFloor()) {
       choice.is_measured = true;
     } else {
       choice.interval_px2 = UnknownFloor();
-      choice.variance_px2 = model::Estimate{choice.interval_px2->mean(), 0};
     }
+    if (choice.interval_px2) choice.variance_px2 = model::Estimate{choice.interval_px2->mean(), 0};
     return choice;
   }
 
+  bool MeasuresFloor() const {
+    return std::any_of(evidence_.setup.meters.begin(), evidence_.setup.meters.end(),
+                       [](const BlurSamples& m) { return m.held_softness_px2.has_value(); });
+  }
+
   Eigen::Vector2d UnknownFloor() {
-    const model::FloorKnowledge& known = sweep_.floor;
-    if (known.from_px) return {*known.from_px * *known.from_px, *known.to_px * *known.to_px};
-    if (absolute_) {
+    if (const std::optional<double> softness_px2 = EdgeSoftness()) {
       // From none of the edge's softness to all of it.
-      BlurFitSetup free = setup_;
-      free.floor_variance_px2.reset();
-      free.target_softness = false;
-      const BlurFitResult all_lens = FitBlur(samples_, free);
-      if (all_lens.done && all_lens.values[2] > 0) {
-        result_.warnings.push_back(fmt::format(
-            "the edges are {:.2f} px soft at focus; how much of it is the lens and how much the "
-            "target is not known: photograph a knife edge, or state blur_floor_px",
-            std::sqrt(all_lens.values[2])));
-        return {0, all_lens.values[2]};
-      }
+      result_.warnings.push_back(fmt::format(
+          "the edges are {:.2f} px soft at focus; how much of it is the lens and how much the "
+          "target is not known: photograph a knife edge, or state blur_floor_px",
+          std::sqrt(*softness_px2)));
+      return {0, *softness_px2};
     }
-    result_.warnings.push_back(
-        fmt::format("the lens floor cannot be found from this target; {} to {} px is allowed for: "
-                    "measure it on a "
-                    "knife edge, or state blur_floor_px",
-                    kUnknownFloorFromPx, kUnknownFloorToPx));
+    result_.warnings.push_back(fmt::format(
+        "the lens floor cannot be found from this target; {} to {} px is allowed for, a "
+        "softer lens is not: measure it on a knife edge, or state blur_floor_px",
+        kUnknownFloorFromPx, kUnknownFloorToPx));
     return {kUnknownFloorFromPx * kUnknownFloorFromPx, kUnknownFloorToPx * kUnknownFloorToPx};
   }
 
-  void FillFrames(const BlurFitResult& fit) {
-    std::vector<std::size_t> outliers;
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      FrameMeasurement& frame = result_.frames[samples_[i].frame];
-      frame.in_blur_fit = true;
-      frame.blur_fit_weight = fit.weights[i];
-      frame.blur_sigma_px = std::sqrt(std::max(0.0, fit.variances_px2[i]));
-      // Near 0 the root's derivative grows without bound; the variance's own root bounds the error.
-      frame.blur_sigma_error_px =
-          std::min(samples_[i].error_px2 / (2 * std::max(frame.blur_sigma_px, 1e-9)),
-                   std::sqrt(samples_[i].error_px2));
-      if (fit.weights[i] < kOutlierWeight) {
-        outliers.push_back(samples_[i].frame);
-      } else {
-        ++result_.blur.frames_used;
+  // sigma^2 of the target's edges in the plane of focus, lens and ink together, if it has edges.
+  std::optional<double> EdgeSoftness() {
+    BlurFitSetup setup = evidence_.setup;
+    if (evidence_.edges >= 0) {
+      setup.meters = {setup.meters[static_cast<std::size_t>(evidence_.edges)]};
+      setup.meters[0].held_softness_px2 = 0;
+      setup.floor_variance_px2.reset();
+      const BlurFitResult fit = FitBlur(setup);
+      if (!fit.done || !(fit.values[kFloorVariance] > 0)) return std::nullopt;
+      return fit.values[kFloorVariance];
+    }
+    if (!evidence_.unstated_edges) return std::nullopt;
+    setup.floor_variance_px2 = model::Estimate{kUnknownFloorToPx * kUnknownFloorToPx / 2, 0};
+    const BlurFitResult fit = FitBlur(setup);
+    if (!fit.done) return std::nullopt;
+    std::vector<double> rests;
+    for (std::size_t i = 0; i < evidence_.unstated_edges->frames.size(); ++i) {
+      const std::size_t f = evidence_.unstated_edges->frames[i];
+      const double defocus = std::pow(fit.values[kBlurRatio], 2) *
+                             DefocusVariance(setup, fit.values[kFocusDepth], DepthMm(f));
+      const double scale = setup.frames[f].scale;
+      rests.push_back(evidence_.unstated_edges->variances_px2[static_cast<Eigen::Index>(i)] *
+                          scale * scale -
+                      defocus);
+    }
+    const double softness = Median(rests);
+    return softness > 0 ? std::optional<double>(softness) : std::nullopt;
+  }
+
+  // ---- results ----
+  void FillBlur() {
+    BlurFit& blur = result_.blur;
+    blur.done = true;
+    blur.chi2_per_dof = fit_.chi2_per_dof;
+    blur.weak_direction = fit_.weak_direction;
+    blur.meter = evidence_.edges < 0      ? "relative spectrum"
+                 : evidence_.spectrum < 0 ? "edges"
+                                          : "edges and relative spectrum";
+    blur.better_psf = evidence_.spectrum >= 0 ? evidence_.better_psf : sweep_.camera.psf;
+    blur.gaussian_misfit = evidence_.gaussian_misfit;
+    blur.disc_misfit = evidence_.disc_misfit;
+    result_.examples = evidence_.examples;
+    if (evidence_.disc_misfit && blur.better_psf != sweep_.camera.psf) {
+      const double stated =
+          sweep_.camera.psf == model::Psf::kGaussian ? *blur.gaussian_misfit : *blur.disc_misfit;
+      const double better =
+          blur.better_psf == model::Psf::kGaussian ? *blur.gaussian_misfit : *blur.disc_misfit;
+      if (stated > 1.1 * better) {
+        result_.warnings.push_back(fmt::format(
+            "a {} describes the frames better than the {} that the camera file states "
+            "(chi2/dof {:.2f} against {:.2f})",
+            model::PsfName(blur.better_psf), model::PsfName(sweep_.camera.psf), better, stated));
       }
     }
-    WarnOfOutliers(outliers);
   }
 
-  void WarnOfOutliers(const std::vector<std::size_t>& outliers) {
-    if (outliers.empty()) return;
-    std::string names;
-    for (std::size_t i = 0; i < std::min<std::size_t>(outliers.size(), 3); ++i) {
-      const FrameMeasurement& frame = result_.frames[outliers[i]];
-      names +=
-          fmt::format("{}{} (reading {} mm)", i == 0 ? "" : ", ",
-                      std::filesystem::path(frame.image).filename().string(), frame.reading_mm);
+  void FillFrames() {
+    for (std::size_t m = 0; m < evidence_.setup.meters.size(); ++m) {
+      const BlurSamples& meter = evidence_.setup.meters[m];
+      for (std::size_t i = 0; i < meter.frames.size(); ++i) {
+        const std::size_t f = meter.frames[i];
+        FrameMeasurement& frame = Frame(f);
+        const auto row = static_cast<Eigen::Index>(i);
+        const double s2 = std::pow(evidence_.setup.frames[f].scale, 2);
+        const double variance =
+            std::max(0.0, (meter.variances_px2[row] - fit_.softness_px2[m]) * s2);
+        const double error = std::sqrt(std::max(0.0, meter.covariance(row, row))) * s2;
+        frame.blur_sigma_px = std::sqrt(variance);
+        // Near 0 the root's derivative grows without bound; the variance's own root bounds it.
+        frame.blur_sigma_error_px =
+            std::min(error / (2 * std::max(frame.blur_sigma_px, 1e-9)), std::sqrt(error));
+        frame.in_blur_fit = true;
+      }
     }
-    if (outliers.size() > 3) names += fmt::format(" and {} more", outliers.size() - 3);
-    result_.warnings.push_back(fmt::format(
-        "{} of {} frames do not follow the blur law (reading off, frame damaged, or a lens "
-        "that does not): {}",
-        outliers.size(), samples_.size(), names));
+    std::vector<std::size_t> light;
+    for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
+      FrameMeasurement& frame = Frame(f);
+      if (!frame.in_blur_fit) continue;
+      const auto row = static_cast<Eigen::Index>(f);
+      frame.blur_fit_weight = fit_.weights[row];
+      frame.reading_error_mm = fit_.reading_errors_mm[row];
+      frame.reading_error_sigma_mm = fit_.reading_error_sigmas_mm[row];
+      ++result_.blur.frames_used;
+      if (frame.blur_fit_weight < kOutlierWeight) light.push_back(f);
+    }
+    WarnOfLight(light);
   }
 
-  void FillValues(const BlurFitResult& fit) {
-    const double zf = fit.values[0];
-    result_.focus_depth_mm = Result{zf, std::sqrt(fit.covariance(0, 0)), std::nullopt};
-    result_.blur_ratio = Result{fit.values[1], std::sqrt(fit.covariance(1, 1)), std::nullopt};
+  void WarnOfLight(const std::vector<std::size_t>& light) {
+    if (light.empty()) return;
+    std::string names;
+    for (std::size_t i = 0; i < std::min<std::size_t>(light.size(), 3); ++i) {
+      const FrameMeasurement& frame = Frame(light[i]);
+      names += fmt::format("{}{} (reading {} mm, off by {:.2f} mm or damaged)", i == 0 ? "" : ", ",
+                           std::filesystem::path(frame.image).filename().string(), frame.reading_mm,
+                           frame.reading_error_mm);
+    }
+    if (light.size() > 3) names += fmt::format(" and {} more", light.size() - 3);
+    result_.warnings.push_back(
+        fmt::format("{} of {} frames follow the laws badly and weigh less: {}", light.size(),
+                    result_.blur.frames_used, names));
+  }
+
+  void FillValues() {
+    const double zf = fit_.values[kFocusDepth];
+    const model::ThickLens& lens = evidence_.setup.lens;
+    result_.focus_depth_mm =
+        Result{zf, std::sqrt(fit_.covariance(kFocusDepth, kFocusDepth)), std::nullopt};
+    result_.blur_ratio = Result{fit_.values[kBlurRatio],
+                                std::sqrt(fit_.covariance(kBlurRatio, kBlurRatio)), std::nullopt};
     result_.image_distance_mm =
-        Result{model::ImageDistanceMm(setup_.lens, zf),
-               std::abs(model::ImageDistanceSlope(setup_.lens, zf)) * result_.focus_depth_mm->sigma,
+        Result{model::ImageDistanceMm(lens, zf),
+               std::abs(model::ImageDistanceSlope(lens, zf)) * result_.focus_depth_mm->sigma,
                std::nullopt};
   }
 
-  bool IsPlausible(const BlurFitResult& fit) {
-    const double zf = fit.values[0];
-    const double kappa = fit.values[1];
+  bool IsPlausible() {
+    const double zf = fit_.values[kFocusDepth];
+    const double kappa = fit_.values[kBlurRatio];
     const double zf_sigma = result_.focus_depth_mm->sigma;
     const double kappa_sigma = result_.blur_ratio->sigma;
-    const double outside_mm = std::max({0.0, Nearest() - zf, zf - Farthest()});
-    const char* side = zf < Nearest() ? "nearer" : "farther";
+    const auto [nearest, farthest] = DepthRange();
+    const double outside_mm = std::max({0.0, nearest - zf, zf - farthest});
+    const char* side = zf < nearest ? "nearer" : "farther";
     if (!(kappa > 3 * kappa_sigma)) {
-      Refuse(
-          fmt::format("the blur does not change over the sweep by more than its errors (blur ratio "
-                      "{:.3f} +- {:.3f}): "
-                      "move the target farther from focus on both sides",
-                      kappa, kappa_sigma));
+      Refuse(fmt::format(
+          "the blur does not change over the sweep by more than its errors (blur ratio {:.3f} +- "
+          "{:.3f}): move the target farther from focus on both sides",
+          kappa, kappa_sigma));
       return false;
     }
-    if (!(zf_sigma < 0.5 * (Farthest() - Nearest()))) {
+    if (!(zf_sigma < 0.5 * (farthest - nearest))) {
       Refuse(
-          fmt::format("the depth of focus is not fixed by the blur: {:.1f} +- {:.1f} mm in a sweep "
-                      "from {:.1f} to {:.1f} mm",
-                      zf, zf_sigma, Nearest(), Farthest()));
+          fmt::format("the depth of focus is not fixed by the blur: {:.1f} +- {:.1f} mm in a "
+                      "sweep from {:.1f} to {:.1f} mm",
+                      zf, zf_sigma, nearest, farthest));
       return false;
     }
     if (outside_mm > 0 && !(zf_sigma < StepMm())) {
       Refuse(
-          fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to {:.1f} "
-                      "mm), about {:.0f} +- "
-                      "{:.0f} mm; extend the sweep that way",
-                      side, Nearest(), Farthest(), zf, zf_sigma));
+          fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to "
+                      "{:.1f} mm), about {:.0f} +- {:.0f} mm; extend the sweep that way",
+                      side, nearest, farthest, zf, zf_sigma));
       return false;
     }
     if (!(kappa >= kSmallestRatio && kappa <= kLargestRatio)) {
       Refuse(
           fmt::format("the blur ratio comes out as {:.3f}, which no lens has ({} to {}): check "
-                      "focal lengths, aperture "
-                      "radius, pixel pitch and the unit of the readings",
+                      "focal lengths, aperture radius, pixel pitch and the unit of the readings",
                       kappa, kSmallestRatio, kLargestRatio));
       return false;
     }
+    if (!(kappa >= kLowRatio && kappa <= kHighRatio)) {
+      result_.warnings.push_back(fmt::format(
+          "a blur ratio of {:.3f} is unusual (the full aperture gives .5): a wrong focal "
+          "length, aperture radius or pixel pitch looks like this; state "
+          "target_period_mm of a grid to check them",
+          kappa));
+    }
+    result_.blur.outside_mm = outside_mm;
     if (outside_mm > 0) {
       result_.warnings.push_back(
           fmt::format("the focus at {:.2f} mm is extrapolated: it lies {:.2f} mm {} than the sweep",
@@ -243,114 +388,9 @@ class Solution {
     return true;
   }
 
-  // The ends of what is not known of the floor, and the meter's own part of kappa.
-  void AddSystematic(const FloorChoice& choice) {
-    Eigen::Vector2d focus = Eigen::Vector2d::Constant(result_.focus_depth_mm->value);
-    Eigen::Vector2d ratio = Eigen::Vector2d::Constant(result_.blur_ratio->value);
-    if (choice.interval_px2) {
-      for (const double end_px2 : {choice.interval_px2->x(), choice.interval_px2->y()}) {
-        BlurFitSetup at_end = setup_;
-        at_end.floor_variance_px2 = model::Estimate{end_px2, 0};
-        const BlurFitResult fit = FitBlur(samples_, at_end);
-        if (!fit.done) continue;
-        focus = {std::min(focus.x(), fit.values[0]), std::max(focus.y(), fit.values[0])};
-        ratio = {std::min(ratio.x(), fit.values[1]), std::max(ratio.y(), fit.values[1])};
-      }
-    }
-    IncludeSides(&focus, &ratio);
-    const Tolerances open = OpenByTolerances();
-    focus += Eigen::Vector2d(-open.focus_depth_mm, open.focus_depth_mm);
-    ratio += Eigen::Vector2d(-open.blur_ratio, open.blur_ratio);
-    const double meter = absolute_ ? kAbsoluteRatioError : kRelativeRatioError;
-    result_.blur_ratio->systematic =
-        Eigen::Vector2d(ratio.x() * (1 - meter), ratio.y() * (1 + meter));
-    result_.focus_depth_mm->systematic = focus;
-    // d1 falls as zf grows.
-    result_.image_distance_mm->systematic =
-        Eigen::Vector2d(model::ImageDistanceMm(setup_.lens, focus.y()) - open.image_distance_mm,
-                        model::ImageDistanceMm(setup_.lens, focus.x()) + open.image_distance_mm);
-  }
-
-  // What the tolerances stated in the camera file leave open, in quadrature. d1 follows the focal
-  // length directly; what comes to it through zf is in the interval of zf.
-  struct Tolerances {
-    double focus_depth_mm = 0, image_distance_mm = 0, blur_ratio = 0;
-  };
-  Tolerances OpenByTolerances() const {
-    Tolerances open;
-    for (const auto& [field, statement] : sweep_.camera.statements) {
-      if (!(statement.tolerance > 0)) continue;
-      Tolerances largest;
-      for (const double change : {-statement.tolerance, statement.tolerance}) {
-        BlurFitSetup changed = setup_;
-        if (!Change(field, change, &changed)) continue;
-        const BlurFitResult fit = FitBlur(samples_, changed);
-        if (!fit.done) continue;
-        const double zf = result_.focus_depth_mm->value;
-        largest.focus_depth_mm = std::max(largest.focus_depth_mm, std::abs(fit.values[0] - zf));
-        largest.blur_ratio =
-            std::max(largest.blur_ratio, std::abs(fit.values[1] - result_.blur_ratio->value));
-        largest.image_distance_mm =
-            std::max(largest.image_distance_mm, std::abs(model::ImageDistanceMm(changed.lens, zf) -
-                                                         model::ImageDistanceMm(setup_.lens, zf)));
-      }
-      open.focus_depth_mm = std::hypot(open.focus_depth_mm, largest.focus_depth_mm);
-      open.image_distance_mm = std::hypot(open.image_distance_mm, largest.image_distance_mm);
-      open.blur_ratio = std::hypot(open.blur_ratio, largest.blur_ratio);
-    }
-    return open;
-  }
-
-  // Moves a number of the camera file; false for those that the fit does not use, or an impossible
-  // value.
-  static bool Change(const std::string& field, double change, BlurFitSetup* setup) {
-    double* number = field == "lens.front_focal_length_mm"  ? &setup->lens.front_focal_length_mm
-                     : field == "lens.rear_focal_length_mm" ? &setup->lens.rear_focal_length_mm
-                     : field == "lens.lens_thickness_mm"    ? &setup->lens.lens_thickness_mm
-                     : field == "lens.aperture_radius_mm"   ? &setup->lens.aperture_radius_mm
-                     : field == "sensor.pixel_pitch_mm"     ? &setup->pixel_pitch_mm
-                                                            : nullptr;
-    if (number == nullptr) return false;
-    *number += change;
-    return setup->lens.IsValid(nullptr) && setup->pixel_pitch_mm > 0 &&
-           setup->lens.front_focal_length_mm < setup->start_focus_depth_mm;
-  }
-
-  // Each side of focus alone. A real lens (spherical aberration, a target that fills the field on
-  // one side only) may follow two laws; where the sides disagree by more than their errors, both
-  // are inside the interval.
-  void IncludeSides(Eigen::Vector2d* focus, Eigen::Vector2d* ratio) {
-    const double zf = result_.focus_depth_mm->value;
-    std::vector<BlurSample> near, far;
-    for (const BlurSample& sample : samples_) {
-      const FrameMeasurement& frame = result_.frames[sample.frame];
-      if (frame.blur_fit_weight < kOutlierWeight) continue;
-      (frame.depth_mm < zf ? near : far).push_back(sample);
-    }
-    if (near.size() < kFewestOnASide || far.size() < kFewestOnASide) return;
-    BlurFitSetup held = setup_;
-    held.target_softness = false;  // one side alone cannot tell it from the floor
-    held.offset_mm.sigma = 0;      // moves both sides alike
-    const BlurFitResult nearer = FitBlur(near, held);
-    const BlurFitResult farther = FitBlur(far, held);
-    if (!nearer.done || !farther.done) return;
-    const double apart_mm = std::abs(nearer.values[0] - farther.values[0]);
-    const double sigma_mm = std::sqrt(nearer.covariance(0, 0) + farther.covariance(0, 0));
-    if (!(apart_mm > 3 * sigma_mm)) return;
-    result_.warnings.push_back(fmt::format(
-        "the two sides of focus disagree: the nearer frames alone give {:.2f} +- {:.2f} mm, "
-        "the farther ones {:.2f} +- {:.2f} mm",
-        nearer.values[0], std::sqrt(nearer.covariance(0, 0)), farther.values[0],
-        std::sqrt(farther.covariance(0, 0))));
-    for (const BlurFitResult* side : {&nearer, &farther}) {
-      *focus = {std::min(focus->x(), side->values[0]), std::max(focus->y(), side->values[0])};
-      *ratio = {std::min(ratio->x(), side->values[1]), std::max(ratio->y(), side->values[1])};
-    }
-  }
-
-  void FillFloor(const FloorChoice& choice, const BlurFitResult& fit) {
-    const double floor_px2 = fit.values[2];
-    const double error_px2 = std::sqrt(fit.covariance(2, 2));
+  void FillFloor(const FloorChoice& choice) {
+    const double floor_px2 = fit_.values[kFloorVariance];
+    const double error_px2 = std::sqrt(fit_.covariance(kFloorVariance, kFloorVariance));
     if (choice.interval_px2) {
       // Only the interval is known; any value in it would be made up.
       constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -368,27 +408,37 @@ class Solution {
 
   // From (zf, kappa, S0, offset) to the parameters of the camera file; what is left open has no
   // row.
-  void FillCovariance(const BlurFitResult& fit) {
-    std::vector<int> rows = {0, 1};
+  void FillCovariance() {
+    std::vector<int> rows = {kFocusDepth, kBlurRatio};
     result_.covariance_order = {"image_distance_mm", "blur_ratio"};
-    Eigen::Vector4d slope(model::ImageDistanceSlope(setup_.lens, fit.values[0]), 1, 0, 1);
+    Eigen::Vector4d slope(model::ImageDistanceSlope(evidence_.setup.lens, fit_.values[kFocusDepth]),
+                          1, 0, 1);
     const bool floor_is_open = !result_.blur.undetermined.empty();
+    Eigen::Matrix4d covariance = fit_.covariance;
+    const double offset_sigma = evidence_.setup.offset_mm.sigma;
+    covariance(kBenchOffset, kBenchOffset) =
+        std::max(covariance(kBenchOffset, kBenchOffset), offset_sigma * offset_sigma);
     if (!floor_is_open) {
-      rows.push_back(2);
+      rows.push_back(kFloorVariance);
       result_.covariance_order.emplace_back("blur_floor_px");
-      const double floor_px = std::sqrt(std::max(0.0, fit.values[2]));
-      slope[2] = floor_px > 0 ? 1 / (2 * floor_px) : 0;
+      const double floor_px = std::sqrt(std::max(0.0, fit_.values[kFloorVariance]));
+      slope[kFloorVariance] = floor_px > 0 ? 1 / (2 * floor_px) : 0;
     }
-    rows.push_back(3);
+    rows.push_back(kBenchOffset);
     result_.covariance_order.emplace_back("bench_offset_mm");
-    const Eigen::Matrix4d full = slope.asDiagonal() * fit.covariance * slope.asDiagonal();
-    const auto n = static_cast<Eigen::Index>(rows.size());
-    result_.covariance.resize(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        result_.covariance(i, j) =
-            full(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(j)]);
-      }
+    const Eigen::Matrix4d full = slope.asDiagonal() * covariance * slope.asDiagonal();
+    result_.covariance = full(rows, rows);
+  }
+
+  // Frames that passed every gate and still say nothing of the blur.
+  void NameUnused() {
+    for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
+      FrameMeasurement& frame = Frame(f);
+      if (frame.in_blur_fit || !frame.rejection.empty()) continue;
+      frame.not_in_fit = frame.image_scale
+                             ? "too strongly blurred, or too far off in scale, for the "
+                               "part of the target that all frames share"
+                             : "could be neither registered, nor does it show edges";
     }
   }
 
@@ -402,17 +452,16 @@ class Solution {
   }
 
   const FocusSweep& sweep_;
-  const std::vector<BlurSample>& samples_;
-  bool absolute_;
+  BlurEvidence& evidence_;
+  BlurFitResult& fit_;
   Calibration& result_;
-  BlurFitSetup setup_;
 };
 
 }  // namespace
 
-void SolveFocus(const FocusSweep& sweep, const std::vector<BlurSample>& samples, bool absolute,
-                std::size_t reference, Calibration* calibration) {
-  Solution(sweep, samples, absolute, reference, calibration).Run();
+void SolveFocus(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
+                Calibration* calibration) {
+  Solution(sweep, evidence, fit, calibration).Run();
 }
 
 }  // namespace thicklens::calib

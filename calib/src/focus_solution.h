@@ -1,19 +1,18 @@
 #ifndef THICKLENS_CALIB_SRC_FOCUS_SOLUTION_H_
 #define THICKLENS_CALIB_SRC_FOCUS_SOLUTION_H_
 
-#include <vector>
-
-#include "blur_fit.h"
+#include "blur_measurement.h"
 #include "thicklens/calib/calibrate.h"
 
 namespace thicklens::calib {
 
-// From the blur of the frames to the results: chooses what is known of the floor, fits, takes the
-// systematic interval from what is not known, and decides the outcome. Reads the gates, depths and
-// sharpness out of `calibration` and fills in the rest. `absolute` says whether the samples are
-// absolute variances (isolated edges) or relative to frame `reference`.
-void SolveFocus(const FocusSweep& sweep, const std::vector<BlurSample>& samples, bool absolute,
-                std::size_t reference, Calibration* calibration);
+// From the blur of the frames to the results: throws out frames that do not follow (named in their
+// `rejection`), chooses what is known of the floor, fits, takes the systematic interval from what
+// is not known, and decides the outcome. Reads gates, depths and sharpness out of `calibration` and
+// fills in the rest. On return `evidence` holds the frames that were used, the floor that was
+// assumed and, in `fit`, the answer.
+void SolveFocus(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
+                Calibration* calibration);
 
 }  // namespace thicklens::calib
 

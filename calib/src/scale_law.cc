@@ -326,6 +326,9 @@ class LawFinder {
   }
 
   void DoesNotFollow(std::size_t following, ScaleLaw* result) const {
+    constexpr std::size_t kEnoughToContradict = 8;
+    result->contradicts_readings =
+        points_.size() >= kEnoughToContradict && 2 * following < points_.size();
     result->message = fmt::format(
         "the image scale does not follow the readings: {} of {} frames agree with one law (1/z, "
         "reversed or constant). Check that every frame has its own reading, or state offset_mm",

@@ -14,7 +14,8 @@ namespace thicklens::calib {
 
 struct CalibrationOptions {
   GateOptions gates;
-  int threads = 0;  // 0: one per core
+  bool map_field = true;  // tiles and colour channels too
+  int threads = 0;        // 0: one per core
   // Called now and then with (steps done, steps in all); false stops the run (Interrupted).
   std::function<bool(int done, int total)> progress;
 
@@ -26,6 +27,16 @@ struct Result {
   double value = 0;
   double sigma = 0;
   std::optional<Eigen::Vector2d> systematic;  // (lo, hi), absolute values
+};
+
+// One source of systematic error: how far each result may lie from its value because of it,
+// (lowest, highest) with lowest <= 0 <= highest, in the result's unit.
+struct SystematicPart {
+  std::string name;  // "lens floor", "side of focus", "lens.front_focal_length_mm"
+  Eigen::Vector2d focus_depth_mm{0, 0};
+  Eigen::Vector2d image_distance_mm{0, 0};
+  Eigen::Vector2d blur_ratio{0, 0};
+  std::string remedy;  // what would shrink it, said to a person at the bench
 };
 
 // What was measured on one frame. Depths are from Ap with the offset that was given or found.
@@ -42,9 +53,15 @@ struct FrameMeasurement {
   double blur_sigma_px = 0;           // lens and defocus, pixel box and operator removed
   double blur_sigma_error_px = 0;     // its standard deviation
   bool in_blur_fit = false;           // false: outside the meter's range, or rejected
+  std::string not_in_fit;             // why a frame that was not rejected is not in it
   double blur_fit_weight = 0;         // 0 to 1, of the robust loss
   std::optional<double> image_scale;  // relative to the reference frame
+  double image_scale_sigma = 0;       // its standard deviation
   bool in_scale_fit = false;
+  // Written reading minus the one that the joint fit believes, and its standard deviation; 0 in
+  // frames that are not in the fit.
+  double reading_error_mm = 0;
+  double reading_error_sigma_mm = 0;
 };
 
 // The source's recipe: sharpest frame, then the mean of sigma/r_defocus. No error estimate: the
@@ -57,6 +74,9 @@ struct SourceRecipe {
   double image_distance_mm = 0;
   double blur_ratio = 0;  // dominated by frames near focus (the ratio diverges there)
   int ratio_frames = 0;   // frames in the mean; the sharpest has r_defocus = 0 and is left out
+  // The same recipe with the index divided by the frame's mean grey.
+  int sharpest_normalised_frame = -1;
+  double normalised_focus_depth_mm = 0;
 };
 
 // Normalised sharpness: a parabola through the logarithm over the top of the curve.
@@ -72,15 +92,90 @@ struct SharpnessPeak {
   double from_depth_mm = 0, to_depth_mm = 0;  // the frames fitted
 };
 
+// How the image scale goes with the reading.
+enum class ScaleKind {
+  kUnknown,       // too few registrations, or none of the others
+  kInverseDepth,  // as 1/z: a camera whose pupil stands still
+  kConstant,      // telecentric, or the sensor moves
+  kReversed,      // as 1/z with the other direction
+};
+
 // Bench zero from the image scale: 1/scale = (offset + direction * reading)/z_reference.
 struct ScaleLaw {
-  bool done = false;
+  bool done = false;  // the offset was found; kInverseDepth alone
   std::string message = "not run";
+  ScaleKind kind = ScaleKind::kUnknown;
+  bool contradicts_readings = false;  // frames were registered, and most agree with no law at all
   int reference_frame = -1;
   Result offset_mm;
   double reference_depth_mm = 0;  // z of the reference frame by the fit; scale = z_reference/z
   double reading_rms_mm = 0;      // scatter of the readings about the law
   int frames_used = 0;
+  // Radial distortion that the registrations show: relative change of the image height at the
+  // corner of the region (positive: pincushion), if there were enough of them to tell.
+  std::optional<model::Estimate> distortion_at_corner;
+};
+
+// What the image scale says of d1 where a length on the target is known (sweep file:
+// target_period_mm): m = f1 D/(f2 z), independent of sharpness.
+struct MagnificationCheck {
+  double period_px = 0;  // measured in the reference frame
+  double period_mm = 0;  // as stated
+  model::Estimate image_distance_mm;
+};
+
+// One frame's blur as it was measured, for the eye: an edge's profile, or the transfer relative to
+// the reference against frequency.
+struct BlurExample {
+  int frame = -1;  // index into frames
+  bool is_edge = false;
+  std::vector<double> x;         // edge: distance from it, px; else frequency, cycles per px
+  std::vector<double> measured;  // edge: 0 dark to 1 bright; else transfer, 1 at frequency 0
+  std::vector<double> gaussian;  // the fit with a Gaussian, at x
+  std::vector<double> disc;      // the fit with a disc, at x; may be empty
+};
+
+// One side of focus fitted alone.
+struct SideFit {
+  bool done = false;
+  std::string message = "not run";
+  model::Estimate focus_depth_mm;
+  model::Estimate blur_ratio;
+  int frames_used = 0;
+};
+
+// Focus over the field: the same fit on each tile of a regular grid.
+struct FieldTile {
+  Eigen::Vector2d centre_px{0, 0};  // in the full picture
+  bool done = false;
+  std::string message = "not run";
+  model::Estimate focus_depth_mm;
+  int cluster = 0;  // index into FieldMap::clusters
+};
+struct DepthCluster {
+  model::Estimate focus_depth_mm;
+  int tiles = 0;
+};
+struct FieldMap {
+  bool done = false;
+  std::string message = "not run";
+  int columns = 0, rows = 0;
+  std::vector<FieldTile> tiles;  // row by row
+  // zf(x, y) = centre + tilt + curvature; absent where too few tiles were fitted.
+  // Degrees between the target and the sensor about the vertical and the horizontal axis: positive
+  // where the target's right side, or its bottom, is nearer to the camera.
+  std::optional<model::Estimate> tilt_right_deg, tilt_down_deg;
+  std::optional<model::Estimate> curvature_mm;    // zf at the outermost tile minus at the centre
+  std::optional<model::Estimate> astigmatism_mm;  // zf of horizontal blur minus of vertical blur
+  std::vector<DepthCluster> clusters;             // one: the target is at one depth
+};
+
+// One colour channel fitted alone.
+struct ChannelFocus {
+  std::string name;  // "red", "green", "blue"
+  bool done = false;
+  std::string message = "not run";
+  model::Estimate focus_depth_mm;
 };
 
 // sigma^2 = S0 + A (1/z - 1/zf)^2, fitted by Ceres in (zf, kappa, floor); the bench zero is held
@@ -91,6 +186,11 @@ struct BlurFit {
   double chi2_per_dof = 0;
   int frames_used = 0;
   std::vector<std::string> undetermined;  // parameters that the data do not fix
+  std::string weak_direction;             // the combination of parameters that is known worst
+  std::string meter;                      // "edges" or "relative spectrum"
+  model::Psf better_psf = model::Psf::kGaussian;       // the shape that describes the frames better
+  std::optional<double> gaussian_misfit, disc_misfit;  // chi^2 per dof of the meter with each
+  double outside_mm = 0;  // how far the focus lies outside the sweep; 0: inside
 };
 
 enum class Outcome { kOk, kPartial, kRefused };
@@ -114,7 +214,14 @@ struct Calibration {
   SharpnessPeak sharpness;
   ScaleLaw scale;
   BlurFit blur;
-  std::vector<FrameMeasurement> frames;  // in the sweep's order
+  SideFit nearer, farther;  // the frames on each side of focus alone
+  FieldMap field;
+  std::vector<ChannelFocus> channels;  // of colour frames
+  std::optional<MagnificationCheck> magnification;
+  std::vector<SystematicPart> systematic_parts;  // largest first, by their part of zf
+  std::string advice;                            // what would shrink the largest error, and to what
+  std::vector<BlurExample> examples;             // nearest, sharpest and farthest frame
+  std::vector<FrameMeasurement> frames;          // in the sweep's order
   int frames_used = 0;  // in the blur fit; before there is one, those that passed the gates
   double seconds = 0;
 };

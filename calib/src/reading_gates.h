@@ -1,0 +1,36 @@
+#ifndef THICKLENS_CALIB_SRC_READING_GATES_H_
+#define THICKLENS_CALIB_SRC_READING_GATES_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/image_scale.h"
+
+namespace thicklens::calib {
+
+// Why the image scales of the used frames forbid any result, or nothing: the readings run the other
+// way, or one picture was repeated for all of them.
+std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
+                                               const std::vector<FrameMeasurement>& frames,
+                                               const std::vector<std::size_t>& used,
+                                               const ScaleLaw& law);
+
+// Names the frames whose reading contradicts their image scale, with the amount, and those whose
+// picture stands at another reading too: sets their `rejection`.
+void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>& samples,
+                         const ScaleLaw& law, std::vector<FrameMeasurement>* frames);
+
+// From one frame on all readings are off by as much: a clamp that slipped, a table moved by a row.
+struct Slip {
+  std::size_t frame = 0;  // the first, in the order of the readings
+  model::Estimate jump_mm;
+};
+// The jump that the image scales show best beside a smooth law, if it lies beyond six standard
+// deviations and explains a good part of the scatter.
+std::optional<Slip> FindSlip(std::vector<ScaleSample> samples, const ScaleLaw& law);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_SRC_READING_GATES_H_

@@ -1,0 +1,555 @@
+#include "relative_spectrum.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "thicklens/model/blur_transfer.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kTwoPiSquared = 2 * kPi * kPi;
+constexpr int kRings = 24;
+constexpr int kLeakageNodes = 12;
+constexpr double kLeakageBand = 4;  // H below exp(-4): no frame uses such a mode
+constexpr int kMostSteps = 30;
+// By how much neighbouring modes, which share a sixth of their noise and of the texture's amplitude
+// (the transform of the squared Hann window), widen the variances of independent ones: (1 +
+// 2/36)^2.
+constexpr double kSharedNoise = 1.114;
+// N is the noise of a complex value; the derivatives see its real part alone.
+constexpr double kRealPart = 0.5;
+
+// A disc's transfer function of v = (R/2)^2, its variance per axis, and d ln/dv. Analytic through
+// v = 0, so that noise may push v below.
+//   D = 2 J1(x)/x, x = 4 pi nu sqrt(v); dD/dv = -(J2(x)/x) 4 pi nu/sqrt(v).
+struct ValueAndSlope {
+  double value = 1, log_slope = 0;
+};
+
+ValueAndSlope Disc(double v, double nu) {
+  const double x2 = 16 * kPi * kPi * nu * nu * v;
+  const double dx2 = 16 * kPi * kPi * nu * nu;
+  if (x2 < 1) {
+    const double value = 1 + x2 * (-1.0 / 8 + x2 * (1.0 / 192 - x2 / 9216));
+    const double slope = -1.0 / 8 + x2 * (1.0 / 96 - x2 / 3072);
+    if (x2 < -20) return {std::exp(-x2 / 8), -dx2 / 8};
+    return {value, slope * dx2 / value};
+  }
+  const double x = std::sqrt(x2);
+  const double value = 2 * ::j1(x) / x;
+  const double slope = -::jn(2, x) / x2;  // dD/d(x^2)
+  return {value, slope * dx2 / value};
+}
+
+ValueAndSlope Transfer(const RelativeBlurOptions& options, double variance_px2, double scale,
+                       double nu) {
+  if (options.psf == model::Psf::kGaussian) {
+    return {std::exp(-kTwoPiSquared * variance_px2 * nu * nu), -kTwoPiSquared * nu * nu};
+  }
+  const double floor = options.floor_variance_px2 / (scale * scale);
+  ValueAndSlope disc = Disc(variance_px2 - floor, nu);
+  disc.value *= std::exp(-kTwoPiSquared * floor * nu * nu);
+  return disc;
+}
+
+// Gauss-Newton with T projected out. Amplitudes (ln g, V) and shifts do not mix in the normal
+// equations: the derivatives of the ones are real multiples of the model, of the others imaginary.
+class Fit {
+ public:
+  Fit(const std::vector<SpectrumSample>& samples, std::size_t reference, const TargetWindow& window,
+      const std::vector<Mode>& modes, const WindowLeakage& leakage,
+      const RelativeBlurOptions& options)
+      : samples_(samples), reference_(reference), leakage_(leakage), options_(options) {
+    const auto n = static_cast<Eigen::Index>(samples.size());
+    const auto count = static_cast<Eigen::Index>(modes.size());
+    nu_.resize(2, count);
+    for (Eigen::Index k = 0; k < count; ++k)
+      nu_.col(k) = ModeFrequency(modes[static_cast<std::size_t>(k)], window);
+    norm2_ = nu_.colwise().squaredNorm().transpose().array();
+    box2_.resize(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const auto c = samples[i].spectrum.values.size();
+      box2_[i].resize(c);
+      for (Eigen::Index k = 0; k < c; ++k) {
+        const double box =
+            BoxTransfer(modes[static_cast<std::size_t>(k)], window, samples[i].scale);
+        box2_[i][k] = box * box;
+      }
+    }
+    state_.log_gain = Eigen::VectorXd::Zero(n);
+    state_.variance.resize(n);
+    state_.shift = Eigen::Matrix2Xd::Zero(2, n);
+    noise_.resize(n);
+    expected_noise_.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const SpectrumSample& sample = samples[static_cast<std::size_t>(i)];
+      state_.variance[i] = sample.start_variance_px2;
+      expected_noise_[i] =
+          std::max(sample.spectrum.noise_gain * sample.pixel_noise * sample.pixel_noise, 1e-14);
+    }
+    noise_ = expected_noise_;
+  }
+
+  RelativeBlur Run() {
+    if (samples_.size() < 3) {
+      result_.message = fmt::format("spectra of {} frames, at least 3 are needed", samples_.size());
+      return result_;
+    }
+    // The band, the leakage and the noise follow the blur found; three rounds settle them.
+    for (int round = 0; round < 3; ++round) {
+      ChooseBands();
+      TakeLeakageOut();
+      if (!Descend()) return result_;
+      EstimateNoise();
+    }
+    if (!Finish()) return result_;
+    result_.done = true;
+    result_.message = "converged";
+    return result_;
+  }
+
+ private:
+  struct State {
+    Eigen::VectorXd log_gain, variance;
+    Eigen::Matrix2Xd shift;
+  };
+
+  Eigen::Index n() const { return static_cast<Eigen::Index>(samples_.size()); }
+  Eigen::Index Count(Eigen::Index i) const { return counts_[static_cast<std::size_t>(i)]; }
+
+  void ChooseBands() {
+    const double least = state_.variance.minCoeff();
+    counts_.assign(samples_.size(), 0);
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const double range = std::max(state_.variance[i] - least, 1e-9);
+      const double limit = options_.band / (kTwoPiSquared * range);
+      const auto available = samples_[static_cast<std::size_t>(i)].spectrum.values.size();
+      Eigen::Index c = 0;
+      while (c < available && norm2_[c] < limit) ++c;
+      counts_[static_cast<std::size_t>(i)] = c;
+    }
+    modes_ = *std::max_element(counts_.begin(), counts_.end());
+  }
+
+  void TakeLeakageOut() {
+    data_.resize(samples_.size());
+    const double base = state_.variance[static_cast<Eigen::Index>(reference_)];
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      data_[s] = samples_[s].spectrum.values.head(Count(i)) -
+                 leakage_.At(state_.variance[i] - base, static_cast<std::size_t>(Count(i)));
+    }
+  }
+
+  // M_i(k) = g_i H_i(k) exp(-2 pi i nu.t_i), with d ln M/dV beside it.
+  void Model(const State& state, Eigen::Index i, Eigen::ArrayXcd* model,
+             Eigen::ArrayXd* slope) const {
+    const double scale = samples_[static_cast<std::size_t>(i)].scale;
+    const double gain = std::exp(state.log_gain[i]);
+    model->resize(Count(i));
+    slope->resize(Count(i));
+    for (Eigen::Index k = 0; k < Count(i); ++k) {
+      const ValueAndSlope h = Transfer(options_, state.variance[i], scale, std::sqrt(norm2_[k]));
+      const double phase = -2 * kPi * nu_.col(k).dot(state.shift.col(i));
+      (*model)[k] = std::polar(1.0, phase) * (gain * h.value);
+      (*slope)[k] = h.log_slope;
+    }
+  }
+
+  struct Evaluation {
+    double cost = 0;
+    Eigen::ArrayXcd texture;
+    Eigen::ArrayXd information;  // P = sum |M|^2/N per mode
+    std::vector<Eigen::ArrayXcd> models;
+    std::vector<Eigen::ArrayXd> slopes;
+  };
+
+  // T by linear least squares at every mode, and what is left.
+  Evaluation Evaluate(const State& state) const {
+    Evaluation e;
+    e.models.resize(samples_.size());
+    e.slopes.resize(samples_.size());
+    e.texture = Eigen::ArrayXcd::Zero(modes_);
+    e.information = Eigen::ArrayXd::Zero(modes_);
+    Eigen::ArrayXd energy = Eigen::ArrayXd::Zero(modes_);
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      Model(state, i, &e.models[s], &e.slopes[s]);
+      const Eigen::ArrayXd weight = box2_[s].head(Count(i)) / noise_[i];
+      e.texture.head(Count(i)) += e.models[s].conjugate() * data_[s] * weight;
+      e.information.head(Count(i)) += e.models[s].abs2() * weight;
+      energy.head(Count(i)) += data_[s].abs2() * weight;
+    }
+    e.cost = (energy - e.texture.abs2() / e.information).sum();
+    e.texture /= e.information;
+    return e;
+  }
+
+  // Gauss-Newton with a damping that grows where a step fails.
+  bool Descend() {
+    Evaluation now = Evaluate(state_);
+    double damping = 1e-6;
+    for (int step = 0; step < kMostSteps; ++step) {
+      Eigen::VectorXd gradient;
+      const Eigen::MatrixXd normal = AmplitudeNormal(now, &gradient);
+      const Eigen::Matrix2Xd shifts = ShiftSteps(now);
+      bool better = false;
+      for (int attempt = 0; attempt < 8 && !better; ++attempt) {
+        const State next = Moved(Solved(normal, gradient, damping), shifts / (1 + damping));
+        Evaluation there = Evaluate(next);
+        if (std::isfinite(there.cost) && there.cost <= now.cost) {
+          const double gained = now.cost - there.cost;
+          state_ = next;
+          now = std::move(there);
+          damping = std::max(1e-9, 0.1 * damping);
+          better = true;
+          if (gained < 1e-7 * now.cost + 1e-9) step = kMostSteps;
+        } else {
+          damping = std::max(1e-4, 30 * damping);
+        }
+      }
+      if (!better) break;
+    }
+    last_ = std::move(now);
+    if (!std::isfinite(last_.cost) || !state_.variance.allFinite()) {
+      result_.message = "the fit of the spectra did not converge";
+      return false;
+    }
+    return true;
+  }
+
+  // Without the reference's rows: its gain, variance and shift are held, they only move T.
+  static Eigen::VectorXd Solved(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gradient,
+                                double damping) {
+    Eigen::MatrixXd damped = normal;
+    damped.diagonal() *= 1 + damping;
+    damped.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();
+    return damped.ldlt().solve(gradient);
+  }
+
+  State Moved(const Eigen::VectorXd& amplitude, const Eigen::Matrix2Xd& shifts) const {
+    State next = state_;
+    next.shift += shifts;
+    Eigen::Index row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      next.log_gain[i] += std::clamp(amplitude[2 * row], -0.3, 0.3);
+      next.variance[i] += amplitude[2 * row + 1];
+      ++row;
+    }
+    return next;
+  }
+
+  // Of (ln g, V) of every frame: sum over modes of |T|^2 |M|^2/N d d^T within a frame, minus the
+  // projection on T.
+  Eigen::MatrixXd AmplitudeNormal(const Evaluation& e, Eigen::VectorXd* gradient) const {
+    const Eigen::Index size = 2 * (n() - 1);
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
+    Eigen::MatrixXd projection = Eigen::MatrixXd::Zero(size, modes_);
+    gradient->resize(size);
+    const Eigen::ArrayXd power = e.texture.abs2();
+    const Eigen::ArrayXd root = (power / e.information).sqrt();
+    Eigen::Index row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      Eigen::Matrix2Xd d(2, c);
+      d.row(0).setOnes();
+      d.row(1) = e.slopes[s].matrix().transpose();
+      const Eigen::ArrayXcd model = e.models[s] * e.texture.head(c);
+      const Eigen::ArrayXd noise = box2_[s].head(c) / noise_[i];
+      const Eigen::ArrayXd pull = (model.conjugate() * (data_[s] - model)).real() * noise;
+      gradient->segment<2>(2 * row) = d * pull.matrix();
+      const Eigen::ArrayXd weight = e.models[s].abs2() * noise;
+      const Eigen::Matrix2Xd weighted = d.array().rowwise() * (weight * power.head(c)).transpose();
+      normal.block<2, 2>(2 * row, 2 * row) = weighted * d.transpose();
+      projection.block(2 * row, 0, 2, c) =
+          d.array().rowwise() * (weight * root.head(c)).transpose();
+      ++row;
+    }
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(projection, -1);
+    return normal.selfadjointView<Eigen::Lower>();
+  }
+
+  // d M/dt = -2 pi i nu M. The frames' shifts hang together through T only weakly: a step of their
+  // own for each frame converges as well, and nobody asks for their covariance.
+  Eigen::Matrix2Xd ShiftSteps(const Evaluation& e) const {
+    Eigen::Matrix2Xd steps = Eigen::Matrix2Xd::Zero(2, n());
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      if (c < 3) continue;
+      const Eigen::ArrayXcd model = e.models[s] * e.texture.head(c);
+      const Eigen::ArrayXd weight = box2_[s].head(c) / noise_[i];
+      const Eigen::ArrayXd pull = (model.conjugate() * (data_[s] - model)).imag() * weight;
+      const Eigen::Matrix2Xd d = -2 * kPi * nu_.leftCols(c);
+      const Eigen::Matrix2Xd weighted = d.array().rowwise() * (model.abs2() * weight).transpose();
+      const Eigen::Matrix2d normal = weighted * d.transpose();
+      // Along a lone edge a shift shows nothing: that direction stays where it is.
+      steps.col(i) = normal.completeOrthogonalDecomposition().solve(d * pull.matrix());
+    }
+    return steps;
+  }
+
+  // From the residuals, each by its frame's own degrees of freedom; never far below what the pixel
+  // noise explains in the other frames: a frame that alone holds a mode fits itself.
+  void EstimateNoise() {
+    Eigen::VectorXd found(n());
+    std::vector<double> ratios;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      const Eigen::ArrayXd weight = box2_[s].head(c) / noise_[i];
+      const Eigen::ArrayXd leverage = last_.models[s].abs2() * weight / last_.information.head(c);
+      const double freedom =
+          std::max(1.0, static_cast<double>(c) - leverage.sum() - 2 * (n() > 1 ? 1 : 0));
+      const Eigen::ArrayXcd rest = data_[s] - last_.models[s] * last_.texture.head(c);
+      found[i] = (rest.abs2() * box2_[s].head(c)).sum() / freedom;
+      ratios.push_back(found[i] / expected_noise_[i]);
+    }
+    std::vector<double> sorted = ratios;
+    std::nth_element(sorted.begin(), sorted.begin() + n() / 2, sorted.end());
+    const double typical = sorted[static_cast<std::size_t>(n() / 2)];
+    for (Eigen::Index i = 0; i < n(); ++i)
+      noise_[i] = std::max(found[i], 0.5 * typical * expected_noise_[i]);
+  }
+
+  bool Finish() {
+    const Eigen::Index size = 2 * (n() - 1);
+    Eigen::VectorXd gradient;
+    const Eigen::MatrixXd normal = AmplitudeNormal(Evaluate(state_), &gradient);
+    const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+    scaled.diagonal().array() += 1e-12;
+    const Eigen::LDLT<Eigen::MatrixXd> factor(scaled);
+    if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) {
+      result_.message = "the spectra do not tell the blur of every frame";
+      return false;
+    }
+    const Eigen::MatrixXd inverse = scale.asDiagonal() *
+                                    factor.solve(Eigen::MatrixXd::Identity(size, size)) *
+                                    scale.asDiagonal();
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i != static_cast<Eigen::Index>(reference_)) rows.push_back(i);
+    }
+    result_.covariance = Eigen::MatrixXd::Zero(n(), n());
+    for (std::size_t a = 0; a < rows.size(); ++a) {
+      for (std::size_t b = 0; b < rows.size(); ++b) {
+        result_.covariance(rows[a], rows[b]) =
+            kRealPart * kSharedNoise *
+            inverse(static_cast<Eigen::Index>(2 * a + 1), static_cast<Eigen::Index>(2 * b + 1));
+      }
+    }
+    result_.variances_px2 = state_.variance;
+    result_.gains = state_.log_gain.array().exp();
+    result_.shifts_px = state_.shift;
+    result_.noise_ratio = noise_.cwiseQuotient(expected_noise_);
+    result_.modes_used.assign(counts_.begin(), counts_.end());
+    result_.texture = last_.texture;
+    FillMisfit();
+    return true;
+  }
+
+  void FillMisfit() {
+    double chi2 = 0, freedom = -static_cast<double>(modes_) - 2.0 * static_cast<double>(n() - 1);
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::ArrayXcd rest = data_[s] - last_.models[s] * last_.texture.head(Count(i));
+      chi2 += (rest.abs2() * box2_[s].head(Count(i))).sum() / expected_noise_[i];
+      freedom += static_cast<double>(Count(i));
+    }
+    result_.chi2_per_dof = freedom > 0 ? chi2 / freedom : 0;
+  }
+
+  const std::vector<SpectrumSample>& samples_;
+  std::size_t reference_;
+  const WindowLeakage& leakage_;
+  RelativeBlurOptions options_;
+  Eigen::Matrix2Xd nu_;
+  Eigen::ArrayXd norm2_;
+  std::vector<Eigen::ArrayXd> box2_;
+  std::vector<Eigen::Index> counts_;
+  Eigen::Index modes_ = 0;
+  std::vector<Eigen::ArrayXcd> data_;  // spectra without the window's leakage
+  State state_;
+  Eigen::VectorXd noise_, expected_noise_;
+  Evaluation last_;
+  RelativeBlur result_;
+};
+
+}  // namespace
+
+WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
+                             const TargetWindow& window, const std::vector<Mode>& modes,
+                             const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px,
+                             int threads) {
+  if (!(largest_sigma_px > 0)) return;
+  step_px_ = largest_sigma_px / (kLeakageNodes - 1);
+  const int pad = static_cast<int>(std::ceil(4 * largest_sigma_px));
+  // Only what the window sees, and what the blur brings into it.
+  const cv::Rect part =
+      cv::Rect(
+          cv::Point(
+              static_cast<int>(origin_px.x() + window.centre_px.x() - 0.5 * window.size_px.x()) -
+                  pad - 1,
+              static_cast<int>(origin_px.y() + window.centre_px.y() - 0.5 * window.size_px.y()) -
+                  pad - 1),
+          cv::Size(static_cast<int>(window.size_px.x()) + 2 * pad + 3,
+                   static_cast<int>(window.size_px.y()) + 2 * pad + 3)) &
+      cv::Rect(cv::Point(0, 0), reference.size());
+  const Eigen::Vector2d part_origin_px = origin_px - Eigen::Vector2d(part.x, part.y);
+  const cv::Size size(cv::getOptimalDFTSize(part.width + 2 * pad),
+                      cv::getOptimalDFTSize(part.height + 2 * pad));
+  cv::Mat padded, transform;
+  // What lies beyond the part is not asked for: borders end in mirrors, not in other pixels.
+  cv::copyMakeBorder(reference(part), padded, pad, size.height - part.height - pad, pad,
+                     size.width - part.width - pad, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
+  cv::dft(padded, transform, cv::DFT_COMPLEX_OUTPUT);
+  nodes_.resize(kLeakageNodes);
+  nodes_[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
+  model::ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
+    const double sigma = step_px_ * (index + 1);
+    std::size_t count = 0;
+    while (count < modes.size() &&
+           kTwoPiSquared * sigma * sigma * ModeFrequency(modes[count], window).squaredNorm() <
+               kLeakageBand)
+      ++count;
+    cv::Mat blurred = transform.clone();
+    for (int v = 0; v < blurred.rows; ++v) {
+      const double fy =
+          static_cast<double>(v <= blurred.rows / 2 ? v : v - blurred.rows) / blurred.rows;
+      auto* row = blurred.ptr<cv::Vec2f>(v);
+      for (int u = 0; u < blurred.cols; ++u) {
+        const double fx =
+            static_cast<double>(u <= blurred.cols / 2 ? u : u - blurred.cols) / blurred.cols;
+        row[u] *= static_cast<float>(model::DefocusTransfer(psf, sigma, fx, fy));
+      }
+    }
+    cv::Mat picture;
+    cv::dft(blurred, picture, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+    const cv::Mat inner = picture(cv::Rect(pad, pad, part.width, part.height));
+    const auto seen = MeasureSpectrum(inner, part_origin_px, {}, window, modes, count);
+    Eigen::ArrayXcd& node = nodes_[static_cast<std::size_t>(index + 1)];
+    node = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));
+    if (!seen) return;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Eigen::Vector2d nu = ModeFrequency(modes[k], window);
+      const auto i = static_cast<Eigen::Index>(k);
+      node[i] =
+          seen->values[i] - spectrum.values[i] * model::DefocusTransfer(psf, sigma, nu.x(), nu.y());
+    }
+  });
+}
+
+// Cubic interpolation between the nodes; even in sigma, so the nodes go on mirrored below 0.
+Eigen::ArrayXcd WindowLeakage::At(double variance_px2, std::size_t count) const {
+  const auto n = static_cast<Eigen::Index>(count);
+  Eigen::ArrayXcd result = Eigen::ArrayXcd::Zero(n);
+  if (nodes_.empty() || !(variance_px2 > 0)) return result;
+  const double place = std::min(std::sqrt(variance_px2) / step_px_, kLeakageNodes - 1.0);
+  const int first = std::min(static_cast<int>(place), kLeakageNodes - 3) - 1;
+  for (int a = first; a < first + 4; ++a) {
+    double weight = 1;
+    for (int b = first; b < first + 4; ++b) {
+      if (b != a) weight *= (place - b) / (a - b);
+    }
+    const Eigen::ArrayXcd& node = nodes_[static_cast<std::size_t>(std::abs(a))];
+    const Eigen::Index c = std::min<Eigen::Index>(n, node.size());
+    result.head(c) += weight * node.head(c);
+  }
+  return result;
+}
+
+WindowLeakage WindowLeakage::Of(const std::vector<Eigen::Index>& modes) const {
+  WindowLeakage part;
+  part.step_px_ = step_px_;
+  for (const Eigen::ArrayXcd& node : nodes_) {
+    std::vector<Eigen::Index> present;
+    for (const Eigen::Index k : modes) {
+      if (k < node.size()) present.push_back(k);
+    }
+    part.nodes_.emplace_back(node(present));
+  }
+  return part;
+}
+
+RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
+                             const TargetWindow& window, const std::vector<Mode>& modes,
+                             const WindowLeakage& leakage, const RelativeBlurOptions& options) {
+  return Fit(samples, reference, window, modes, leakage, options).Run();
+}
+
+double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,
+                    double nu) {
+  return Transfer(options, variance_px2, scale, nu).value;
+}
+
+std::vector<TransferRing> MeasuredTransfer(const SpectrumSample& sample, const RelativeBlur& fit,
+                                           std::size_t index, double reference_variance_px2,
+                                           const TargetWindow& window,
+                                           const std::vector<Mode>& modes,
+                                           const WindowLeakage& leakage) {
+  constexpr int kPlottedRings = 16;
+  const auto i = static_cast<Eigen::Index>(index);
+  const auto count = std::min<Eigen::Index>(fit.modes_used[index], fit.texture.size());
+  const Eigen::ArrayXcd data =
+      sample.spectrum.values.head(count) -
+      leakage.At(fit.variances_px2[i] - reference_variance_px2, static_cast<std::size_t>(count));
+  std::vector<TransferRing> rings;
+  Eigen::Index k = 0;
+  for (int ring = 1; ring <= kPlottedRings; ++ring) {
+    const Eigen::Index end = count * ring / kPlottedRings;
+    double product = 0, power = 0, nu_sum = 0;
+    const Eigen::Index first = k;
+    for (; k < end; ++k) {
+      const Eigen::Vector2d nu = ModeFrequency(modes[static_cast<std::size_t>(k)], window);
+      const double phase = 2 * kPi * nu.dot(fit.shifts_px.col(i));
+      product += (data[k] * std::conj(fit.texture[k]) * std::polar(1.0, phase)).real();
+      power += std::norm(fit.texture[k]);
+      nu_sum += nu.norm();
+    }
+    if (k == first || !(power > 0)) continue;
+    rings.push_back({nu_sum / static_cast<double>(k - first), product / (power * fit.gains[i])});
+  }
+  return rings;
+}
+
+std::vector<Mode> StrongestModes(const std::vector<Mode>& modes, const Eigen::ArrayXd& power,
+                                 const TargetWindow& window, double least_power,
+                                 int most_per_ring) {
+  if (modes.empty()) return {};
+  const double first = std::log(ModeFrequency(modes.front(), window).norm());
+  const double last = std::log(ModeFrequency(modes.back(), window).norm());
+  std::vector<std::vector<std::size_t>> rings(kRings);
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    if (!(power[static_cast<Eigen::Index>(k)] > least_power)) continue;
+    const double part =
+        (std::log(ModeFrequency(modes[k], window).norm()) - first) / std::max(last - first, 1e-9);
+    rings[static_cast<std::size_t>(std::clamp(part * kRings, 0.0, kRings - 1.0))].push_back(k);
+  }
+  std::vector<std::size_t> kept;
+  for (std::vector<std::size_t>& ring : rings) {
+    std::stable_sort(ring.begin(), ring.end(), [&](std::size_t a, std::size_t b) {
+      return power[static_cast<Eigen::Index>(a)] > power[static_cast<Eigen::Index>(b)];
+    });
+    if (ring.size() > static_cast<std::size_t>(most_per_ring))
+      ring.resize(static_cast<std::size_t>(most_per_ring));
+    kept.insert(kept.end(), ring.begin(), ring.end());
+  }
+  std::sort(kept.begin(), kept.end());
+  std::vector<Mode> strongest;
+  strongest.reserve(kept.size());
+  for (const std::size_t k : kept) strongest.push_back(modes[k]);
+  return strongest;
+}
+
+}  // namespace thicklens::calib
