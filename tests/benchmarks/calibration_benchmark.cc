@@ -46,30 +46,19 @@ void SharpnessIndex(benchmark::State& state) {
 }
 BENCHMARK(SharpnessIndex)->Unit(benchmark::kMillisecond);
 
-void EdgeBlurAlone(benchmark::State& state) {
+void SourceEdgeBlur(benchmark::State& state) {
   const cv::Mat frame = Frame(15);
-  for (auto _ : state) benchmark::DoNotOptimize(calib::MeasureEdgeVariance(frame));
+  for (auto _ : state) benchmark::DoNotOptimize(calib::MeasureSourceEdgeBlur(frame));
 }
-BENCHMARK(EdgeBlurAlone)->Unit(benchmark::kMillisecond);
-
-void EdgeBlurAgainstReference(benchmark::State& state) {
-  const cv::Mat reference = Frame(15);
-  const cv::Mat frame = Frame(static_cast<int>(state.range(0)));
-  const double scale = Bench().truth().frames[15].depth_mm /
-                       Bench().truth().frames[static_cast<std::size_t>(state.range(0))].depth_mm;
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(calib::MeasureAddedVariance(reference, frame, scale, {255.5, 255.5},
-                                                         0.005, model::Psf::kGaussian));
-  }
-}
-BENCHMARK(EdgeBlurAgainstReference)->Arg(5)->Arg(13)->Unit(benchmark::kMillisecond);
+BENCHMARK(SourceEdgeBlur)->Unit(benchmark::kMillisecond);
 
 void RegisterFrame(benchmark::State& state) {
   const cv::Mat reference = Frame(15);
-  const cv::Mat frame = Frame(10);
-  for (auto _ : state) benchmark::DoNotOptimize(calib::RegisterScale(reference, frame, 1.01));
+  const cv::Mat frame = Frame(static_cast<int>(state.range(0)));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(calib::Register(reference, frame, 1.01, {255.5, 255.5}));
 }
-BENCHMARK(RegisterFrame)->Unit(benchmark::kMillisecond);
+BENCHMARK(RegisterFrame)->Arg(10)->Arg(14)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace thicklens

@@ -3,318 +3,440 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
 #include <random>
+#include <vector>
 
-#include "thicklens/model/thick_lens.h"
+#include "blur_samples.h"
 
 namespace thicklens::calib {
 namespace {
 
 using model::BenchDirection;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
+using thicklens::testing::BlurBench;
+using thicklens::testing::kReferencePx2;
+using thicklens::testing::WithEdge;
+using thicklens::testing::WithReadings;
+using thicklens::testing::WithTexture;
 
-constexpr double kFocusMm = 400, kRatio = 0.45, kFloorPx2 = 0.25, kPitchMm = 0.006;
-constexpr double kPixelBoxPx2 = 1.0 / 12;
-// Offset of the bench scale, and the depth of the frame that relative samples refer to.
-constexpr double kOffsetMm = 30, kReferenceMm = 392;
-
-model::ThickLens Lens() { return {12.5, 12.8, 3, 4.4643}; }
-
-// sigma^2 by the lens' own formula for the blur radius, not by the fit's.
-double TrueVariance(double depth_mm, double softness_px2) {
-  const double radius_mm =
-      model::BlurRadiusMm(Lens(), model::ImageDistanceMm(Lens(), kFocusMm), depth_mm);
-  return kFloorPx2 + softness_px2 * std::pow(kFocusMm / depth_mm, 2) +
-         std::pow(kRatio * radius_mm / kPitchMm, 2);
+BlurBench Exact() {
+  BlurBench bench;
+  bench.noise = 0;
+  return bench;
 }
 
-struct Bench {
-  BenchDirection direction = BenchDirection::kAway;
-  bool relative = false;
-  double softness_px2 = 0;
-  double error_px2 = 0.02;
-  double noise = 0;             // times error_px2
-  double reading_sigma_mm = 0;  // of the readings themselves
-  int count = 31;
-};
-
-std::vector<BlurSample> Samples(const Bench& bench, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, 1);
-  std::vector<BlurSample> samples;
-  for (int i = 0; i < bench.count; ++i) {
-    const double depth_mm = 330 + 150.0 * i / (bench.count - 1);
-    BlurSample s;
-    s.frame = static_cast<std::size_t>(i);
-    s.reading_mm = model::DirectionSign(bench.direction) * (depth_mm - kOffsetMm) +
-                   bench.reading_sigma_mm * normal(random);
-    s.variance_px2 = TrueVariance(depth_mm, bench.softness_px2);
-    if (bench.relative) {
-      s.relative_scale = kReferenceMm / depth_mm;
-      s.variance_px2 += kPixelBoxPx2 - s.relative_scale * s.relative_scale *
-                                           (TrueVariance(kReferenceMm, 0) + kPixelBoxPx2);
-    }
-    s.error_px2 = bench.error_px2;
-    s.variance_px2 += bench.noise * bench.error_px2 * normal(random);
-    samples.push_back(s);
-  }
-  return samples;
-}
-
-BlurFitSetup SetupFor(const Bench& bench) {
-  BlurFitSetup setup;
-  setup.lens = Lens();
-  setup.pixel_pitch_mm = kPitchMm;
-  setup.offset_mm = {kOffsetMm, 0};
-  setup.direction = bench.direction;
-  setup.reading_sigma_mm = bench.reading_sigma_mm;
-  setup.reference_reading_mm = model::DirectionSign(bench.direction) * (kReferenceMm - kOffsetMm);
-  setup.start_focus_depth_mm = 385;
-  return setup;
-}
-
-BlurFitSetup WithFloor(BlurFitSetup setup, double sigma_px2) {
-  setup.floor_variance_px2 = model::Estimate{kFloorPx2, sigma_px2};
-  return setup;
-}
-
-void ExpectTruth(const BlurFitResult& fit) {
+void ExpectTruth(const BlurFitResult& fit, const BlurBench& bench) {
   ASSERT_TRUE(fit.done) << fit.message;
-  EXPECT_NEAR(fit.values[0] / kFocusMm, 1, 1e-6);
-  EXPECT_NEAR(fit.values[1] / kRatio, 1, 1e-6);
-  EXPECT_NEAR(fit.values[2] / kFloorPx2, 1, 1e-6);
-  EXPECT_EQ(fit.values[3], kOffsetMm);
+  EXPECT_NEAR(fit.values[kFocusDepth] / bench.focus_mm, 1, 1e-6);
+  EXPECT_NEAR(fit.values[kBlurRatio] / bench.ratio, 1, 1e-6);
+  EXPECT_NEAR(fit.values[kFloorVariance], bench.floor_px2, 1e-6);
+  EXPECT_EQ(fit.values[kBenchOffset], bench.offset_mm);
+  EXPECT_LT(fit.chi2_per_dof, 1e-6);
 }
 
-TEST(BlurFit, ExactAbsoluteSamplesGiveTheTruth) {
-  for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
-    Bench bench;
-    bench.direction = direction;
-    const BlurFitResult fit = FitBlur(Samples(bench, 1), SetupFor(bench));
-    ExpectTruth(fit);
-    EXPECT_LT(fit.chi2_per_dof, 1e-8);
-    for (const double weight : fit.weights) EXPECT_NEAR(weight, 1, 1e-6);
+TEST(DefocusVariance, IsTheLensOwnBlurRadius) {
+  BlurBench bench;
+  std::mt19937 random(1);
+  const BlurFitSetup setup = bench.Setup(&random);
+  for (const double depth_mm : {320.0, 399.0, 400.0, 470.0}) {
+    EXPECT_NEAR(bench.ratio * bench.ratio * DefocusVariance(setup, bench.focus_mm, depth_mm),
+                bench.Variance(depth_mm) - bench.floor_px2, 1e-9);
   }
 }
 
-TEST(BlurFit, ExactRelativeSamplesGiveTheTruthWithTheFloor) {
-  Bench bench;
-  bench.relative = true;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), WithFloor(SetupFor(bench), 0));
-  ExpectTruth(fit);
-  // What was relative comes back absolute.
-  for (std::size_t i = 0; i < fit.variances_px2.size(); ++i)
-    EXPECT_NEAR(fit.variances_px2[i], TrueVariance(330 + 5.0 * static_cast<double>(i), 0), 1e-5);
-}
-
-TEST(BlurFit, ExactSamplesOfASoftTargetGiveItsSoftness) {
-  Bench bench;
-  bench.softness_px2 = 0.6;
-  BlurFitSetup setup = WithFloor(SetupFor(bench), 0);
-  setup.target_softness = true;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
-  ExpectTruth(fit);
-  EXPECT_NEAR(fit.target_softness_px2, 0.6, 1e-5);
-}
-
-TEST(BlurFit, AWrongFloorShiftsTheFocusAsDerived) {
-  // sigma_rel^2 of a texture leaves S0 (1 - s^2) to be made up by zf: dzf = zf dS0/(A uf^2),
-  // dkappa/kappa = dS0/(2 A uf^2), to first order.
-  Bench bench;
-  bench.relative = true;
-  BlurFitSetup setup = WithFloor(SetupFor(bench), 0);
-  const double step_px2 = 0.02;
-  setup.floor_variance_px2->value += step_px2;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
-  ASSERT_TRUE(fit.done);
-  const double k_mm = 12.5 * kFocusMm / (kFocusMm - 12.5);
-  const double curvature = std::pow(kRatio * 4.4643 * k_mm / kPitchMm / kFocusMm, 2);
-  EXPECT_NEAR(std::abs(fit.values[0] - kFocusMm), kFocusMm * step_px2 / curvature,
-              0.05 * kFocusMm * step_px2 / curvature);
-  EXPECT_NEAR(std::abs(fit.values[1] / kRatio - 1), step_px2 / (2 * curvature),
-              0.1 * step_px2 / (2 * curvature));
-  EXPECT_EQ(fit.values[2], kFloorPx2 + step_px2);
-}
-
-TEST(BlurFit, AHeldFloorStaysAndHasNoRow) {
-  const Bench bench;
-  BlurFitSetup setup = WithFloor(SetupFor(bench), 0);
-  setup.floor_variance_px2->value = 0.31;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
-  ASSERT_TRUE(fit.done);
-  EXPECT_EQ(fit.values[2], 0.31);
-  EXPECT_EQ(fit.covariance.row(2).norm(), 0);
-  EXPECT_EQ(fit.covariance.col(2).norm(), 0);
-  EXPECT_GT(fit.covariance(0, 0), 0);
-}
-
-// Scatter over seeded runs against the sigmas stated, for (zf, kappa, S0).
-struct Spread {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), scatter, stated = Eigen::Vector3d::Zero();
-  double correlation = 0, stated_correlation = 0;  // of zf and kappa
-};
-Spread Scatter(const Bench& bench, const BlurFitSetup& setup, int runs) {
-  Spread spread;
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  const Eigen::Vector3d truth(kFocusMm, kRatio, kFloorPx2);
-  std::mt19937 random(77);
-  std::normal_distribution<double> normal(0, 1);
-  for (int run = 0; run < runs; ++run) {
-    BlurFitSetup drawn = setup;
-    // A prior is a measurement too: it scatters with its sigma.
-    if (drawn.floor_variance_px2)
-      drawn.floor_variance_px2->value += drawn.floor_variance_px2->sigma * normal(random);
-    const BlurFitResult fit = FitBlur(Samples(bench, 1000U + static_cast<unsigned>(run)), drawn);
-    EXPECT_TRUE(fit.done) << fit.message;
-    const Eigen::Vector3d error = fit.values.head<3>() - truth;
-    spread.mean += error / runs;
-    squares += error * error.transpose() / runs;
-    spread.stated += fit.covariance.diagonal().head<3>() / runs;
-    spread.stated_correlation +=
-        fit.covariance(0, 1) / std::sqrt(fit.covariance(0, 0) * fit.covariance(1, 1)) / runs;
+TEST(FitBlur, ExactAbsoluteSamplesGiveTheTruthByBothLawsInBothDirections) {
+  for (const BlurLaw law : {BlurLaw::kPerspective, BlurLaw::kTelecentric}) {
+    for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
+      BlurBench bench = Exact();
+      bench.law = law;
+      bench.direction = direction;
+      std::mt19937 random(1);
+      const BlurFitResult fit = FitBlur(WithEdge(bench, 0.02, &random));
+      ExpectTruth(fit, bench);
+      for (const double weight : fit.weights) EXPECT_EQ(weight, 1);
+      EXPECT_EQ(fit.softness_px2, std::vector<double>{0});
+    }
   }
-  const Eigen::Matrix3d covariance = squares - spread.mean * spread.mean.transpose();
-  spread.scatter = covariance.diagonal().cwiseSqrt();
-  spread.stated = spread.stated.cwiseSqrt();
-  spread.correlation = covariance(0, 1) / (spread.scatter[0] * spread.scatter[1]);
-  return spread;
 }
 
-constexpr int kRuns = 400;
-
-void ExpectCovers(const Spread& spread, int parameters) {
-  for (int i = 0; i < parameters; ++i) {
-    // The robust loss costs some information, which the covariance overstates a little.
-    EXPECT_GT(spread.stated[i] / spread.scatter[i], 0.85) << "parameter " << i;
-    EXPECT_LT(spread.stated[i] / spread.scatter[i], 1.2) << "parameter " << i;
-    EXPECT_LT(std::abs(spread.mean[i]), 4 * spread.scatter[i] / std::sqrt(kRuns))
-        << "parameter " << i;
+TEST(FitBlur, ExactRelativeSamplesGiveTheTruthAndTheirNuisance) {
+  for (const BlurLaw law : {BlurLaw::kPerspective, BlurLaw::kTelecentric}) {
+    BlurBench bench = Exact();
+    bench.law = law;
+    std::mt19937 random(1);
+    const BlurFitResult fit = FitBlur(WithTexture(bench, 0.02, 0, &random));
+    ExpectTruth(fit, bench);
+    EXPECT_NEAR(fit.softness_px2.at(0),
+                kReferencePx2 - bench.OnTarget(bench.Depth(bench.reference)), 1e-5);
   }
-  EXPECT_NEAR(spread.stated_correlation, spread.correlation, 0.15);
 }
 
-TEST(BlurFit, CovarianceIsTheScatterOfAbsoluteFits) {
-  Bench bench;
-  bench.noise = 1;
-  ExpectCovers(Scatter(bench, SetupFor(bench), kRuns), 3);
-}
-
-TEST(BlurFit, CovarianceIsTheScatterOfRelativeFitsWithAFloorOfKnownError) {
-  Bench bench;
-  bench.noise = 1;
-  bench.relative = true;
-  ExpectCovers(Scatter(bench, WithFloor(SetupFor(bench), 0.03), kRuns), 3);
-}
-
-TEST(BlurFit, CovarianceIncludesTheReadingsErrors) {
-  Bench bench;
-  bench.noise = 1;
-  bench.error_px2 = 0.005;
-  bench.reading_sigma_mm = 0.5;
-  const Spread with = Scatter(bench, SetupFor(bench), kRuns);
-  ExpectCovers(with, 3);
-  // They are the larger part here.
-  bench.reading_sigma_mm = 0;
-  EXPECT_GT(with.stated[0], 1.5 * Scatter(bench, SetupFor(bench), 20).stated[0]);
-}
-
-TEST(BlurFit, CovarianceGrowsWhereTheScatterIsLargerThanStated) {
-  Bench bench;
-  bench.noise = 2;  // errors twice as large as they are said to be
-  const Spread spread = Scatter(bench, SetupFor(bench), kRuns);
-  for (int i = 0; i < 3; ++i)
-    EXPECT_NEAR(spread.stated[i] / spread.scatter[i], 1, 0.25) << "parameter " << i;
-}
-
-TEST(BlurFit, TheOffsetsErrorIsCarriedIntoTheResults) {
-  Bench bench;
-  bench.error_px2 = 1e-4;
-  BlurFitSetup setup = SetupFor(bench);
-  const double offset_sigma_mm = 1.5;
-  setup.offset_mm.sigma = offset_sigma_mm;
-  const auto samples = Samples(bench, 1);
-  const BlurFitResult fit = FitBlur(samples, setup);
-  ASSERT_TRUE(fit.done);
-  EXPECT_NEAR(std::sqrt(fit.covariance(3, 3)), offset_sigma_mm, 1e-9);
-  // Monte Carlo: bench zeros drawn from their distribution and taken as exact.
+TEST(FitBlur, AStartSavesTheSearchAndChangesNothing) {
+  BlurBench bench;
   std::mt19937 random(5);
-  std::normal_distribution<double> drawn(kOffsetMm, offset_sigma_mm);
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
-  for (int run = 0; run < kRuns; ++run) {
-    setup.offset_mm = {drawn(random), 0};
-    const BlurFitResult one = FitBlur(samples, setup);
-    ASSERT_TRUE(one.done);
-    const Eigen::Vector2d error(one.values[0] - kFocusMm, one.values[1] - kRatio);
-    mean += error / kRuns;
-    squares += error * error.transpose() / kRuns;
+  const BlurFitSetup setup = WithEdge(bench, 0.02, &random);
+  const BlurFitResult fit = FitBlur(setup);
+  BlurFitResult far_off = fit;
+  far_off.values = {415, 0.3, 0.6, bench.offset_mm};
+  const BlurFitResult again = FitBlur(setup, &far_off);
+  ASSERT_TRUE(fit.done && again.done);
+  EXPECT_NEAR(again.values[kFocusDepth], fit.values[kFocusDepth], 1e-5);
+  EXPECT_NEAR(again.values[kBlurRatio], fit.values[kBlurRatio], 1e-8);
+}
+
+// V = S0 z^2/zr^2 + A (1 - z/zf)^2/zr^2 + c for every c, so a texture leaves a = A uf^2 + S0 and
+// the vertex zf (a - S0)/a alone; a floor that is off by dS0 gives zf = vertex a/(a - S0 - dS0) and
+// kappa^2 in proportion to (a - S0 - dS0) (zf - f1)^2. To first order dzf = zf dS0/(A uf^2).
+TEST(FitBlur, AWrongFloorMovesFocusAndRatioAsDerived) {
+  const BlurBench bench = Exact();
+  const double curvature = bench.Curvature(), a = curvature + bench.floor_px2;
+  for (const double off_px2 : {-0.2, 0.15, 3.0}) {
+    std::mt19937 random(1);
+    BlurFitSetup setup = WithTexture(bench, 0.02, 0, &random);
+    setup.floor_variance_px2->value += off_px2;
+    const BlurFitResult fit = FitBlur(setup);
+    ASSERT_TRUE(fit.done) << fit.message;
+    const double rest = a - bench.floor_px2 - off_px2;
+    const double focus_mm = bench.focus_mm * curvature / rest;
+    EXPECT_NEAR(fit.values[kFocusDepth], focus_mm, 1e-3);
+    EXPECT_NEAR(fit.values[kFocusDepth] - bench.focus_mm, bench.focus_mm * off_px2 / curvature,
+                0.04 * std::abs(bench.focus_mm * off_px2 / curvature));
+    const double f1 = bench.lens.front_focal_length_mm;
+    EXPECT_NEAR(fit.values[kBlurRatio],
+                bench.ratio * std::sqrt(rest / curvature) * (focus_mm - f1) / (bench.focus_mm - f1),
+                1e-5);
   }
-  const Eigen::Matrix2d scatter = squares - mean * mean.transpose();
-  EXPECT_NEAR(std::sqrt(fit.covariance(0, 0) / scatter(0, 0)), 1, 0.15);
-  EXPECT_NEAR(std::sqrt(fit.covariance(1, 1) / scatter(1, 1)), 1, 0.15);
-  // A zero error goes about one to one into the plane of focus.
-  EXPECT_NEAR(std::sqrt(fit.covariance(0, 0)), offset_sigma_mm, 0.2 * offset_sigma_mm);
 }
 
-TEST(BlurFit, OutliersAreWeightedDown) {
-  Bench bench;
-  bench.noise = 1;
-  auto samples = Samples(bench, 3);
-  const BlurFitResult clean = FitBlur(samples, SetupFor(bench));
-  samples[4].variance_px2 += 3;
-  samples[20].variance_px2 -= 2;
-  samples[26].variance_px2 *= 3;
-  const BlurFitResult fit = FitBlur(samples, SetupFor(bench));
+TEST(FitBlur, OfATelecentricLensAWrongFloorIsANuisanceAlone) {
+  BlurBench bench = Exact();
+  bench.law = BlurLaw::kTelecentric;
+  std::mt19937 random(1);
+  BlurFitSetup setup = WithTexture(bench, 0.02, 0, &random);
+  setup.floor_variance_px2->value += 1;
+  const BlurFitResult fit = FitBlur(setup);
   ASSERT_TRUE(fit.done);
-  for (const std::size_t i : {4U, 20U, 26U}) EXPECT_LT(fit.weights[i], 0.01) << i;
-  EXPECT_NEAR(fit.values[0], clean.values[0], std::sqrt(clean.covariance(0, 0)));
-  EXPECT_NEAR(fit.values[1], clean.values[1], std::sqrt(clean.covariance(1, 1)));
+  EXPECT_NEAR(fit.values[kFocusDepth], bench.focus_mm, 1e-3);
+  EXPECT_NEAR(fit.values[kBlurRatio], bench.ratio, 1e-6);
 }
 
-TEST(BlurFit, TheFloorOfATextureIsNamedAsUndetermined) {
-  Bench bench;
-  bench.relative = true;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), SetupFor(bench));
+TEST(FitBlur, AHeldFloorStaysAndHasNoRow) {
+  const BlurBench bench = Exact();
+  std::mt19937 random(1);
+  BlurFitSetup setup = WithEdge(bench, 0.02, &random);
+  setup.floor_variance_px2 = model::Estimate{0.31, 0};
+  const BlurFitResult fit = FitBlur(setup);
+  ASSERT_TRUE(fit.done);
+  EXPECT_EQ(fit.values[kFloorVariance], 0.31);
+  for (const int held : {kFloorVariance, kBenchOffset}) {
+    EXPECT_EQ(fit.covariance.row(held).norm(), 0);
+    EXPECT_EQ(fit.covariance.col(held).norm(), 0);
+  }
+  EXPECT_GT(fit.covariance(kFocusDepth, kFocusDepth), 0);
+}
+
+TEST(FitBlur, AGivenFloorsErrorGoesIntoFocusAndRatio) {
+  const BlurBench bench = Exact();
+  std::mt19937 random(1);
+  const double sigma_px2 = 0.5;
+  const BlurFitResult fit = FitBlur(WithTexture(bench, 1e-3, sigma_px2, &random));
+  ASSERT_TRUE(fit.done);
+  // A texture says nothing of the floor.
+  EXPECT_NEAR(std::sqrt(fit.covariance(kFloorVariance, kFloorVariance)), sigma_px2,
+              1e-3 * sigma_px2);
+  const double per_px2 = bench.focus_mm / bench.Curvature();
+  EXPECT_NEAR(std::sqrt(fit.covariance(kFocusDepth, kFocusDepth)), per_px2 * sigma_px2,
+              0.01 * per_px2 * sigma_px2);
+  EXPECT_NEAR(fit.covariance(kFocusDepth, kFloorVariance), per_px2 * sigma_px2 * sigma_px2,
+              0.01 * per_px2 * sigma_px2 * sigma_px2);
+  // Where the data say it better, their own error counts.
+  BlurFitSetup edge = WithEdge(bench, 0.02, &random);
+  const double alone = FitBlur(edge).covariance(kFloorVariance, kFloorVariance);
+  edge.floor_variance_px2 = model::Estimate{bench.floor_px2, 2 * std::sqrt(alone)};
+  EXPECT_NEAR(FitBlur(edge).covariance(kFloorVariance, kFloorVariance), alone / (1 + 0.25),
+              1e-3 * alone);
+}
+
+// A knife edge in a texture: the one gives the floor, the other the precision.
+TEST(FitBlur, EdgesAndTextureTogetherAreBetterThanEither) {
+  const BlurBench bench = Exact();
+  std::mt19937 random(1);
+  BlurFitSetup both = bench.Setup(&random);
+  BlurSamples edge = bench.Absolute(0.2, 0, &random);
+  edge.held_softness_px2 = 0;
+  const BlurSamples texture = bench.Relative(0.004, kReferencePx2, &random);
+  both.meters = {edge, texture};
+  const BlurFitResult fit = FitBlur(both);
+  ExpectTruth(fit, bench);
+  EXPECT_EQ(fit.softness_px2.at(0), 0);
+  EXPECT_NEAR(fit.softness_px2.at(1), kReferencePx2 - bench.OnTarget(bench.Depth(bench.reference)),
+              1e-4);
+  BlurFitSetup edge_alone = both, texture_alone = both;
+  edge_alone.meters = {edge};
+  texture_alone.meters = {texture};
+  const BlurFitResult by_edge = FitBlur(edge_alone);
+  ASSERT_TRUE(by_edge.done);
+  EXPECT_LT(fit.covariance(kFocusDepth, kFocusDepth),
+            0.25 * by_edge.covariance(kFocusDepth, kFocusDepth));
+  EXPECT_FALSE(FitBlur(texture_alone).done);
+}
+
+// ---- readings ----
+
+TEST(FitBlur, PreciseScalesTellTheReadingsErrors) {
+  for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
+    BlurBench bench = WithReadings(0.5, 2e-5);
+    bench.direction = direction;
+    double squares = 0, drawn_squares = 0, standardised = 0;
+    int count = 0;
+    for (unsigned seed = 0; seed < 20; ++seed) {
+      std::mt19937 random(100 + seed);
+      std::vector<double> errors_mm;
+      BlurFitSetup setup = bench.Setup(&random, &errors_mm);
+      setup.meters = {bench.Absolute(0.05, 0, &random)};
+      setup.meters[0].held_softness_px2 = 0;
+      const BlurFitResult fit = FitBlur(setup);
+      ASSERT_TRUE(fit.done) << fit.message;
+      for (std::size_t i = 0; i < errors_mm.size(); ++i) {
+        const auto row = static_cast<Eigen::Index>(i);
+        const double off = fit.reading_errors_mm[row] - errors_mm[i];
+        squares += off * off;
+        drawn_squares += errors_mm[i] * errors_mm[i];
+        standardised += std::pow(off / fit.reading_error_sigmas_mm[row], 2);
+        ++count;
+      }
+    }
+    // A common offset and stretch of the readings is the scales' law: that much stays unknown.
+    EXPECT_LT(squares, 0.15 * drawn_squares);
+    EXPECT_NEAR(std::sqrt(standardised / count), 1, 0.15);
+  }
+}
+
+TEST(FitBlur, AReadingFarOffIsFoundAndDoesNoHarm) {
+  BlurBench bench = WithReadings(0.05, 2e-5);
+  std::mt19937 random(3);
+  std::vector<double> errors_mm;
+  BlurFitSetup setup = bench.Setup(&random, &errors_mm);
+  setup.meters = {bench.Absolute(0.02, 0, &random)};
+  setup.meters[0].held_softness_px2 = 0;
+  const BlurFitResult clean = FitBlur(setup);
+  setup.frames[5].reading_mm += 2;
+  const BlurFitResult fit = FitBlur(setup);
+  ASSERT_TRUE(clean.done && fit.done);
+  EXPECT_NEAR(fit.reading_errors_mm[5], 2 + errors_mm[5], 0.06);
+  EXPECT_LT(fit.weights[5], 0.2);
+  for (Eigen::Index i = 0; i < fit.weights.size(); ++i) {
+    if (i != 5) {
+      EXPECT_GT(fit.weights[i], 0.8) << i;
+    }
+  }
+  EXPECT_NEAR(fit.values[kFocusDepth], clean.values[kFocusDepth],
+              std::sqrt(clean.covariance(kFocusDepth, kFocusDepth)));
+}
+
+// The blur is judged at the reading that is believed, not at the one that was written.
+TEST(FitBlur, AReadingWithinItsErrorCostsNoWeight) {
+  for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
+    BlurBench bench = Exact();
+    bench.direction = direction;
+    std::mt19937 random(1);
+    BlurFitSetup setup = WithEdge(bench, 0.01, &random);
+    setup.reading_sigma_mm = 0.3;
+    setup.frames[3].reading_mm += 0.9;  // thirty times the blur's own error
+    const BlurFitResult fit = FitBlur(setup);
+    ASSERT_TRUE(fit.done);
+    EXPECT_EQ(fit.weights.minCoeff(), 1);
+    EXPECT_NEAR(fit.reading_errors_mm[3], 0.9, 0.05);
+  }
+}
+
+TEST(FitBlur, ReadingsThatAreExactHaveNoErrors) {
+  BlurBench bench;
+  std::mt19937 random(3);
+  const BlurFitResult fit = FitBlur(WithEdge(bench, 0.02, &random));
+  ASSERT_TRUE(fit.done);
+  EXPECT_EQ(fit.reading_errors_mm.norm(), 0);
+  EXPECT_EQ(fit.reading_error_sigmas_mm.norm(), 0);
+}
+
+// ---- weights and widening ----
+
+TEST(FitBlur, WeightIsLostBeyondFourStandardDeviationsOnly) {
+  const BlurBench bench = Exact();
+  constexpr double kErrorPx2 = 0.02;
+  std::mt19937 random(1);
+  BlurFitSetup setup = WithEdge(bench, kErrorPx2, &random);
+  setup.meters[0].variances_px2[8] += 3.5 * kErrorPx2;
+  EXPECT_EQ(FitBlur(setup).weights.minCoeff(), 1);
+  setup.meters[0].variances_px2[20] += 16 * kErrorPx2;
+  const BlurFitResult fit = FitBlur(setup);
+  ASSERT_TRUE(fit.done);
+  // 4/16, the fit's own part in the frame aside.
+  EXPECT_NEAR(fit.weights[20], 0.25, 0.03);
+  EXPECT_EQ(fit.weights[8], 1);
+  EXPECT_NEAR(fit.residuals[20], 16, 1);
+}
+
+TEST(FitBlur, OutliersDoLittleHarm) {
+  BlurBench bench;
+  std::mt19937 random(3);
+  BlurFitSetup setup = WithEdge(bench, 0.02, &random);
+  const BlurFitResult clean = FitBlur(setup);
+  setup.meters[0].variances_px2[4] += 3;
+  setup.meters[0].variances_px2[20] -= 2;
+  const BlurFitResult fit = FitBlur(setup);
+  ASSERT_TRUE(clean.done && fit.done);
+  for (const int i : {4, 20}) EXPECT_LT(fit.weights[i], 0.1) << i;
+  for (const int i : {kFocusDepth, kBlurRatio}) {
+    // Each pulls like one that is four standard deviations off.
+    EXPECT_NEAR(fit.values[i], clean.values[i], 3 * std::sqrt(clean.covariance(i, i))) << i;
+  }
+}
+
+// A datum that has lost its weight is none: chi^2 and its degrees of freedom count what is left.
+TEST(FitBlur, LostWeightCountsInTheDegreesOfFreedom) {
+  BlurBench bench;
+  std::mt19937 random(3);
+  BlurFitSetup setup = WithEdge(bench, 0.02, &random);
+  for (const int i : {4, 9, 14, 20, 25}) setup.meters[0].variances_px2[i] += i % 2 == 0 ? 0.8 : -1;
+  const BlurFitResult fit = FitBlur(setup);
+  ASSERT_TRUE(fit.done);
+  const double chi2 = (fit.weights.array() * fit.residuals.array().square()).sum();
+  EXPECT_LT(fit.weights.sum(), 27);
+  EXPECT_NEAR(fit.chi2_per_dof, chi2 / (fit.weights.sum() - 3), 0.05 * fit.chi2_per_dof);
+}
+
+TEST(FitBlur, ResidualsAreInTheirOwnStandardDeviations) {
+  for (const double reading_sigma_mm : {0.0, 0.1}) {
+    BlurBench bench;
+    bench.reading_sigma_mm = reading_sigma_mm;
+    double squares = 0, largest = 0;
+    int count = 0;
+    for (unsigned seed = 0; seed < 20; ++seed) {
+      std::mt19937 random(40 + seed);
+      const BlurFitResult fit = FitBlur(WithTexture(bench, 0.02, 0, &random));
+      ASSERT_TRUE(fit.done);
+      squares += fit.residuals.squaredNorm();
+      largest = std::max(largest, fit.residuals.cwiseAbs().maxCoeff());
+      count += bench.count;
+    }
+    EXPECT_NEAR(std::sqrt(squares / count), 1, 0.2) << reading_sigma_mm;
+    EXPECT_LT(largest, 5) << reading_sigma_mm;
+  }
+}
+
+// chi^2/dof of 28 degrees of freedom exceeds 1.72 once in a hundred.
+TEST(FitBlur, ErrorsAreWidenedOnlyWhereChanceDoesNotExplainChiSquared) {
+  BlurBench bench;
+  int widened = 0;
+  constexpr int kRuns = 150;
+  for (unsigned seed = 0; seed < kRuns; ++seed) {
+    std::mt19937 random(500 + seed);
+    const BlurFitResult fit = FitBlur(WithEdge(bench, 0.02, &random));
+    ASSERT_TRUE(fit.done);
+    if (fit.chi2_per_dof > 1.75) {
+      EXPECT_NEAR(fit.error_factor, std::sqrt(fit.chi2_per_dof), 1e-9);
+      ++widened;
+    }
+    if (fit.chi2_per_dof < 1.70) {
+      EXPECT_EQ(fit.error_factor, 1);
+    }
+  }
+  EXPECT_LE(widened, 5);
+  std::mt19937 random(7);
+  bench.noise = 2.5;
+  BlurFitSetup setup = WithEdge(bench, 0.02, &random);
+  const BlurFitResult widened_fit = FitBlur(setup);
+  ASSERT_TRUE(widened_fit.done);
+  EXPECT_NEAR(widened_fit.error_factor, 2.5, 0.6);
+  setup.meters[0].covariance *= widened_fit.error_factor * widened_fit.error_factor;
+  const BlurFitResult as_stated = FitBlur(setup);
+  EXPECT_EQ(as_stated.error_factor, 1);
+  EXPECT_NEAR(as_stated.covariance(0, 0) / widened_fit.covariance(0, 0), 1, 0.05);
+}
+
+TEST(FitBlur, WhereNobodyKnowsTheReadingsErrorTheScatterIsTaken) {
+  BlurBench bench;
+  bench.noise = 0.5;
+  std::mt19937 random(8);
+  BlurFitSetup setup = WithEdge(bench, 0.02, &random);
+  const BlurFitResult known = FitBlur(setup);
+  setup.reading_sigma_is_known = false;
+  const BlurFitResult fit = FitBlur(setup);
+  ASSERT_TRUE(known.done && fit.done);
+  EXPECT_EQ(known.error_factor, 1);
+  EXPECT_NEAR(fit.error_factor, std::sqrt(fit.chi2_per_dof), 1e-9);
+  EXPECT_NEAR(fit.error_factor, 0.5, 0.2);
+  EXPECT_NEAR(fit.covariance(0, 0), fit.error_factor * fit.error_factor * known.covariance(0, 0),
+              1e-6 * known.covariance(0, 0));
+}
+
+// ---- what the data do not fix ----
+
+TEST(FitBlur, TheFloorOfATextureIsNamedAsUndetermined) {
+  const BlurBench bench = Exact();
+  std::mt19937 random(1);
+  BlurFitSetup setup = WithTexture(bench, 0.02, 0, &random);
+  setup.floor_variance_px2.reset();
+  const BlurFitResult fit = FitBlur(setup);
   EXPECT_FALSE(fit.done);
   EXPECT_THAT(fit.message, HasSubstr("the data do not tell apart"));
   EXPECT_THAT(fit.weak_direction, HasSubstr("blur_floor_px"));
 }
 
-TEST(BlurFit, FloorAndSoftnessTogetherAreNamedAsUndetermined) {
-  Bench bench;
-  bench.softness_px2 = 0.4;
-  BlurFitSetup setup = SetupFor(bench);
-  setup.target_softness = true;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), setup);
-  EXPECT_FALSE(fit.done);
-  EXPECT_THAT(fit.weak_direction, HasSubstr("blur_floor_px"));
-  EXPECT_THAT(fit.weak_direction, HasSubstr("target softness"));
-}
-
-TEST(BlurFit, TwoDepthsDoNotFixThreeParameters) {
-  const Bench bench;
-  std::vector<BlurSample> samples;
-  for (int i = 0; i < 12; ++i) {
-    BlurSample s;
+TEST(FitBlur, TwoDepthsDoNotFixThreeParameters) {
+  const BlurBench bench = Exact();
+  std::mt19937 random(1);
+  BlurFitSetup setup = WithEdge(bench, 0.02, &random);
+  for (std::size_t i = 0; i < setup.frames.size(); ++i) {
     const double depth_mm = i % 2 == 0 ? 350 : 450;
-    s.reading_mm = depth_mm - kOffsetMm;
-    s.variance_px2 = TrueVariance(depth_mm, 0);
-    s.error_px2 = 0.02;
-    samples.push_back(s);
+    setup.frames[i].reading_mm = depth_mm - bench.offset_mm;
+    setup.frames[i].scale = bench.Scale(depth_mm);
+    setup.meters[0].variances_px2[static_cast<Eigen::Index>(i)] = bench.OnTarget(depth_mm);
   }
-  const BlurFitResult fit = FitBlur(samples, SetupFor(bench));
+  EXPECT_FALSE(FitBlur(setup).done);
+  BlurFitResult start;
+  start.done = true;
+  start.values = {bench.focus_mm, bench.ratio, bench.floor_px2, bench.offset_mm};
+  const BlurFitResult fit = FitBlur(setup, &start);
   EXPECT_FALSE(fit.done);
-  EXPECT_NE(fit.weak_direction, "") << fit.message;
   EXPECT_THAT(fit.message, HasSubstr("tell apart"));
+  EXPECT_NE(fit.weak_direction, "");
 }
 
-TEST(BlurFit, FewerThanFourSamplesAreRefused) {
-  Bench bench;
+TEST(FitBlur, TheWorstKnownCombinationIsNamedWithItsCorrelation) {
+  const BlurBench bench = Exact();
+  std::mt19937 random(1);
+  // Of a texture zf and the floor go together (a wrong floor moves the focus), all but entirely.
+  const BlurFitResult fit = FitBlur(WithTexture(bench, 1e-3, 0.5, &random));
+  ASSERT_TRUE(fit.done);
+  EXPECT_THAT(fit.weak_direction, HasSubstr("blur_floor_px"));
+  EXPECT_THAT(fit.weak_direction, HasSubstr("(correlation "));
+  EXPECT_THAT(fit.weak_direction, HasSubstr("1.00)"));
+}
+
+TEST(FitBlur, FewerThanFourFramesAreRefused) {
+  BlurBench bench;
   bench.count = 3;
-  const BlurFitResult fit = FitBlur(Samples(bench, 1), SetupFor(bench));
+  bench.reference = 1;
+  std::mt19937 random(1);
+  const BlurFitResult fit = FitBlur(WithEdge(bench, 0.02, &random));
   EXPECT_FALSE(fit.done);
   EXPECT_THAT(fit.message, HasSubstr("3 frames, at least 4"));
+  EXPECT_FALSE(FitBlur({}).done);
+}
+
+TEST(FitBlur, BlurWithoutAMinimumIsRefused) {
+  const BlurBench bench = Exact();
+  std::mt19937 random(1);
+  BlurFitSetup setup = WithTexture(bench, 0.02, 0, &random);
+  setup.meters[0].variances_px2 *= -1;
+  const BlurFitResult fit = FitBlur(setup);
+  EXPECT_FALSE(fit.done);
+  EXPECT_THAT(fit.message, HasSubstr("no minimum in depth"));
 }
 
 }  // namespace

@@ -73,8 +73,8 @@ void ExpectRight(const Calibration& c, const model::SweepTruth& truth) {
   ASSERT_TRUE(c.focus_depth_mm) << c.reason;
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   EXPECT_LT(std::abs(c.focus_depth_mm->value - truth.focus_depth_mm), 3 * c.focus_depth_mm->sigma);
-  EXPECT_LT(c.focus_depth_mm->sigma, 1);
-  EXPECT_NEAR(c.blur_ratio->value / truth.blur_ratio, 1, 0.03);
+  EXPECT_LT(c.focus_depth_mm->sigma, 0.15);
+  EXPECT_NEAR(c.blur_ratio->value / truth.blur_ratio, 1, 0.005);
   EXPECT_NEAR(c.image_distance_mm->value, truth.image_distance_mm, 3 * c.image_distance_mm->sigma);
 }
 
@@ -144,9 +144,9 @@ TEST(Calibrate, AnUnknownBenchZeroIsFound) {
   for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm -= 45;
   const Calibration c = Calibrated(s);
   ASSERT_TRUE(c.bench_offset_mm) << c.reason;
-  EXPECT_NEAR(c.bench_offset_mm->value, 45, 3 * c.bench_offset_mm->sigma + 1.2);
+  EXPECT_NEAR(c.bench_offset_mm->value, 45, 3 * c.bench_offset_mm->sigma);
   ASSERT_TRUE(c.focus_depth_mm);
-  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma + 1.2);
+  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma);
   // The bench zero's error is in the focus' error.
   EXPECT_GE(c.focus_depth_mm->sigma, 0.8 * c.bench_offset_mm->sigma);
 }
@@ -218,9 +218,11 @@ TEST(Calibrate, StatedTolerancesWidenTheSystematicInterval) {
   const double half_mm = 0.1 * zf / (zf - s.sweep.camera.lens.front_focal_length_mm);
   EXPECT_NEAR(c.image_distance_mm->systematic->y() - exact.image_distance_mm->systematic->y(),
               half_mm, 1e-3);
-  const double meter = 0.05 * c.blur_ratio->value;
-  EXPECT_NEAR(c.blur_ratio->systematic->y() - c.blur_ratio->value - meter,
-              0.02 * c.blur_ratio->value, 0.003 * c.blur_ratio->value);
+  // With what the meter itself is good for, and whatever else there is, in quadrature.
+  const double before = exact.blur_ratio->systematic->y() - exact.blur_ratio->value;
+  const double after = c.blur_ratio->systematic->y() - c.blur_ratio->value;
+  EXPECT_NEAR(std::sqrt(after * after - before * before), 0.02 * c.blur_ratio->value,
+              0.001 * c.blur_ratio->value);
 }
 
 TEST(Calibrate, ABlackAndAnOverexposedFrameAreRejectedByName) {
@@ -243,9 +245,9 @@ TEST(Calibrate, SwappedReadingsAreNamedAndDoNoHarm) {
   std::swap(s.sweep.frames[4].reading_mm, s.sweep.frames[12].reading_mm);
   const Calibration c = Calibrated(s);
   ExpectRight(c, s.truth);
-  EXPECT_THAT(c.warnings, Contains(HasSubstr("frame-12")));
-  // Either may also be out of the meter's range at the size that its reading promises.
-  for (const std::size_t i : {4U, 12U}) EXPECT_LT(c.frames[i].blur_fit_weight, 0.3) << i;
+  EXPECT_THAT(c.frames[4].rejection, HasSubstr("swapped with frame-12"));
+  EXPECT_THAT(c.frames[12].rejection, HasSubstr("swapped with frame-4"));
+  for (const std::size_t i : {4U, 12U}) EXPECT_FALSE(c.frames[i].in_blur_fit) << i;
 }
 
 TEST(Calibrate, AnUnknownFloorLeavesItUnwrittenAndTheTruthInsideTheInterval) {

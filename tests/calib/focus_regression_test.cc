@@ -27,14 +27,17 @@ struct Bounds {
   double ratio;  // relative
 };
 // Dead leaves, floor given as .5 +- .01 px.
-constexpr Bounds kLeaves[] = {
-    {"i", 3, 0.025}, {"ii", 0.12, 0.025}, {"iii", 0.4, 0.02}, {"iv", 2, 0.02}, {"v", 0.2, 0.09}};
+constexpr Bounds kLeaves[] = {{"i", 0.5, 0.007},
+                              {"ii", 0.045, 0.01},
+                              {"iii", 0.02, 0.002},
+                              {"iv", 0.23, 0.004},
+                              {"v", 0.035, 0.015}};
 // A knife edge, floor fitted.
-constexpr Bounds kEdge[] = {{"i", 0.7, 0.02},
-                            {"ii", 0.07, 0.015},
-                            {"iii", 0.1, 0.01},
-                            {"iv", 0.45, 0.015},
-                            {"v", 0.12, 0.03}};
+constexpr Bounds kEdge[] = {{"i", 0.4, 0.003},
+                            {"ii", 0.05, 0.006},
+                            {"iii", 0.12, 0.002},
+                            {"iv", 0.35, 0.002},
+                            {"v", 0.045, 0.02}};
 
 SimulatedSweep Sweep(const std::string& name, model::TargetKind kind, std::uint64_t seed) {
   model::SweepSimulationOptions options = SweepCase(name, kSizePx, seed);
@@ -77,9 +80,9 @@ void CheckEdge(const Bounds& bounds, std::uint64_t seed) {
   EXPECT_NEAR(c.blur_ratio->value / s.truth.blur_ratio, 1, bounds.ratio);
   ExpectCovered(*c.focus_depth_mm, s.truth.focus_depth_mm);
   ExpectCovered(*c.blur_ratio, s.truth.blur_ratio);
-  // The meter reads sharp edges up to .035 px too soft; a coarse sweep may not fix the floor.
+  // A coarse sweep may not fix the floor.
   if (c.blur_floor_px) {
-    EXPECT_NEAR(c.blur_floor_px->value, s.truth.blur_floor_px, 0.05 + 3 * c.blur_floor_px->sigma);
+    EXPECT_NEAR(c.blur_floor_px->value, s.truth.blur_floor_px, 0.003 + 3 * c.blur_floor_px->sigma);
   }
 }
 
@@ -116,21 +119,28 @@ TEST(FocusRegression, SlowAPrintedEdgeOfUnknownFloorCoversTheTruth) {
   CheckPrinted("iv");
 }
 
-// What a zero error does goes into zf too, so both are held to the same bound.
-void CheckUnknownOffset(const char* name) {
+// Found from the image scale the bench zero is good to a few tenths of a millimetre where the scale
+// changes enough (i, iii, iv), and says so where it is not. Its error goes into zf one to one.
+void CheckUnknownOffset(const char* name, double within_mm) {
   SCOPED_TRACE(name);
   SimulatedSweep s = Sweep(name, model::TargetKind::kDeadLeaves, 1);
   GiveFloor(&s);
   s.sweep.offset_mm.reset();
   const Calibration c = Measured(s);
   ASSERT_TRUE(c.bench_offset_mm && c.focus_depth_mm) << c.reason;
-  EXPECT_NEAR(c.bench_offset_mm->value, s.truth.bench_offset_mm,
-              3 * c.bench_offset_mm->sigma + 1.2);
-  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma + 1.2);
+  const double offset_error_mm = c.bench_offset_mm->value - s.truth.bench_offset_mm;
+  const double focus_error_mm = c.focus_depth_mm->value - s.truth.focus_depth_mm;
+  EXPECT_LT(std::abs(offset_error_mm), within_mm);
+  EXPECT_LT(std::abs(focus_error_mm), within_mm);
+  EXPECT_LT(std::abs(offset_error_mm), 3 * c.bench_offset_mm->sigma);
+  EXPECT_LT(std::abs(focus_error_mm), 3 * c.focus_depth_mm->sigma);
 }
-TEST(FocusRegression, AnUnknownOffsetIsFoundFromTheImageScale) { CheckUnknownOffset("iii"); }
+TEST(FocusRegression, AnUnknownOffsetIsFoundFromTheImageScale) { CheckUnknownOffset("iii", 0.6); }
 TEST(FocusRegression, SlowAnUnknownOffsetIsFoundFromTheImageScale) {
-  for (const char* name : {"i", "ii", "iv", "v"}) CheckUnknownOffset(name);
+  CheckUnknownOffset("i", 0.9);
+  CheckUnknownOffset("ii", 2.1);
+  CheckUnknownOffset("iv", 0.6);
+  CheckUnknownOffset("v", 2.7);
 }
 
 // Error of the source: the sharpest raw frame is not the plane of focus (lamp, magnification and
@@ -147,7 +157,7 @@ void CheckSourceRecipe(const char* name) {
   EXPECT_GT(source_mm, 5 * c.focus_depth_mm->sigma);
   EXPECT_LT(c.source.focus_depth_mm, s.truth.focus_depth_mm);  // pulled to the near side
   EXPECT_GT(std::abs(c.source.blur_ratio / s.truth.blur_ratio - 1), 0.3);
-  EXPECT_LT(std::abs(c.blur_ratio->value / s.truth.blur_ratio - 1), 0.03);
+  EXPECT_LT(std::abs(c.blur_ratio->value / s.truth.blur_ratio - 1), 0.004);
 }
 TEST(SourceRecipe, MissesFocusAndRatioInCaseThree) { CheckSourceRecipe("iii"); }
 TEST(SourceRecipe, SlowMissesFocusAndRatioInCaseFour) { CheckSourceRecipe("iv"); }

@@ -1,10 +1,12 @@
 #ifndef THICKLENS_TESTS_CALIB_SIMULATED_SWEEP_H_
 #define THICKLENS_TESTS_CALIB_SIMULATED_SWEEP_H_
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -54,8 +56,10 @@ struct SimulatedSweep {
   cv::Mat& frame(int index) { return (*stored)[static_cast<std::size_t>(index)]; }
 };
 
-inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options) {
-  const model::SweepSimulator simulator(options, {});
+// `target_picture` is for a target of that kind alone.
+inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
+                               const model::LinearPicture& target_picture = {}) {
+  const model::SweepSimulator simulator(options, target_picture);
   SimulatedSweep result;
   result.truth = simulator.truth();
   result.stored = std::make_shared<std::vector<cv::Mat>>();
@@ -77,6 +81,21 @@ inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options) {
 // The same, told what a person can know who has measured the lens floor on a knife edge before.
 inline void GiveFloor(SimulatedSweep* simulated) {
   simulated->sweep.floor.given_px = model::Estimate{simulated->truth.blur_floor_px, 0.01};
+}
+
+// The same, as a measurement really is: the variance drawn about the truth with the error that is
+// stated, d(floor) = d(variance)/(2 floor).
+inline void GiveDrawnFloor(SimulatedSweep* simulated, std::uint64_t seed) {
+  constexpr double kVarianceSigmaPx2 = 0.01;
+  constexpr double kTwoPi = 6.283185307179586;
+  std::mt19937_64 engine(seed);
+  // Box and Muller's, because std::normal_distribution differs between standard libraries.
+  const auto uniform = [&engine] { return (static_cast<double>(engine() >> 11) + 0.5) * 0x1p-53; };
+  const double radius = std::sqrt(-2 * std::log(uniform()));
+  const double normal = radius * std::cos(kTwoPi * uniform());
+  const double truth_px = simulated->truth.blur_floor_px;
+  const double floor_px = std::sqrt(truth_px * truth_px + kVarianceSigmaPx2 * normal);
+  simulated->sweep.floor.given_px = model::Estimate{floor_px, kVarianceSigmaPx2 / (2 * floor_px)};
 }
 
 }  // namespace thicklens::testing

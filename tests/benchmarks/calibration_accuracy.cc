@@ -1,0 +1,187 @@
+// How accurate a calibration is, and whether its error bars are: seeded simulated sweeps of the
+// cases in configs/sweeps, each of several targets, calibrated and compared with the truth.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "benchmarks/accuracy/fault_study.h"
+#include "benchmarks/accuracy/tables.h"
+#include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::accuracy {
+namespace {
+
+const std::vector<std::string> kCases = {"i", "ii", "iii", "iv", "v"};
+const std::vector<model::TargetKind> kTargets = {
+    model::TargetKind::kWhiteNoise,   model::TargetKind::kPinkNoise,
+    model::TargetKind::kCheckerboard, model::TargetKind::kSiemensStar,
+    model::TargetKind::kDeadLeaves,   model::TargetKind::kPicture,
+    model::TargetKind::kKnifeEdge};
+
+struct Arguments {
+  std::vector<std::string> cases = kCases;
+  std::vector<std::string> targets;
+  std::vector<std::string> floors = {"exact", "drawn"};
+  int sweeps = 20;
+  int threads = 0;
+  TrialSettings settings;
+  std::string psf = "gaussian";
+  std::string picture_path;
+  std::string json_path;
+  bool faults = false;
+};
+
+std::vector<std::string> TargetNames() {
+  std::vector<std::string> names;
+  for (const model::TargetKind kind : kTargets) names.push_back(model::TargetKindName(kind));
+  return names;
+}
+
+// As a screen would show it; sRGB light becomes linear.
+model::LinearPicture ReadPicture(const std::string& path) {
+  const cv::Mat stored = cv::imread(path, cv::IMREAD_GRAYSCALE);
+  if (stored.empty())
+    throw Error(path +
+                ": cannot be read as a picture; a PNG, JPEG or TIFF file is "
+                "expected");
+  model::LinearPicture picture{stored.cols, stored.rows, 1, {}};
+  for (int y = 0; y < stored.rows; ++y) {
+    for (int x = 0; x < stored.cols; ++x) {
+      picture.values.push_back(static_cast<float>(
+          model::TransferCurve::Srgb().Decode(stored.at<std::uint8_t>(y, x) / 255.0)));
+    }
+  }
+  return picture;
+}
+
+void AddOptions(CLI::App* app, Arguments* arguments) {
+  const auto positive = CLI::PositiveNumber;
+  app->add_option("--case", arguments->cases, "cases of configs/sweeps: i ii iii iv v (all)")
+      ->check(CLI::IsMember(kCases));
+  app->add_option(
+         "--target", arguments->targets,
+         "targets (all; `picture` with --picture alone): " + CLI::detail::join(TargetNames()))
+      ->check(CLI::IsMember(TargetNames()));
+  app->add_option(
+         "--floor", arguments->floors,
+         "lens floor of textures: exact, drawn about the truth (both); an edge measures it")
+      ->check(CLI::IsMember({"exact", "drawn"}));
+  app->add_option("--sweeps", arguments->sweeps, "sweeps of each case and target (20)")
+      ->check(CLI::Range(1, 20000));
+  app->add_option("--size", arguments->settings.size_px, "side of the field in px (192)")
+      ->check(CLI::Range(64, 4096));
+  app->add_option("--psf", arguments->psf, "gaussian (default) or disc")
+      ->check(CLI::IsMember({"gaussian", "disc"}));
+  app->add_option("--picture", arguments->picture_path, "photograph for the target `picture`")
+      ->check(CLI::ExistingFile);
+  app->add_option("--seed", arguments->settings.first_seed, "of the first sweep (1)")
+      ->check(positive);
+  app->add_option("--threads", arguments->threads, "sweeps at the same time (one per core)")
+      ->check(CLI::NonNegativeNumber);
+  app->add_option("--calibration-threads", arguments->settings.calibration_threads,
+                  "of each calibration (1)")
+      ->check(CLI::NonNegativeNumber);
+  app->add_flag("--map-field", arguments->settings.map_field, "fit tiles and channels, too");
+  app->add_flag("--faults", arguments->faults,
+                "instead: one sweep of each case, damaged in one way after the other");
+  app->add_option("--json", arguments->json_path, "write the tables to a file");
+}
+
+std::vector<model::TargetKind> Targets(const Arguments& arguments) {
+  std::vector<model::TargetKind> targets;
+  for (const model::TargetKind kind : kTargets) {
+    const std::string name = model::TargetKindName(kind);
+    const bool named = std::count(arguments.targets.begin(), arguments.targets.end(), name) > 0;
+    const bool is_picture = kind == model::TargetKind::kPicture;
+    if (named && is_picture && arguments.picture_path.empty())
+      throw Error("--target picture: the photograph is missing; give it with --picture FILE");
+    if (named || (arguments.targets.empty() && !(is_picture && arguments.picture_path.empty())))
+      targets.push_back(kind);
+  }
+  return targets;
+}
+
+std::vector<TrialKey> Keys(const Run& run, int sweeps) {
+  std::vector<TrialKey> keys;
+  for (const std::string& name : run.cases) {
+    const auto number = std::find(kCases.begin(), kCases.end(), name) - kCases.begin();
+    for (const model::TargetKind target : run.targets) {
+      for (int i = 0; i < sweeps; ++i) {
+        keys.push_back({name, static_cast<int>(number), target, i});
+      }
+    }
+  }
+  return keys;
+}
+
+void RunAll(const Arguments& arguments, Run* run) {
+  const std::vector<TrialKey> keys = Keys(*run, arguments.sweeps);
+  std::vector<std::vector<Trial>> results(keys.size());
+  std::atomic<std::size_t> done{0};
+  const auto begin = std::chrono::steady_clock::now();
+  model::ParallelFor(static_cast<int>(keys.size()), arguments.threads, [&](int i) {
+    const TrialKey& key = keys[static_cast<std::size_t>(i)];
+    const bool is_edge = key.target == model::TargetKind::kKnifeEdge;
+    results[static_cast<std::size_t>(i)] =
+        RunTrials(key, run->settings, is_edge ? std::vector<Floor>{Floor::kMeasured} : run->floors);
+    if (const std::size_t count = ++done; count % 20 == 0 || count == keys.size())
+      std::cerr << fmt::format("{} of {} sweeps\n", count, keys.size());
+  });
+  for (const auto& result : results) {
+    run->trials.insert(run->trials.end(), result.begin(), result.end());
+  }
+  std::cout << fmt::format(
+      "{} sweeps of {} px, {} psf, in {:.0f} s\n", keys.size(), run->settings.size_px,
+      arguments.psf,
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+}
+
+void RunStudy(Arguments arguments) {
+  if (arguments.psf == "disc") arguments.settings.psf = model::Psf::kDisc;
+  if (!arguments.picture_path.empty())
+    arguments.settings.picture = ReadPicture(arguments.picture_path);
+  nlohmann::ordered_json json;
+  if (arguments.faults) {
+    json["faults"] = RunFaultStudy(arguments.cases, arguments.settings, arguments.threads);
+  } else {
+    Run run;
+    run.settings = arguments.settings;
+    run.cases = arguments.cases;
+    run.targets = Targets(arguments);
+    for (const std::string& floor : arguments.floors)
+      run.floors.push_back(floor == "exact" ? Floor::kExact : Floor::kDrawn);
+    RunAll(arguments, &run);
+    json = PrintTables(run);
+  }
+  if (arguments.json_path.empty()) return;
+  std::ofstream file(arguments.json_path);
+  file << json.dump(2) << "\n";
+  if (!file.flush()) throw Error(arguments.json_path + ": cannot be written");
+}
+
+}  // namespace
+}  // namespace thicklens::accuracy
+
+int main(int argc, char** argv) {
+  thicklens::accuracy::Arguments arguments;
+  CLI::App app("Accuracy of the calibration on simulated sweeps");
+  thicklens::accuracy::AddOptions(&app, &arguments);
+  CLI11_PARSE(app, argc, argv);
+  cv::setNumThreads(1);  // the sweeps run side by side
+  try {
+    thicklens::accuracy::RunStudy(arguments);
+  } catch (const std::exception& e) {
+    std::cerr << "thicklens_calibration_accuracy: error: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}
