@@ -58,6 +58,7 @@ void AddReportCommand(CLI::App* program, CommandAction* action);
 void AddExplainCommand(CLI::App* program, CommandAction* action);
 void AddDoctorCommand(CLI::App* program, CommandAction* action);
 void AddCameraCommand(CLI::App* program, CommandAction* action);
+void AddTargetCommand(CLI::App* program, CommandAction* action);
 
 }  // namespace thicklens::tools
 

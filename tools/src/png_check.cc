@@ -46,6 +46,13 @@ std::uint32_t Crc(const std::string& bytes, std::size_t begin, std::size_t end) 
   return ~crc;
 }
 
+std::string BigEndianBytes(std::uint32_t value) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8)
+    bytes += static_cast<char>(static_cast<std::uint8_t>(value >> shift & 0xFFU));
+  return bytes;
+}
+
 }  // namespace
 
 void RequireWholePng(const std::string& bytes, const std::string& name) {
@@ -73,6 +80,20 @@ void RequireWholePng(const std::string& bytes, const std::string& name) {
 int PngBits(const std::string& bytes) {
   if (!IsPng(bytes) || bytes.size() <= kBitsAt) return 0;
   return static_cast<std::uint8_t>(bytes[kBitsAt]);
+}
+
+std::string WithPngResolution(const std::string& png, int pixels_per_metre) {
+  const std::string resolution = BigEndianBytes(static_cast<std::uint32_t>(pixels_per_metre));
+  const std::string unit_metre(1, '\1');
+  const std::string content = resolution + resolution + unit_metre;  // across, down
+  const std::string checked = "pHYs" + content;
+  const std::string chunk = BigEndianBytes(static_cast<std::uint32_t>(content.size())) + checked +
+                            BigEndianBytes(Crc(checked, 0, checked.size()));
+  // It has to stand before the first IDAT; right behind IHDR is always possible.
+  const std::size_t header_bytes =
+      kLengthBytes + kTypeBytes + BigEndian(png, kSignatureBytes) + kCrcBytes;
+  std::string with = png;
+  return with.insert(kSignatureBytes + header_bytes, chunk);
 }
 
 }  // namespace thicklens::tools

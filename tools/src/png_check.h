@@ -13,6 +13,10 @@ void RequireWholePng(const std::string& bytes, const std::string& name);
 // Bits a value of a PNG file; 0 for other files.
 int PngBits(const std::string& bytes);
 
+// A PNG file, which must be whole and have no resolution yet, with its resolution: the chunk pHYs,
+// by which programs print it at its true size.
+std::string WithPngResolution(const std::string& png, int pixels_per_metre);
+
 }  // namespace thicklens::tools
 
 #endif  // THICKLENS_TOOLS_PNG_CHECK_H_

@@ -80,6 +80,7 @@ int Main(int argc, char** argv) {
   tools::AddExplainCommand(&program, &action);
   tools::AddDoctorCommand(&program, &action);
   tools::AddCameraCommand(&program, &action);
+  tools::AddTargetCommand(&program, &action);
   return ParseAndRun(&program, &action, argc, argv);
 }
 

@@ -1,0 +1,27 @@
+#ifndef THICKLENS_TOOLS_TARGET_TEXTURE_H_
+#define THICKLENS_TOOLS_TARGET_TEXTURE_H_
+
+#include <vector>
+
+#include "target_page.h"
+
+namespace thicklens::tools {
+
+struct Leaf {
+  double x_mm = 0, y_mm = 0;  // on the sheet
+  double radius_mm = 0;
+  int grey = 0;  // 0 to 255, as stored
+};
+
+// The texture of a target: dead leaves, discs that hide each other, from the hindmost to the
+// foremost. Radii are distributed as r^-3, so that every octave of sizes takes the same part of the
+// area: whatever the blur, some of it is left to be seen, and nothing repeats. Leaves that others
+// hide are left out. The same page gives the same leaves on every machine.
+std::vector<Leaf> DeadLeaves(const TargetPage& page);
+
+// What shows where no leaf lies, below a thousandth of the area.
+int GreyBehindLeaves(const TargetPage& page);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_TARGET_TEXTURE_H_
