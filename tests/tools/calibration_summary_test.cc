@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -12,7 +13,6 @@
 namespace thicklens::tools {
 namespace {
 
-using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -116,99 +116,43 @@ TEST(CalibrationText, TellsWhyFramesWereRejected) {
   EXPECT_THAT(text, HasSubstr("partial: floor unknown (2.7 s)\n"));
 }
 
+TEST(CalibrationText, TellsTheDetailsInFewLines) {
+  MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
+  const std::string text = CalibrationText(made.sweep, made.calibration, &made.truth);
+  EXPECT_THAT(LineWith(text, "source's recipe: "),
+              HasSubstr("over mean grey frame_020.png, at 399.9"));
+  EXPECT_THAT(LineWith(text, "magnification: "),
+              HasSubstr("5 mm is 26.481 px in the picture: d1 = 16.100 +- 0.050 mm, -0.70 %"));
+  EXPECT_THAT(text, HasSubstr("radial distortion +0.420 +- 0.060 % of the image height"));
+  EXPECT_THAT(LineWith(text, "sides of focus: "),
+              HasSubstr("near side zf 398.60 +- 0.90 mm; far side zf 401.10 +- 0.90 mm; "
+                        "apart +2.5 +- 1.3 mm"));
+  EXPECT_THAT(text, HasSubstr("field: tilt about the vertical axis +1.210 +- 0.090 deg"));
+  EXPECT_THAT(text, HasSubstr("colours: red 400.61 +- 0.12 mm, green 400.02"));
+  EXPECT_THAT(LineWith(text, "blur shape: "), HasSubstr("(chi2/dof 1.04 against 2.31)"));
+  EXPECT_THAT(LineWith(text, "systematic: lens floor"),
+              HasSubstr("zf -2.9 .. +3.6 mm, d1 -0.0015 .. +0.0012 mm, kappa -0.0070 .. +0.0080"));
+  EXPECT_THAT(text, HasSubstr("advice: photograph a knife edge"));
+  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 35);
+  made.calibration.blur.outside_mm = 2.5;
+  EXPECT_THAT(CalibrationText(made.sweep, made.calibration, nullptr),
+              HasSubstr("2.5 mm outside the sweep and is extrapolated"));
+}
+
+TEST(CalibrationText, WithoutDetailsSaysNothingOfThem) {
+  MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
+  RemoveDetails(&made.calibration);
+  const std::string text = CalibrationText(made.sweep, made.calibration, nullptr);
+  for (const char* about : {"field:", "colours:", "sides", "shape", "advice",
+                            "systematic:", "magnification", "distortion", "worst", "not run"})
+    EXPECT_THAT(text, Not(HasSubstr(about)));
+}
+
 TEST(CalibrationText, KeepsControlCharactersOffTheTerminal) {
   MadeUpCalibration made = MakeUpCalibration(7, 340, 20);
   made.calibration.frames[2].image = "evil\x1b[2J.png";
   RejectFrame(2, "dark", &made.calibration);
   EXPECT_THAT(CalibrationText(made.sweep, made.calibration, nullptr), Not(HasSubstr("\x1b")));
-}
-
-TEST(CalibrationJson, HasTheKeysOfTheFormat) {
-  MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
-  RejectFrame(3, "dark", &made.calibration);
-  const json out = CalibrationJson(made.sweep, made.calibration, &made.truth, false);
-  EXPECT_EQ(out.at("status"), "ok");
-  EXPECT_EQ(out.at("reason"), "");
-  EXPECT_EQ(out.at("method"), "fit");
-  for (const char* key :
-       {"image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"}) {
-    EXPECT_TRUE(out.at(key).at("value").is_number()) << key;
-    EXPECT_TRUE(out.at(key).at("sigma").is_number()) << key;
-    EXPECT_TRUE(out.at(key).contains("systematic")) << key;
-  }
-  EXPECT_EQ(out["focus_depth_mm"]["systematic"], json::array({400 - 3.1, 400 + 3.9}));
-  EXPECT_TRUE(out["blur_floor_px"]["systematic"].is_null());
-  EXPECT_EQ(out.at("frames_used"), 40);
-  EXPECT_EQ(out.at("frames_rejected"),
-            json::array({{{"image", "/sweeps/bench/frame_003.png"}, {"reason", "dark"}}}));
-  EXPECT_EQ(out.at("chi2_per_dof"), 1.04);
-  EXPECT_EQ(out.at("other_methods").at("source").at("focus_depth_mm").at("value"), 393.5);
-  EXPECT_TRUE(out["other_methods"]["source"]["focus_depth_mm"]["sigma"].is_null());
-  EXPECT_EQ(out["other_methods"].at("sharpness_peak").at("focus_depth_mm").at("sigma"), 1.3);
-  EXPECT_EQ(out.at("seconds"), 2.7);
-  EXPECT_EQ(out.at("warnings"), json::array());
-  EXPECT_EQ(out.at("covariance").at("order").size(), 4u);
-  EXPECT_NEAR(out["covariance"].at("rows")[0][3].get<double>(), -0.71 * 0.0012 * 0.11, 1e-12);
-  EXPECT_EQ(out.at("scale_law").at("frames_used"), 41);
-  EXPECT_EQ(out.at("frames").size(), 41u);
-  EXPECT_TRUE(out["frames"][3]["blur_sigma_px"].is_null());
-  EXPECT_EQ(out["frames"][3]["rejection"], "dark");
-  EXPECT_TRUE(out["frames"][4]["blur_sigma_px"].is_number());
-  const json& errors = out.at("truth").at("errors");
-  EXPECT_NEAR(errors.at("fit").at("focus_depth_mm").get<double>(), -0.28, 1e-9);
-  EXPECT_NEAR(errors.at("source").at("focus_depth_mm").get<double>(), -6.5, 1e-9);
-  EXPECT_NEAR(errors.at("sharpness_peak").at("focus_depth_mm").get<double>(), 0.9, 1e-9);
-}
-
-TEST(CalibrationJson, RefusalIsWrittenToo) {
-  MadeUpCalibration made = MakeUpCalibration(31, 700, 10);
-  RefuseAll("sharpness is monotone", &made.calibration);
-  const json out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
-  EXPECT_EQ(out.at("status"), "refused");
-  EXPECT_EQ(out.at("reason"), "sharpness is monotone");
-  for (const char* key : {"image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                          "bench_offset_mm", "chi2_per_dof", "covariance"})
-    EXPECT_TRUE(out.at(key).is_null()) << key;
-  EXPECT_FALSE(out.at("other_methods").at("source").at("done").get<bool>());
-  EXPECT_FALSE(out.contains("truth"));
-}
-
-TEST(CalibrationJson, SourcesRecipeInPlaceOfTheFit) {
-  const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
-  const json out = CalibrationJson(made.sweep, made.calibration, nullptr, true);
-  EXPECT_EQ(out.at("method"), "source");
-  EXPECT_EQ(out.at("focus_depth_mm").at("value"), 393.5);
-  EXPECT_TRUE(out.at("blur_floor_px").is_null());
-  EXPECT_NEAR(out.at("other_methods").at("fit").at("focus_depth_mm").at("value").get<double>(),
-              399.72, 1e-9);
-}
-
-// JSON has no NaN, and a dump throws on broken UTF-8: neither may reach it from any field.
-TEST(CalibrationJson, SurvivesNanAndBrokenFileNames) {
-  MadeUpCalibration made = MakeUpCalibration(7, 340, 20);
-  calib::Calibration& c = made.calibration;
-  c.image_distance_mm->value = kNan;
-  c.focus_depth_mm->sigma = kNan;
-  c.blur_ratio->systematic = Eigen::Vector2d(kNan, 1);
-  c.covariance(1, 1) = std::numeric_limits<double>::infinity();
-  c.blur.chi2_per_dof = kNan;
-  c.seconds = kNan;
-  c.scale.reading_rms_mm = kNan;
-  c.frames[0].image = "caf\xE9.png";
-  c.frames[0].blur_sigma_px = kNan;
-  c.frames[1].image_scale = kNan;
-  c.frames[1].statistics.contrast = kNan;
-  c.frames[2].rejection = "bad \xFF";
-  c.warnings = {"\x80"};
-  const json out = CalibrationJson(made.sweep, c, &made.truth, false);
-  const json back = json::parse(out.dump());
-  EXPECT_EQ(back, out) << "a NaN compares unequal to itself or came back as null";
-  EXPECT_TRUE(out["image_distance_mm"]["value"].is_null());
-  EXPECT_TRUE(out["focus_depth_mm"]["sigma"].is_null());
-  EXPECT_TRUE(out["blur_ratio"]["systematic"].is_null());
-  EXPECT_TRUE(out["frames"][0]["blur_sigma_px"].is_null());
-  EXPECT_EQ(out["frames"][0]["image"], "caf\uFFFD.png");
-  EXPECT_TRUE(out["truth"]["errors"]["fit"]["image_distance_mm"].is_null());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
 #include <set>
 #include <string>
 
@@ -23,8 +24,10 @@ std::string Report() {
   MadeUpCalibration made = MakeUpCalibration(31, 330, 5);
   RejectFrame(3, "dark: <0.01 & so on", &made.calibration);
   made.sweep.camera.name = "Ünïcode & <b>";
-  return CalibrationReportHtml(made.sweep, made.calibration, &made.truth,
-                               {"sweep.yaml", "0.1.0", "2026-01-31", {}});
+  return MakeCalibrationReport(made.sweep, made.calibration, &made.truth,
+                               {"sweep.yaml", "0.1.0", "2026-01-31", {}},
+                               [](std::size_t) { return cv::Mat(300, 400, CV_8U, cv::Scalar(9)); })
+      .html;
 }
 
 std::string Inlined(const std::string& main) {
@@ -37,7 +40,8 @@ TEST(InlinedReport, KeepsAllOfTheReport) {
   const XmlDocument after =
       ParseXml("<main>" + InlinedCalibrationReport(report, "r.html") + "</main>");
   ASSERT_EQ(after.error, "");
-  for (const char* element : {"svg", "table", "td", "path", "figcaption", "details", "li"}) {
+  for (const char* element :
+       {"svg", "table", "td", "path", "figcaption", "details", "li", "img", "rect"}) {
     EXPECT_EQ(after.Named(element).size(), before.Named(element).size()) << element;
   }
   std::string text_before, text_after;
@@ -78,7 +82,7 @@ TEST(InlinedReport, IdsGetAPrefixAndAreStillFound) {
       EXPECT_EQ(ids.count(id), 1u) << reference;
     }
   }
-  EXPECT_EQ(references, 10);  // five plots, each with a title and a clip
+  EXPECT_EQ(references, 19);  // ten drawings with a title, all but the field with a clip
 }
 
 TEST(InlinedReport, RefusesWhatIsNoReport) {
@@ -89,11 +93,26 @@ TEST(InlinedReport, RefusesWhatIsNoReport) {
 }
 
 TEST(InlinedReport, LetsNothingInThatRunsOrLoads) {
-  for (const char* markup :
-       {"<script>alert(1)</script>", "<p onclick=\"x()\">a</p>", "<img src=\"x\"/>",
-        "<p style=\"background: url(http://x)\">a</p>", "<a href=\"http://x\">a</a>",
-        "<g clip-path=\"url(http://x)\"></g>", "<g clip-path=\" url(http://x)\"></g>", "<!-- x -->",
-        "<![CDATA[x]]>", "<?php x ?>", "<iframe/>", "<P>a</P>"}) {
+  for (const char* markup : {"<script>alert(1)</script>",
+                             "<p onclick=\"x()\">a</p>",
+                             "<img src=\"x\"/>",
+                             "<img src=\"http://x/y.png\"/>",
+                             "<img src=\"data:image/svg+xml;base64,PHN2Zy8+\"/>",
+                             "<img src=\"data:text/html;base64,eA==\"/>",
+                             "<img src=\"data:image/png;base64,\"/>",
+                             "<img src=\"data:image/png;base64,a b\"/>",
+                             "<rect fill=\"url(http://x)\"/>",
+                             "<p style=\"max-width: 3px; color: red\">a</p>",
+                             "<p style=\"max-width: px\">a</p>",
+                             "<p style=\"background: url(http://x)\">a</p>",
+                             "<a href=\"http://x\">a</a>",
+                             "<g clip-path=\"url(http://x)\"></g>",
+                             "<g clip-path=\" url(http://x)\"></g>",
+                             "<!-- x -->",
+                             "<![CDATA[x]]>",
+                             "<?php x ?>",
+                             "<iframe/>",
+                             "<P>a</P>"}) {
     EXPECT_THAT(ErrorOf([&] { Inlined(markup); }), StartsWith("r.html: ")) << markup;
   }
 }
@@ -105,6 +124,9 @@ TEST(InlinedReport, RefusesBrokenMarkup) {
         "<p class=\"<\">a</p>", "a & b", "&nbsp;", "&#0;", "\xff", "\x01", "< p>a</p>"}) {
     EXPECT_THAT(ErrorOf([&] { Inlined(markup); }), StartsWith("r.html: ")) << markup;
   }
+  const std::string picture =
+      "<img src=\"data:image/png;base64,iVBORw0K+/==\" alt=\"a\" style=\"max-width: 80px\"/>";
+  EXPECT_EQ(Inlined(picture), picture);
   EXPECT_EQ(Inlined("<p class=\"x\">a &amp; b</p><rect/>"), "<p class=\"x\">a &amp; b</p><rect/>");
 }
 

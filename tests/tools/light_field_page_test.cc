@@ -147,7 +147,8 @@ class LightFieldPageTest : public ::testing::Test {
     }
     const MadeUpCalibration made = MakeUpCalibration(31, 330, 5);
     input_.calibration = InlinedCalibrationReport(
-        CalibrationReportHtml(made.sweep, made.calibration, nullptr, {"s", "0.1.0", "now", {}}),
+        MakeCalibrationReport(made.sweep, made.calibration, nullptr, {"s", "0.1.0", "now", {}})
+            .html,
         "r");
     input_.estimate = Estimate();
     input_.comparison = Comparison(31.25, 30.75);

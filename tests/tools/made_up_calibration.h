@@ -7,12 +7,125 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::tools {
+
+namespace made_up {
+
+inline constexpr double kFocusMm = 400, kKappa = 0.45, kFloorPx = 0.5, kOffsetMm = 12.34;
+using Normal = std::normal_distribution<double>;
+
+// One side's fit, off by so much of what is usual.
+inline calib::SideFit Side(double off_mm, int frames) {
+  calib::SideFit side;
+  side.done = true;
+  side.message = "done";
+  side.focus_depth_mm = {kFocusMm + off_mm, 0.9};
+  side.blur_ratio = {kKappa - 0.01 * off_mm, 0.006};
+  side.frames_used = frames;
+  return side;
+}
+
+// Five by four tiles of a target that is tilted about the vertical axis, in a curved field; the
+// last one could not be fitted.
+inline calib::FieldMap Field(std::mt19937* generator) {
+  Normal normal;
+  calib::FieldMap field;
+  field.done = true;
+  field.message = "done";
+  field.columns = 5;
+  field.rows = 4;
+  for (int row = 0; row < field.rows; ++row) {
+    for (int column = 0; column < field.columns; ++column) {
+      calib::FieldTile tile;
+      tile.centre_px = {64 + 128.0 * column, 60 + 120.0 * row};
+      const double x = (column - 2) / 2.0, y = (row - 1.5) / 1.5;
+      tile.done = row < 3 || column < 4;
+      tile.message = tile.done ? "done" : "no texture above noise";
+      if (tile.done)
+        tile.focus_depth_mm = {
+            kFocusMm - 1.6 * x - 0.9 * (x * x + y * y) + 0.15 * normal(*generator), 0.15};
+      field.tiles.push_back(tile);
+    }
+  }
+  field.tilt_right_deg = model::Estimate{1.21, 0.09};
+  field.tilt_down_deg = model::Estimate{-0.05, 0.08};
+  field.curvature_mm = model::Estimate{-1.83, 0.21};
+  field.astigmatism_mm = model::Estimate{0.42, 0.11};
+  field.clusters = {{{kFocusMm - 0.28, 0.04}, 19}};
+  return field;
+}
+
+// The transfer of a frame relative to the sharpest: a Gaussian's with noise, and the disc of the
+// same second moment (radius 2 sigma).
+inline calib::BlurExample Example(int frame, double added_sigma_px, std::mt19937* generator) {
+  constexpr double kPi = 3.14159265358979323846;
+  Normal normal;
+  calib::BlurExample example;
+  example.frame = frame;
+  for (int i = 0; i < 40; ++i) {
+    const double f = 0.008 * (i + 1), w = 2 * kPi * f * added_sigma_px;
+    const double gaussian = std::exp(-w * w / 2);
+    if (gaussian < 0.1) break;
+    example.x.push_back(f);
+    example.gaussian.push_back(gaussian);
+    example.disc.push_back(w > 0 ? std::cyl_bessel_j(1.0, 2 * w) / w : 1);
+    example.measured.push_back(gaussian + 0.015 * normal(*generator));
+  }
+  return example;
+}
+
+// All that a calibration may say beyond its results.
+inline void AddDetails(calib::Calibration* calibration) {
+  calib::Calibration& c = *calibration;
+  std::mt19937 generator(8);
+  const int count = static_cast<int>(c.frames.size());
+  c.source.sharpest_normalised_frame = count / 2;
+  c.source.normalised_focus_depth_mm = c.frames[static_cast<std::size_t>(count / 2)].depth_mm;
+  c.scale.kind = calib::ScaleKind::kInverseDepth;
+  c.scale.distortion_at_corner = model::Estimate{0.0042, 0.0006};
+  c.blur.weak_direction = "blur_floor_px against focus_depth_mm";
+  c.blur.meter = "relative spectrum";
+  c.blur.gaussian_misfit = 1.04;
+  c.blur.disc_misfit = 2.31;
+  c.nearer = Side(-1.4, count / 2);
+  c.farther = Side(1.1, count - count / 2);
+  c.field = Field(&generator);
+  for (const auto& [name, off_mm] :
+       {std::pair("red", 0.61), std::pair("green", 0.02), std::pair("blue", 1.44)}) {
+    calib::ChannelFocus channel;
+    channel.name = name;
+    channel.done = true;
+    channel.message = "done";
+    channel.focus_depth_mm = {kFocusMm + off_mm, 0.12};
+    c.channels.push_back(channel);
+  }
+  c.magnification = calib::MagnificationCheck{26.4812, 5, {16.1, 0.05}};
+  c.systematic_parts = {
+      {"lens floor", {-2.9, 3.6}, {-0.0015, 0.0012}, {-0.007, 0.008}, "photograph a knife edge"},
+      {"lens.front_focal_length_mm",
+       {0, 0},
+       {-0.1, 0.1},
+       {-0.002, 0.002},
+       "have the lens measured"},
+      {"side of focus",
+       {-1.1, 1.4},
+       {-0.0005, 0.0005},
+       {-0.004, 0.005},
+       "more frames on both sides"}};
+  c.advice =
+      "photograph a knife edge: the floor is 80 % of your error, +-3.6 mm would become +-1.5";
+  for (const int i : {0, count / 2, count - 1})
+    c.examples.push_back(
+        Example(i, c.frames[static_cast<std::size_t>(i)].blur_sigma_px, &generator));
+}
+
+}  // namespace made_up
 
 // A sweep and what a calibration of it could look like, filled by the laws and seeded noise:
 // nothing is measured here. Depths are offset + reading, the truth that of the camera below.
@@ -23,7 +136,7 @@ struct MadeUpCalibration {
 };
 
 inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_mm, double step_mm) {
-  constexpr double kFocusMm = 400, kKappa = 0.45, kFloorPx = 0.5, kOffsetMm = 12.34;
+  using made_up::kFloorPx, made_up::kFocusMm, made_up::kKappa, made_up::kOffsetMm;
   MadeUpCalibration made;
   model::Camera& camera = made.sweep.camera;
   camera.name = "bench-camera";
@@ -62,6 +175,9 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
     frame.in_blur_fit = true;
     frame.blur_fit_weight = 1;
     frame.in_scale_fit = true;
+    frame.image_scale_sigma = 1e-4;
+    frame.reading_error_sigma_mm = 0.03;
+    frame.reading_error_mm = frame.reading_mm + kOffsetMm - z_mm + 0.03 * normal(generator);
     made.sweep.frames.push_back({frame.image, frame.reading_mm});
     made.truth.frames.push_back({frame.image, z_mm, frame.reading_mm, sigma_px});
     c.frames.push_back(frame);
@@ -119,7 +235,30 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
   c.blur.frames_used = frame_count;
   c.frames_used = frame_count;
   c.seconds = 2.7;
+  made_up::AddDetails(&c);
   return made;
+}
+
+// What remains where no more was found than the results: no sides, field, colours, examples, parts.
+inline void RemoveDetails(calib::Calibration* calibration) {
+  calib::Calibration& c = *calibration;
+  c.source.sharpest_normalised_frame = -1;
+  c.source.normalised_focus_depth_mm = 0;
+  c.scale.kind = calib::ScaleKind::kUnknown;
+  c.scale.distortion_at_corner.reset();
+  c.blur.weak_direction.clear();
+  c.blur.meter.clear();
+  c.blur.gaussian_misfit.reset();
+  c.blur.disc_misfit.reset();
+  c.nearer = c.farther = {};
+  c.field = {};
+  c.channels.clear();
+  c.magnification.reset();
+  c.systematic_parts.clear();
+  c.advice.clear();
+  c.examples.clear();
+  for (calib::FrameMeasurement& frame : c.frames)
+    frame.image_scale_sigma = frame.reading_error_mm = frame.reading_error_sigma_mm = 0;
 }
 
 // What the gates leave of a frame: its statistics and the reason.

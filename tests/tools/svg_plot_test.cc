@@ -235,5 +235,75 @@ TEST(SvgPlot, LegendEntriesDoNotTouch) {
   }
 }
 
+// A band stands between its curves and is broken where one of them is not known.
+TEST(SvgPlot, DrawsABandAsAClosedArea) {
+  Plot plot = PlotOf({0, 10}, {0, 10});
+  plot.x_axis.range = plot.y_axis.range = {{0, 10}};
+  PlotBand band;
+  band.label = "between";
+  band.x = {0, 5, 6, 8, 10};
+  band.lo = {2, 2, kNan, 4, 4};
+  band.hi = {3, 3, 5, 6, 6};
+  plot.bands.push_back(band);
+  const XmlDocument document = ParseXml(SvgPlot(plot));
+  ASSERT_EQ(document.error, "");
+  std::string d;
+  for (const XmlElement& path : document.Named("path"))
+    if (path.Attribute("class") == "band") d += path.Attribute("d");
+  EXPECT_EQ(std::count(d.begin(), d.end(), 'M'), 2);
+  EXPECT_EQ(std::count(d.begin(), d.end(), 'Z'), 2);
+  EXPECT_EQ(std::count(d.begin(), d.end(), 'L'), 6);  // two areas of four corners
+  const std::vector<XmlElement> keys = document.Named("rect");
+  EXPECT_TRUE(std::any_of(keys.begin(), keys.end(), [](const XmlElement& rect) {
+    return rect.Attribute("class") == "band";
+  }));
+}
+
+TEST(SvgPlot, ABandDoesNotWidenThePlot) {
+  Plot plot = PlotOf({0, 10}, {0, 10});
+  const auto labels = [&] {
+    std::string text;
+    for (const XmlElement& element : ParseXml(SvgPlot(plot)).Named("text"))
+      text += element.text + "|";
+    return text;
+  };
+  const std::string before = labels();
+  PlotBand band;
+  band.x = {0, 10};
+  band.lo = {-1000, -1000};
+  band.hi = {1000, 1000};
+  plot.bands.push_back(band);
+  EXPECT_EQ(labels(), before);
+}
+
+TEST(SvgPlot, AHeadingStandsAboveTheLegend) {
+  Plot plot = PlotOf({0, 10}, {0, 10});
+  plot.heading = "what & which";
+  const XmlDocument document = ParseXml(SvgPlot(plot));
+  double heading_y = 0, legend_y = 0;
+  for (const XmlElement& text : document.Named("text")) {
+    if (text.Attribute("class") == "heading") {
+      EXPECT_EQ(text.text, "what & which");
+      heading_y = text.Number("y");
+    }
+    if (text.text == "points") legend_y = text.Number("y");
+  }
+  EXPECT_GT(heading_y, 0);
+  EXPECT_GT(legend_y, heading_y + 12);
+}
+
+TEST(SvgFile, StandsAloneWithoutVariables) {
+  const std::string element = SvgPlot(PlotOf({0, 1}, {0, 1}));
+  const std::string file = SvgFile(element);
+  const XmlDocument document = ParseXml(file);
+  ASSERT_EQ(document.error, "");
+  EXPECT_EQ(document.elements[0].Attribute("xmlns"), "http://www.w3.org/2000/svg");
+  EXPECT_EQ(document.elements[0].Attribute("viewBox"), "0 0 860 320");
+  EXPECT_EQ(file.find("var("), std::string::npos);
+  EXPECT_EQ(document.Named("path").size(), ParseXml(element).Named("path").size());
+  EXPECT_NE(file.find("#0072b2"), std::string::npos);  // the fit's colour on light paper
+  EXPECT_NE(file.find("#56b4e9"), std::string::npos);  // and on dark
+}
+
 }  // namespace
 }  // namespace thicklens::tools

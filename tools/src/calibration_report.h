@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration_sections.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
@@ -18,11 +19,27 @@ struct ReportOrigin {
   std::vector<std::string> notes;  // one line each
 };
 
-// One page that needs nothing else: no network, no script; its figures are inline SVG. It is
-// well-formed XML too. `truth` may be null. Figures without data are left out.
-std::string CalibrationReportHtml(const calib::FocusSweep& sweep,
-                                  const calib::Calibration& calibration,
-                                  const model::SweepTruth* truth, const ReportOrigin& origin);
+struct ReportFile {
+  std::string name;
+  std::string content;
+};
+
+struct CalibrationReport {
+  // One page that needs nothing else: no network, no script; its figures are inline SVG, its
+  // pictures inline too. It is well-formed XML.
+  std::string html;
+  std::vector<ReportFile> figures;  // the same figures as SVG files
+  std::string captions;             // plain text: which figure is which file, and what it shows
+};
+
+// `truth` may be null and `pictures` empty. Figures without data are left out.
+CalibrationReport MakeCalibrationReport(const calib::FocusSweep& sweep,
+                                        const calib::Calibration& calibration,
+                                        const model::SweepTruth* truth, const ReportOrigin& origin,
+                                        const FramePictures& pictures = {});
+
+// The names that figures of a report can have.
+std::vector<std::string> ReportFigureNames();
 
 }  // namespace thicklens::tools
 

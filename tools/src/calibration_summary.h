@@ -1,11 +1,11 @@
 #ifndef THICKLENS_TOOLS_CALIBRATION_SUMMARY_H_
 #define THICKLENS_TOOLS_CALIBRATION_SUMMARY_H_
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "rounding.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
@@ -37,26 +37,9 @@ std::vector<RejectionRun> RejectionRuns(const std::vector<calib::FrameMeasuremen
 // The file's own name out of a path, printable.
 std::string FrameName(const std::string& image);
 
-// A number with the digits that its error leaves meaningful: two of the error's. With an error that
-// is 0, NaN or infinite: five significant digits.
-std::string RoundedTo(double value, double sigma);
-std::string RoundedSigma(double sigma);  // two digits; "-" if 0, NaN or infinite
-std::string SignedRoundedTo(double value, double sigma);
-
 // What is printed after a calibration. `truth` may be null. Ends with a newline.
 std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
                             const model::SweepTruth* truth);
-
-// The machine-readable summary. `status`, `reason`, `method` and the results are always there;
-// a result that does not exist, and every number that is not finite, is null. `scale_law`,
-// `covariance` and the entries of `other_methods` are there with `done: false` or null numbers if
-// they were not reached; `truth` is left out where none is known.
-//
-// With `use_source_recipe` the results are the source's, their sigma null, status and reason its
-// own; the fit's are then in `other_methods.fit`.
-nlohmann::json CalibrationJson(const calib::FocusSweep& sweep,
-                               const calib::Calibration& calibration,
-                               const model::SweepTruth* truth, bool use_source_recipe);
 
 }  // namespace thicklens::tools
 

@@ -20,26 +20,30 @@ constexpr char kNameLetters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTU
 
 bool IsKnownElement(const std::string& name) {
   static const std::set<std::string> known = {
-      "b",    "circle", "clipPath", "details", "div",   "figcaption", "figure",
-      "g",    "h1",     "h2",       "h3",      "li",    "line",       "p",
-      "path", "rect",   "span",     "summary", "svg",   "table",      "tbody",
-      "td",   "text",   "th",       "thead",   "title", "tr",         "ul"};
+      "b",    "circle", "clipPath", "details", "div",   "figcaption", "figure", "g",
+      "h1",   "h2",     "h3",       "img",     "li",    "line",       "p",      "path",
+      "rect", "span",   "summary",  "svg",     "table", "tbody",      "td",     "text",
+      "th",   "thead",  "title",    "tr",      "ul"};
   return known.count(name) > 0;
 }
 
 bool IsKnownAttribute(const std::string& name) {
-  static const std::set<std::string> known = {"aria-labelledby",
+  static const std::set<std::string> known = {"alt",
+                                              "aria-labelledby",
                                               "class",
                                               "clip-path",
                                               "cx",
                                               "cy",
                                               "d",
+                                              "fill",
                                               "height",
                                               "id",
                                               "r",
                                               "role",
                                               "scope",
+                                              "src",
                                               "stroke-dasharray",
+                                              "style",
                                               "text-anchor",
                                               "transform",
                                               "viewBox",
@@ -51,6 +55,33 @@ bool IsKnownAttribute(const std::string& name) {
                                               "y1",
                                               "y2"};
   return known.count(name) > 0;
+}
+
+bool IsMadeOf(std::string_view text, std::string_view letters) {
+  return !text.empty() && text.find_first_not_of(letters) == text.npos;
+}
+
+bool TakesPrefix(std::string_view prefix, std::string_view* text) {
+  if (text->substr(0, prefix.size()) != prefix) return false;
+  text->remove_prefix(prefix.size());
+  return true;
+}
+
+// A picture that carries its data, of the two kinds that a report has.
+bool IsInlinePicture(std::string_view source) {
+  return (TakesPrefix("data:image/png;base64,", &source) ||
+          TakesPrefix("data:image/jpeg;base64,", &source)) &&
+         IsMadeOf(source, "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=");
+}
+
+// Attributes through which something could be loaded hold nothing but what a report writes there.
+bool IsHarmless(const std::string& key, std::string_view value) {
+  if (key == "src") return IsInlinePicture(value);
+  if (key == "fill") return TakesPrefix("#", &value) && IsMadeOf(value, "0123456789abcdef");
+  if (key != "style") return true;
+  const bool is_width = TakesPrefix("max-width: ", &value) && value.size() > 2 &&
+                        value.substr(value.size() - 2) == "px";
+  return is_width && IsMadeOf(value.substr(0, value.size() - 2), "0123456789");
 }
 
 // References to characters, as EscapeXml writes them.
@@ -159,6 +190,7 @@ class Inliner {
     if (end == markup_.npos) Refuse(fmt::format("a broken <{}>", element));
     const std::string value = CheckedText(markup_.substr(at_, end - at_));
     if (value.find('<') != value.npos) Refuse(fmt::format("a broken <{}>", element));
+    if (!IsHarmless(key, value)) Refuse(fmt::format("<{}> with {}", element, key));
     at_ = end + 1;
     out_ += fmt::format(" {}=\"{}\"", key, Referring(element, key, value));
     return true;

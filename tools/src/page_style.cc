@@ -46,6 +46,15 @@ h3 { font-size: 15px; margin: 24px 0 6px; font-weight: 600; }
 figure { margin: 22px 0 30px; break-inside: avoid; }
 figcaption { color: var(--soft); font-size: 14px; margin-top: 6px; max-width: 80ch; }
 figcaption b { color: var(--ink); font-weight: 600; }
+.beside { display: flex; flex-wrap: wrap; gap: 10px; }
+.thumbnails { display: grid; gap: 14px 12px; margin-top: 16px;
+  grid-template-columns: repeat(auto-fill, minmax(180px, 1fr)); }
+.thumbnails > div { break-inside: avoid; }
+.thumbnails img { display: block; width: 100%; height: auto; border-radius: 2px; }
+.thumbnails img.crisp { image-rendering: pixelated; }
+.thumbnails span { display: block; margin-top: 4px; color: var(--soft); font-size: 12.5px;
+  line-height: 1.35; overflow-wrap: anywhere; }
+.thumbnails b { color: var(--ink); font-weight: 500; }
 details { margin-top: 12px; } summary { cursor: pointer; color: var(--soft); }
 @media print { body { font-size: 11pt; } main { padding: 0; max-width: none; }
   h2 { break-after: avoid; } tr { break-inside: avoid; } }

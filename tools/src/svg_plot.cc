@@ -12,7 +12,6 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr char kReplacement[] = "\xEF\xBF\xBD";  // U+FFFD
 constexpr double kFontPx = 12;
 // Wide enough for the widest of the usual system fonts, so that nothing overlaps in any of them.
 constexpr double kCharWidthPx = 7.2;
@@ -25,27 +24,6 @@ std::size_t CodePoints(const std::string& text) {
 
 double TextWidthPx(const std::string& text) {
   return kCharWidthPx * static_cast<double>(CodePoints(text));
-}
-
-// Length of the well-formed, printable UTF-8 sequence at `at`; 0 if there is none. Surrogates,
-// overlong forms and U+FFFE, U+FFFF count as broken.
-std::size_t PrintableLength(const std::string& text, std::size_t at) {
-  const auto byte = [&](std::size_t i) -> std::uint32_t {
-    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
-  };
-  const std::uint32_t lead = byte(at);
-  if (lead < 0x80) return lead >= 0x20 && lead != 0x7F ? 1 : 0;
-  const std::size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
-  if (lead < 0xC2 || lead > 0xF4) return 0;
-  std::uint32_t code = lead & (0x7Fu >> length);
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(at + i) & 0xC0) != 0x80) return 0;
-    code = code << 6 | (byte(at + i) & 0x3F);
-  }
-  constexpr std::uint32_t kSmallestOfLength[] = {0, 0, 0xA0, 0x800, 0x10000};
-  if (code < kSmallestOfLength[length] || code > 0x10FFFF) return 0;
-  if ((code >= 0xD800 && code <= 0xDFFF) || code == 0xFFFE || code == 0xFFFF) return 0;
-  return length;
 }
 
 const char* ClassOf(Ink ink) {
@@ -163,18 +141,23 @@ struct LegendEntry {
   Ink ink;
   Mark mark;
   Stroke stroke;
+  bool thin = false;
+  bool band = false;
 };
 
 std::vector<LegendEntry> LegendOf(const Plot& plot, const Interval& x, const Interval& y) {
   std::vector<LegendEntry> entries;
   for (const PlotSeries& series : plot.series)
     if (!series.label.empty() && !series.x.empty())
-      entries.push_back({series.label, series.ink, series.mark, series.stroke});
+      entries.push_back({series.label, series.ink, series.mark, series.stroke, series.thin});
+  for (const PlotBand& band : plot.bands)
+    if (!band.label.empty() && !band.x.empty())
+      entries.push_back({band.label, band.ink, Mark::kNone, Stroke::kNone, false, true});
   for (const PlotLine& line : plot.lines) {
     if (line.label.empty()) continue;
     const bool inside = (line.vertical ? x : y).Holds(line.position);
     entries.push_back({inside ? line.label : line.label + " (outside the plot)", line.ink,
-                       Mark::kNone, line.stroke});
+                       Mark::kNone, line.stroke, false, false});
   }
   return entries;
 }
@@ -199,17 +182,20 @@ std::vector<std::pair<double, int>> LegendPlaces(const std::vector<LegendEntry>&
 }
 
 void AppendLegend(const std::vector<LegendEntry>& entries,
-                  const std::vector<std::pair<double, int>>& places, double left,
+                  const std::vector<std::pair<double, int>>& places, double left, double top,
                   std::string* svg) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const LegendEntry& entry = entries[i];
     const double x = left + places[i].first;
-    const double y = 10 + kLegendRowPx * places[i].second;
+    const double y = top + 10 + kLegendRowPx * places[i].second;
     *svg += fmt::format("<g class=\"{}\">", ClassOf(entry.ink));
+    if (entry.band)
+      *svg += fmt::format(
+          "<rect class=\"band\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"24\" height=\"10\"/>", x, y - 5);
     if (entry.stroke != Stroke::kNone)
       *svg += fmt::format(
-          "<line class=\"line\" x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"{}/>", x, y,
-          x + 24, y, DashOf(entry.stroke));
+          "<line class=\"{}\" x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"{}/>",
+          entry.thin ? "thin" : "line", x, y, x + 24, y, DashOf(entry.stroke));
     *svg += MarkAt(entry.mark, x + 12, y);
     *svg += "</g>";
     *svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", x + 30, y + 4,
@@ -263,7 +249,33 @@ void AppendPolyline(const PlotSeries& series, const Frame& frame, std::string* s
     pen_down = true;
   }
   if (!path.empty())
-    *svg += fmt::format("<path class=\"line\" d=\"{}\"{}/>", path, DashOf(series.stroke));
+    *svg += fmt::format("<path class=\"{}\" d=\"{}\"{}/>", series.thin ? "thin" : "line", path,
+                        DashOf(series.stroke));
+}
+
+// From left to right along the upper curve and back along the lower one. A point where either is
+// not finite ends the area, and the next begins another.
+void AppendBand(const PlotBand& band, const Frame& frame, std::string* svg) {
+  const std::size_t count = std::min({band.x.size(), band.lo.size(), band.hi.size()});
+  const auto point = [&](std::size_t i, double y) {
+    return fmt::format("{:.2f} {:.2f}", frame.X(band.x[i]), std::clamp(frame.Y(y), -1e4, 1e4));
+  };
+  std::string path, upper, lower;
+  const auto close = [&] {
+    if (!upper.empty()) path += "M" + upper + lower + "Z";
+    upper.clear();
+    lower.clear();
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(band.x[i]) || !std::isfinite(band.lo[i]) || !std::isfinite(band.hi[i])) {
+      close();
+      continue;
+    }
+    upper += (upper.empty() ? "" : "L") + point(i, band.hi[i]);
+    lower = "L" + point(i, band.lo[i]) + lower;
+  }
+  close();
+  if (!path.empty()) *svg += fmt::format("<path class=\"band\" d=\"{}\"/>", path);
 }
 
 // A triangle at the edge that a point lies beyond.
@@ -311,73 +323,6 @@ void AppendNotes(const Plot& plot, const Frame& frame, std::string* svg) {
 
 }  // namespace
 
-std::string PrintableUtf8(const std::string& text) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size();) {
-    const std::size_t length = PrintableLength(text, i);
-    if (length == 0) {
-      out += kReplacement;
-      ++i;
-    } else {
-      out.append(text, i, length);
-      i += length;
-    }
-  }
-  return out;
-}
-
-std::string EscapeXml(const std::string& text) {
-  std::string out;
-  for (char c : PrintableUtf8(text)) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
-std::vector<double> NiceTicks(double lo, double hi, int at_most) {
-  std::vector<double> ticks;
-  if (!std::isfinite(lo) || !std::isfinite(hi) || !(lo < hi) || at_most < 1) return ticks;
-  const double span = hi - lo;
-  const double power = std::pow(10, std::floor(std::log10(span / at_most)));
-  for (double factor : {1.0, 2.0, 5.0, 10.0, 20.0, 50.0}) {
-    const double step = factor * power;
-    const double first = std::ceil(lo / step - 1e-9);
-    const double last = std::floor(hi / step + 1e-9);
-    if (last - first + 1 > at_most) continue;
-    // Multiples of the step, not a running sum: zero comes out as zero.
-    for (int i = 0; i <= static_cast<int>(last - first); ++i) ticks.push_back((first + i) * step);
-    return ticks;
-  }
-  return ticks;
-}
-
-std::string TickLabel(double value, double step) {
-  const int decimals =
-      step > 0 ? std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 9) : 0;
-  std::string label = std::abs(value) >= 1e6 ? fmt::format("{:.3g}", value)
-                                             : fmt::format("{:.{}f}", value, decimals);
-  if (label[0] == '-') label.replace(0, 1, "\xE2\x88\x92");  // U+2212
-  return label;
-}
-
 std::string SvgPlot(const Plot& plot) {
   Frame frame;
   frame.x = RangeOf(plot, true);
@@ -387,9 +332,10 @@ std::string SvgPlot(const Plot& plot) {
   const std::vector<LegendEntry> legend = LegendOf(plot, frame.x, frame.y);
   // The legend's rows decide the height, the height the ticks, their labels the left margin.
   const double legend_left = 30;
+  const double heading_px = plot.heading.empty() ? 0 : 20;
   const std::vector<std::pair<double, int>> places =
       LegendPlaces(legend, frame.right - legend_left);
-  frame.top = legend.empty() ? 10 : 14 + kLegendRowPx * (places.back().second + 1);
+  frame.top = heading_px + (legend.empty() ? 10 : 14 + kLegendRowPx * (places.back().second + 1));
   frame.bottom = plot.height_px - 46;
   const std::vector<double> y_ticks = NiceTicks(
       frame.y.lo, frame.y.hi, std::max(2, static_cast<int>((frame.bottom - frame.top) / 26)));
@@ -413,9 +359,17 @@ std::string SvgPlot(const Plot& plot) {
       "<clipPath id=\"{}-clip\"><rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" "
       "height=\"{:.1f}\"/></clipPath>\n",
       id, frame.left, frame.top, frame.right - frame.left, frame.bottom - frame.top);
-  AppendLegend(legend, places, legend_left, &svg);
+  if (!plot.heading.empty())
+    svg += fmt::format("<text class=\"heading\" x=\"{:.1f}\" y=\"13\">{}</text>\n", legend_left,
+                       EscapeXml(plot.heading));
+  AppendLegend(legend, places, legend_left, heading_px, &svg);
   AppendAxes(plot, frame, x_ticks, y_ticks, &svg);
   svg += fmt::format("<g clip-path=\"url(#{}-clip)\">\n", id);
+  for (const PlotBand& band : plot.bands) {
+    svg += fmt::format("<g class=\"{}\">", ClassOf(band.ink));
+    AppendBand(band, frame, &svg);
+    svg += "</g>\n";
+  }
   for (const PlotLine& line : plot.lines) {
     if (!(line.vertical ? frame.x : frame.y).Holds(line.position)) continue;
     const double at = line.vertical ? frame.X(line.position) : frame.Y(line.position);
@@ -439,31 +393,6 @@ std::string SvgPlot(const Plot& plot) {
   AppendNotes(plot, frame, &svg);
   svg += "</svg>\n";
   return svg;
-}
-
-std::string SvgPlotStyle() {
-  // Colours after Okabe and Ito, told apart by colour-blind readers; lighter ones on dark paper.
-  return R"(:root { --fit: #0072b2; --source: #d55e00; --peak: #008a64; --data: #4a4f57;
-  --muted: #8d949e; --truth: #b8578d; --axis: #7a818b; --grid: #e6e8eb; }
-@media (prefers-color-scheme: dark) {
-  :root { --fit: #56b4e9; --source: #f08c3a; --peak: #35c79c; --data: #ccd1d8;
-    --muted: #838a95; --truth: #e39cc3; --axis: #8d949e; --grid: #2c3139; } }
-@media print {
-  :root { --fit: #0072b2; --source: #d55e00; --peak: #008a64; --data: #4a4f57;
-    --muted: #8d949e; --truth: #b8578d; --axis: #7a818b; --grid: #e6e8eb; } }
-.plot { display: block; max-width: 100%; height: auto; font-size: 12px; }
-.plot text { fill: currentColor; font-variant-numeric: tabular-nums; }
-.plot .note { font-style: italic; }
-.plot .grid line { stroke: var(--grid); stroke-width: 1; }
-.plot .axis path { stroke: var(--axis); stroke-width: 1; fill: none; }
-.ink-fit { color: var(--fit); } .ink-source { color: var(--source); }
-.ink-peak { color: var(--peak); } .ink-data { color: var(--data); }
-.ink-muted { color: var(--muted); } .ink-truth { color: var(--truth); }
-.plot .line { stroke: currentColor; stroke-width: 1.6; fill: none; }
-.plot .bar { stroke: currentColor; stroke-width: 1; opacity: .6; fill: none; }
-.plot .full { fill: currentColor; }
-.plot .open { stroke: currentColor; stroke-width: 1.3; fill: none; }
-)";
 }
 
 }  // namespace thicklens::tools

@@ -6,15 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "printable_text.h"
+
 namespace thicklens::tools {
-
-// Text made safe for XML content and attributes: markup characters escaped, everything that XML 1.0
-// cannot carry (broken UTF-8, control characters) replaced by U+FFFD.
-std::string EscapeXml(const std::string& text);
-
-// The same text with every broken UTF-8 sequence and every control character replaced by U+FFFD:
-// file names may hold any byte, terminals and JSON may not.
-std::string PrintableUtf8(const std::string& text);
 
 // Round positions within [lo, hi], a step of 1, 2 or 5 times a power of ten apart, the smallest
 // such step that gives at most `at_most` of them. Empty unless lo < hi, both finite, and at_most
@@ -36,9 +30,17 @@ struct PlotSeries {
   Ink ink = Ink::kData;
   Mark mark = Mark::kDot;
   Stroke stroke = Stroke::kNone;
+  bool thin = false;  // a line of less weight
   std::vector<double> x, y;
   std::vector<double> y_error;     // half lengths of the error bars; empty: none
   std::vector<std::string> names;  // of the points, shown when pointed at; empty: none
+};
+
+// What lies between two curves over the same abscissas. It does not widen the plot.
+struct PlotBand {
+  std::string label;  // in the legend; empty: not there
+  Ink ink = Ink::kFit;
+  std::vector<double> x, lo, hi;
 };
 
 // A line across the whole plot. One far outside the data is left out, and the legend says so.
@@ -65,6 +67,8 @@ struct Plot {
   std::string id;     // unique on the page; letters, digits and '-'
   std::string title;  // for readers who cannot see the figure
   PlotAxis x_axis, y_axis;
+  std::string heading;  // shown above; empty: none
+  std::vector<PlotBand> bands;
   std::vector<PlotSeries> series;
   std::vector<PlotLine> lines;
   std::vector<PlotNote> notes;
@@ -77,6 +81,9 @@ std::string SvgPlot(const Plot& plot);
 
 // The style rules of every plot, light and dark.
 std::string SvgPlotStyle();
+
+// An <svg> element of class "plot" as a file of its own, with its style and a ground.
+std::string SvgFile(const std::string& element);
 
 }  // namespace thicklens::tools
 

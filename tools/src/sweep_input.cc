@@ -77,9 +77,16 @@ void TakeOffset(const SweepArguments& arguments, model::SweepFile* file) {
   file->offset_mm->sigma = *arguments.offset_sigma_mm;
 }
 
-void TakeFloor(const std::string& text, model::SweepFile* file) {
+void TakeFloor(const SweepArguments& arguments, model::SweepFile* file) {
+  const std::string& text = arguments.floor_px;
+  if (!arguments.floor_from.empty()) {
+    if (!text.empty()) throw UsageError("--floor-from and --floor-px exclude each other");
+    model::TakeFloorOfCalibration(arguments.floor_from, "--floor-from: ", file);
+    return;
+  }
   if (text.empty()) return;
   file->floor = {};
+  file->floor_origin.reset();
   if (text == kUnknown) return;
   const std::string form = "VALUE, VALUE:SIGMA or 'unknown'";
   const auto numbers = SplitNumbers("--floor-px", text, ':', form);
@@ -103,7 +110,7 @@ void TakeRoi(const std::string& text, model::SweepFile* file) {
 // Direction and target have been checked to be one of the names when the command line was read.
 void TakeArguments(const SweepArguments& arguments, model::SweepFile* file) {
   TakeOffset(arguments, file);
-  TakeFloor(arguments.floor_px, file);
+  TakeFloor(arguments, file);
   TakeRoi(arguments.roi, file);
   if (arguments.reading_sigma_mm) {
     file->reading_sigma_mm = *arguments.reading_sigma_mm;
@@ -137,7 +144,9 @@ std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
 
 }  // namespace
 
-std::vector<std::string> SweepArguments::Files() const { return {input, readings_csv, truth_path}; }
+std::vector<std::string> SweepArguments::Files() const {
+  return {input, readings_csv, truth_path, floor_from};
+}
 
 SweepInput ReadSweepInput(const SweepArguments& arguments) {
   SweepInput input;

@@ -22,7 +22,8 @@ struct SweepArguments {
   std::optional<double> offset_sigma_mm;
   std::string direction;
   std::optional<double> reading_sigma_mm;
-  std::string floor_px;  // VALUE, VALUE:SIGMA or "unknown"
+  std::string floor_px;    // VALUE, VALUE:SIGMA or "unknown"
+  std::string floor_from;  // a camera file
   std::string target;
   std::string roi;  // x,y,width,height
 

@@ -1,0 +1,37 @@
+#ifndef THICKLENS_TOOLS_CALIBRATION_WORDS_H_
+#define THICKLENS_TOOLS_CALIBRATION_WORDS_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/focus_sweep.h"
+
+namespace thicklens::tools {
+
+// What was found, in words that text and page share. One line without an end each, "+-" and "-" as
+// typed; empty where there is nothing to say.
+
+std::string ScaleKindName(calib::ScaleKind kind);  // as in JSON: "inverse-depth"
+std::string ScaleKindWords(calib::ScaleKind kind);
+
+// Tilt, curvature, astigmatism and depths of the field, one line each.
+std::vector<std::string> FieldLines(const calib::FieldMap& field);
+// The axial colour: each channel's depth of focus.
+std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels);
+// How far the far side's depth of focus lies from the near side's; nothing unless both are done.
+std::optional<model::Estimate> SidesApartMm(const calib::Calibration& calibration);
+std::string SidesLine(const calib::Calibration& calibration);
+// Which point spread function the frames like better, and whether the camera file agrees.
+std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur);
+std::string MagnificationLine(const calib::Calibration& calibration);
+std::string DistortionLine(const calib::ScaleLaw& scale);
+std::string OutsideLine(const calib::BlurFit& blur);
+
+// (lowest, highest) of one systematic part, with the digits of the larger: "-3.1 .. +3.9".
+std::string PartRange(const Eigen::Vector2d& range);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_CALIBRATION_WORDS_H_

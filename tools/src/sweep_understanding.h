@@ -1,0 +1,33 @@
+#ifndef THICKLENS_TOOLS_SWEEP_UNDERSTANDING_H_
+#define THICKLENS_TOOLS_SWEEP_UNDERSTANDING_H_
+
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <opencv2/core/types.hpp>
+#include <string>
+
+#include "sweep_input.h"
+
+namespace thicklens::tools {
+
+// What a dry run finds out without measuring.
+struct Understanding {
+  cv::Size frame_size_px;
+  int frame_bits = 0, frame_channels = 0;
+  double min_reading_mm = 0, max_reading_mm = 0, median_step_mm = 0;
+  std::size_t distinct_readings = 0;
+};
+
+// Opens the first frame alone, so that it takes no longer for a large sweep. Throws Error for what
+// would stop the calibration.
+Understanding Understand(const SweepInput& input);
+
+// What a dry run tells. `outputs` names the files that a run would write.
+std::string UnderstandingText(const SweepInput& input, const Understanding& found,
+                              const std::string& method, const std::string& outputs);
+nlohmann::json UnderstandingJson(const SweepInput& input, const Understanding& found,
+                                 const std::string& method);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_SWEEP_UNDERSTANDING_H_
