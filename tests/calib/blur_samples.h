@@ -109,6 +109,13 @@ struct BlurBench {
   }
 };
 
+// One whose meters are exact.
+inline BlurBench ExactBench() {
+  BlurBench bench;
+  bench.noise = 0;
+  return bench;
+}
+
 inline constexpr double kReferencePx2 = 1.7;  // what a relative meter calls the reference's blur
 
 // One meter of a kind, with the noise that the bench says.

@@ -79,7 +79,7 @@ TEST(WindowLeakage, IsWhatTheWindowsEdgeDoes) {
     TextureScene scene;
     scene.psf = psf;
     scene.floor_px2 = 0;
-    scene.window.size_px = {100, 96};
+    scene.window = {{0, -1}, {156, 154}};  // nearly all of the frame
     TextureFrame frame;
     scene.frames = {frame};
     const KnownTexture texture(4);
@@ -153,6 +153,7 @@ TEST(WindowLeakage, DoesNotDependOnThreads) {
 
 TEST(MeasuredTransfer, IsTheBlursOwn) {
   TextureScene scene = TextureSweep();
+  scene.frames[5].left_over_px = {1.1, -0.8};  // the fit's own shift is taken out
   std::vector<cv::Mat> pictures = scene.Render();
   for (std::size_t i = 0; i < pictures.size(); ++i)
     pictures[i] = WithWhiteNoise(pictures[i], scene.pixel_noise, 30 + static_cast<unsigned>(i));
