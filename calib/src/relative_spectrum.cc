@@ -143,8 +143,14 @@ class Fit {
     const double base = state_.variance[static_cast<Eigen::Index>(reference_)];
     for (Eigen::Index i = 0; i < n(); ++i) {
       const auto s = static_cast<std::size_t>(i);
-      data_[s] = samples_[s].spectrum.values.head(Count(i)) -
-                 leakage_.At(state_.variance[i] - base, static_cast<std::size_t>(Count(i)));
+      // What leaks has the frame's own gain and the shift that is left over.
+      Eigen::ArrayXcd leaked =
+          leakage_.At(state_.variance[i] - base, static_cast<std::size_t>(Count(i)));
+      for (Eigen::Index k = 0; k < leaked.size(); ++k) {
+        leaked[k] *= std::polar(std::exp(state_.log_gain[i]),
+                                -2 * kPi * nu_.col(k).dot(state_.shift.col(i)));
+      }
+      data_[s] = samples_[s].spectrum.values.head(Count(i)) - leaked;
     }
   }
 
@@ -225,7 +231,7 @@ class Fit {
     return true;
   }
 
-  // Without the reference's rows: its gain, variance and shift are held, they only move T.
+  // Without the reference's rows: its gain and variance are held, they would only move T.
   static Eigen::VectorXd Solved(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gradient,
                                 double damping) {
     Eigen::MatrixXd damped = normal;

@@ -218,7 +218,7 @@ struct Calibration {
   FieldMap field;
   std::vector<ChannelFocus> channels;  // of colour frames
   std::optional<MagnificationCheck> magnification;
-  std::vector<SystematicPart> systematic_parts;  // largest first, by their part of zf
+  std::vector<SystematicPart> systematic_parts;  // largest first, by their part of d1
   std::string advice;                            // what would shrink the largest error, and to what
   std::vector<BlurExample> examples;             // nearest, sharpest and farthest frame
   std::vector<FrameMeasurement> frames;          // in the sweep's order
