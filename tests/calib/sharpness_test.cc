@@ -104,10 +104,10 @@ SharpnessIndex PlainMeanEdgeSlope(const cv::Mat& grey, double threshold, int max
   const auto at = [&](double x, double y) {
     const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
     const double fx = x - x0, fy = y - y0;
-    return (1 - fy) *
-               ((1 - fx) * smoothed.at<float>(y0, x0) + fx * smoothed.at<float>(y0, x0 + 1)) +
-           fy * ((1 - fx) * smoothed.at<float>(y0 + 1, x0) +
-                 fx * smoothed.at<float>(y0 + 1, x0 + 1));
+    // On the last row or column the next one has no weight, and is not there to be read.
+    const int x1 = std::min(x0 + 1, smoothed.cols - 1), y1 = std::min(y0 + 1, smoothed.rows - 1);
+    return (1 - fy) * ((1 - fx) * smoothed.at<float>(y0, x0) + fx * smoothed.at<float>(y0, x1)) +
+           fy * ((1 - fx) * smoothed.at<float>(y1, x0) + fx * smoothed.at<float>(y1, x1));
   };
   const auto gradient = [&](int x, int y) {
     return cv::Point2d(0.5 * (at(x + 1, y) - at(x - 1, y)), 0.5 * (at(x, y + 1) - at(x, y - 1)));
