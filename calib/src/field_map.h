@@ -10,8 +10,8 @@ namespace thicklens::calib {
 // The same fit on parts of the field, on the blur along x and along y, and on the colour channels:
 // tilt, field curvature, depths of the target, astigmatism, axial colour. All with the readings
 // that the whole field's fit believes, so that what the parts share does not blur how they differ.
-// Fills `field` and `channels` of the calibration and warns of what one plane of focus does not
-// describe. `tick` is called once a frame and pass.
+// Fills `field` and `channels` of the calibration, warns of what one plane of focus does not
+// describe and widens the systematic interval by it.
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration);
 

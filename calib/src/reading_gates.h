@@ -11,7 +11,7 @@
 namespace thicklens::calib {
 
 // Why the image scales of the used frames forbid any result, or nothing: the readings run the other
-// way, or one picture was repeated for all of them.
+// way or are in no order at all, or one picture was repeated for all of them.
 std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
                                                const std::vector<FrameMeasurement>& frames,
                                                const std::vector<std::size_t>& used,

@@ -46,9 +46,9 @@ struct SpectralMeterSetup {
 };
 
 // The largest window that every one of the frames sees, and the frames that keep enough modes in
-// it: sqrt(V - Vmin) below 1/35 of its smaller side. `part` and `place` cut a smaller one out:
-// its size in parts of the whole, its middle from -1/2 to 1/2 of the whole. Nothing where fewer
-// than five frames would be left.
+// it: sqrt(V - Vmin) below 1/35 of its smaller side, up to 1/16 where too few would be left. `part`
+// and `place` cut a smaller one out: its size in parts of the whole, its middle from -1/2 to 1/2 of
+// the whole. Nothing where fewer than five frames would be left.
 std::optional<MeterRegion> PlanRegion(const SpectralMeterSetup& setup, double part,
                                       const Eigen::Vector2d& place);
 

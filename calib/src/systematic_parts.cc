@@ -181,8 +181,10 @@ class Parts {
     if (!trial) return;
     SystematicPart part;
     part.name = "shape of the blur";
-    part.remedy = fmt::format("state psf: {} in the camera file if it describes the frames better",
-                              model::PsfName(evidence_.better_psf));
+    part.remedy = evidence_.better_psf == sweep_.camera.psf
+                      ? std::string("nothing: the shape that the camera file states fits better")
+                      : fmt::format("state psf: {} in the camera file: it fits better",
+                                    model::PsfName(evidence_.better_psf));
     Include(*trial, &part);
     part.blur_ratio.setZero();
     result_.systematic_parts.push_back(part);
