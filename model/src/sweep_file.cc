@@ -1,28 +1,18 @@
 #include "thicklens/model/sweep_file.h"
 
 #include <fmt/format.h>
-#include <glob.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
-#include <filesystem>
 #include <set>
-#include <system_error>
 
-#include "readings_table.h"
-#include "thicklens/error.h"
-#include "thicklens/model/camera_file.h"
+#include "sweep_frames.h"
 #include "thicklens/model/yaml_reader.h"
 
 namespace thicklens::model {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr char kSchema[] = "thicklens/sweep/1";
-constexpr char kTruthSchema[] = "thicklens/sweep-truth/1";
 
 double MillimetresPer(const std::string& unit) {
   if (unit == "um") return 1e-3;
@@ -30,108 +20,6 @@ double MillimetresPer(const std::string& unit) {
   if (unit == "m") return 1000;
   if (unit == "in") return 25.4;
   return 1;
-}
-
-// Half-written outputs and what some systems lay beside every file ("._frame.png").
-bool IsHidden(const fs::path& file) { return file.filename().string().rfind('.', 0) == 0; }
-
-bool IsPictureName(const fs::path& file) {
-  static const std::set<std::string> kEndings = {".png", ".jpg", ".jpeg", ".tif", ".tiff",
-                                                 ".bmp", ".pgm", ".ppm",  ".pnm"};
-  std::string ending = file.extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return kEndings.count(ending) > 0;
-}
-
-// The folder of the YAML file may have any name: only what stands in the file is a pattern.
-std::string EscapedForGlob(const std::string& folder) {
-  std::string escaped;
-  for (const char c : folder) {
-    if (c == '*' || c == '?' || c == '[' || c == '\\') escaped += '\\';
-    escaped += c;
-  }
-  return escaped;
-}
-
-std::vector<std::string> FilesMatching(const YamlNode& node) {
-  const std::string folder = EscapedForGlob(fs::path(node.source()).parent_path().string());
-  const std::string pattern = (fs::path(folder) / node.Text()).string();
-  glob_t found{};
-  std::vector<std::string> files;
-  if (::glob(pattern.c_str(), 0, nullptr, &found) == 0) {
-    for (std::size_t i = 0; i < found.gl_pathc; ++i) files.emplace_back(found.gl_pathv[i]);
-  }
-  ::globfree(&found);
-  return files;
-}
-
-// Pictures directly in the folder, or, where it has none, in its own sub-folders: a person points
-// at the folder that holds both the table and "frames/".
-std::vector<std::string> PicturesIn(const std::string& folder) {
-  std::error_code failure;
-  if (!fs::is_directory(folder, failure)) throw Error(fmt::format("{}: no such folder", folder));
-  fs::directory_iterator entries(folder, failure);
-  if (failure) throw Error(fmt::format("{}: cannot be read: {}", folder, failure.message()));
-  std::vector<std::string> here, below;
-  for (const auto& entry : entries) {
-    if (IsHidden(entry.path())) continue;
-    if (entry.is_regular_file(failure) && IsPictureName(entry.path()))
-      here.push_back(entry.path().string());
-    if (!entry.is_directory(failure)) continue;
-    for (const auto& inner : fs::directory_iterator(entry.path(), failure)) {
-      if (!IsHidden(inner.path()) && inner.is_regular_file(failure) && IsPictureName(inner.path()))
-        below.push_back(inner.path().string());
-    }
-  }
-  std::vector<std::string>& files = here.empty() ? below : here;
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
-// Brings table rows and picture files together by name; each must have its partner.
-std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
-                                         const std::string& table,
-                                         const std::vector<std::string>& files,
-                                         const std::string& folder, double mm_per_unit) {
-  std::vector<SweepFrame> frames;
-  std::set<std::string> used;
-  for (const ReadingRow& row : rows) {
-    std::string path = (fs::path(folder) / row.file).lexically_normal().string();
-    std::error_code failure;
-    if (!fs::is_regular_file(path, failure)) {
-      const auto same_name = [&](const std::string& file) {
-        return fs::path(file).filename() == row.file;
-      };
-      const auto match = std::find_if(files.begin(), files.end(), same_name);
-      if (match == files.end()) {
-        throw Error(fmt::format("{}:{}: the file '{}' is not in {}", table, row.line, row.file,
-                                folder.empty() ? "." : folder));
-      }
-      const auto other = std::find_if(match + 1, files.end(), same_name);
-      if (other != files.end()) {
-        throw Error(fmt::format("{}:{}: '{}' may be {} or {}; name its folder too", table, row.line,
-                                row.file, *match, *other));
-      }
-      path = fs::path(*match).lexically_normal().string();
-    }
-    if (!used.insert(path).second) {
-      throw Error(
-          fmt::format("{}:{}: the file '{}' has a reading already", table, row.line, row.file));
-    }
-    frames.push_back({path, row.reading * mm_per_unit});
-  }
-  std::vector<std::string> without_row;
-  for (const std::string& file : files) {
-    if (used.count(fs::path(file).lexically_normal().string()) == 0) without_row.push_back(file);
-  }
-  // A picture that was left out by mistake costs more than one that has to be moved away.
-  if (!without_row.empty()) {
-    throw Error(fmt::format(
-        "{}: has no row in {} ({} such file{}): add its reading, move it elsewhere, or "
-        "choose the files by frames_glob",
-        without_row.front(), table, without_row.size(), without_row.size() == 1 ? "" : "s"));
-  }
-  return frames;
 }
 
 bool IsUnknown(const YamlNode& node) { return node.IsScalar() && node.Text() == "unknown"; }
@@ -179,45 +67,6 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
     if (const auto sigma = node->Find("sigma")) floor.sigma = sigma->NonNegativeNumber();
     sweep->floor.given_px = floor;
   }
-}
-
-void ReadFrames(const YamlNode& root, double mm_per_unit, SweepFile* sweep) {
-  if (root.Has("frames") == root.Has("frames_csv")) {
-    throw root.ErrorHere(
-        "either 'frames' (a list of image and reading_mm) or 'frames_csv' (a table) is expected");
-  }
-  if (const auto table = root.Find("frames_csv")) {
-    const std::string csv = table->ResolvePath(table->Text());
-    std::string folder = fs::path(csv).parent_path().string();
-    if (const auto dir = root.Find("frames_dir")) folder = dir->ResolvePath(dir->Text());
-    std::vector<std::string> files;
-    if (const auto pattern = root.Find("frames_glob")) {
-      files = FilesMatching(*pattern);
-      if (files.empty())
-        throw pattern->ErrorHere(fmt::format("no file matches '{}'", pattern->Text()));
-    } else {
-      files = PicturesIn(folder.empty() ? "." : folder);
-    }
-    sweep->frames = JoinRowsAndFiles(ReadReadingsTable(csv), csv, files, folder, mm_per_unit);
-    return;
-  }
-  for (const char* key : {"frames_dir", "frames_glob"}) {
-    if (const auto extra = root.Find(key))
-      throw extra->ErrorHere("goes with 'frames_csv'; the paths in 'frames' are complete");
-  }
-  std::set<std::string> images;
-  for (const YamlNode& node : root.At("frames").Elements()) {
-    node.RequireKeys({"image", "reading_mm"});
-    const YamlNode image = node.At("image");
-    const std::string path = image.ResolvePath(image.Text());
-    std::error_code failure;
-    if (!fs::is_regular_file(path, failure))
-      throw image.ErrorHere(fmt::format("the file '{}' does not exist", path));
-    if (!images.insert(path).second)
-      throw image.ErrorHere(fmt::format("'{}' stands in this list twice", image.Text()));
-    sweep->frames.push_back({path, node.At("reading_mm").Number()});
-  }
-  if (sweep->frames.empty()) throw root.At("frames").ErrorHere("a frame at least is expected");
 }
 
 void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notices) {
@@ -305,60 +154,9 @@ SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) 
     sweep.roi = {numbers[0].Integer(0, kMax), numbers[1].Integer(0, kMax),
                  numbers[2].Integer(1, kMax), numbers[3].Integer(1, kMax)};
   }
-  ReadFrames(root, mm_per_unit, &sweep);
+  sweep.frames = ReadSweepFrames(root, mm_per_unit);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
-}
-
-void TakeFloorOfCalibration(const std::string& camera_path, const std::string& place,
-                            SweepFile* sweep) {
-  Camera camera;
-  try {
-    camera = ReadCamera(camera_path);
-  } catch (const Error& error) {
-    throw Error(place + error.what());
-  }
-  if (!camera.calibration) {
-    throw Error(fmt::format(
-        "{}{} holds no calibration: a camera that thicklens calibrate has written is expected",
-        place, camera_path));
-  }
-  const std::string& method = camera.calibration->evidence.method;
-  if (method == "assumed" || method == "source-recipe") {
-    throw Error(fmt::format(
-        "{}{}: calibration.evidence.method is '{}', which measures no floor: calibrate on a sweep "
-        "of a knife edge",
-        place, camera_path, method));
-  }
-  if (!camera.calibration->blur_floor_px) {
-    throw Error(fmt::format(
-        "{}{} holds no calibration.blur_floor_px: its sweep did not determine the floor, one of a "
-        "knife edge does",
-        place, camera_path));
-  }
-  sweep->floor = {};
-  sweep->floor.given_px = *camera.calibration->blur_floor_px;
-  sweep->floor_origin = FloorOrigin{place, camera_path, camera.lens, camera.sensor.pixel_pitch_mm};
-}
-
-void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera) {
-  if (!sweep.floor_origin) return;
-  const FloorOrigin& origin = *sweep.floor_origin;
-  const auto require_same = [&](const char* field, double theirs, double ours) {
-    // The same number may have been written with other digits.
-    if (std::abs(theirs - ours) <= 1e-6 * std::max(std::abs(theirs), std::abs(ours))) return;
-    throw Error(fmt::format(
-        "{}{} has {} {}, the camera '{}' of this sweep {}: a blur floor holds for one lens, "
-        "aperture and pixel pitch",
-        origin.place, origin.camera_path, field, theirs, camera.name, ours));
-  };
-  const ThickLens& a = origin.lens;
-  const ThickLens& b = camera.lens;
-  require_same("lens.front_focal_length_mm", a.front_focal_length_mm, b.front_focal_length_mm);
-  require_same("lens.rear_focal_length_mm", a.rear_focal_length_mm, b.rear_focal_length_mm);
-  require_same("lens.lens_thickness_mm", a.lens_thickness_mm, b.lens_thickness_mm);
-  require_same("lens.aperture_radius_mm", a.aperture_radius_mm, b.aperture_radius_mm);
-  require_same("sensor.pixel_pitch_mm", origin.pixel_pitch_mm, camera.sensor.pixel_pitch_mm);
 }
 
 SweepFile SweepFromFolder(const std::string& folder, const std::string& readings_csv,
@@ -366,8 +164,7 @@ SweepFile SweepFromFolder(const std::string& folder, const std::string& readings
   SweepFile sweep;
   sweep.source = folder;
   sweep.camera_path = camera_path;
-  sweep.frames = JoinRowsAndFiles(ReadReadingsTable(readings_csv), readings_csv, PicturesIn(folder),
-                                  folder, 1);
+  sweep.frames = FramesOfFolder(folder, readings_csv);
   NoteOrderAndRepeats(sweep, notices);
   return sweep;
 }
@@ -415,49 +212,6 @@ std::string SweepToYaml(const SweepFile& sweep) {
     out << YAML::Flow << YAML::BeginMap;
     text("image", frame.image);
     number("reading_mm", frame.reading_mm);
-    out << YAML::EndMap;
-  }
-  out << YAML::EndSeq << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
-}
-
-SweepTruth ReadSweepTruth(const std::string& path) {
-  const YamlNode root = YamlNode::LoadFile(path);
-  root.RequireSchema(kTruthSchema);
-  root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "frames"});
-  SweepTruth truth;
-  truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
-  truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
-  truth.blur_ratio = root.At("blur_ratio").NonNegativeNumber();
-  truth.blur_floor_px = root.At("blur_floor_px").NonNegativeNumber();
-  truth.bench_offset_mm = root.At("bench_offset_mm").Number();
-  for (const YamlNode& node : root.At("frames").Elements()) {
-    node.RequireKeys({"image", "depth_mm", "reading_mm", "blur_sigma_px"});
-    truth.frames.push_back({node.At("image").Text(), node.At("depth_mm").Number(),
-                            node.At("reading_mm").Number(),
-                            node.At("blur_sigma_px").NonNegativeNumber()});
-  }
-  return truth;
-}
-
-std::string SweepTruthToYaml(const SweepTruth& truth) {
-  YAML::Emitter out;
-  const auto number = [&](const char* key, double value) {
-    out << YAML::Key << key << YAML::Value << YamlNumber(value);
-  };
-  out << YAML::BeginMap << YAML::Key << "schema" << YAML::Value << kTruthSchema;
-  number("image_distance_mm", truth.image_distance_mm);
-  number("focus_depth_mm", truth.focus_depth_mm);
-  number("blur_ratio", truth.blur_ratio);
-  number("blur_floor_px", truth.blur_floor_px);
-  number("bench_offset_mm", truth.bench_offset_mm);
-  out << YAML::Key << "frames" << YAML::Value << YAML::BeginSeq;
-  for (const SweepTruth::Frame& frame : truth.frames) {
-    out << YAML::Flow << YAML::BeginMap << YAML::Key << "image" << YAML::Value << frame.image;
-    number("depth_mm", frame.depth_mm);
-    number("reading_mm", frame.reading_mm);
-    number("blur_sigma_px", frame.blur_sigma_px);
     out << YAML::EndMap;
   }
   out << YAML::EndSeq << YAML::EndMap;
