@@ -1,5 +1,3 @@
-#include <ceres/tiny_solver.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -7,6 +5,7 @@
 
 #include "edge_profile.h"
 #include "step_fit.h"
+#include "step_search.h"
 
 namespace thicklens::calib {
 namespace {
@@ -27,7 +26,6 @@ enum Parameter {
   kHalf = kMean + 3,
   kParameters = kHalf + 3
 };
-using Parameters = Eigen::Matrix<double, kParameters, 1>;
 
 // The grey around an X corner (derived here):
 //   I = A + B [S1(d1) S2(d2) + 4 c E1'(d1) E2'(d2) + 2 c^2 E1''(d1) E2''(d2)], S = 2 E - 1,
@@ -36,30 +34,22 @@ using Parameters = Eigen::Matrix<double, kParameters, 1>;
 // the covariance, px^2, of blur and pixel along the two normals. For Gaussians dI/dc is I's
 // derivative by d1 and d2: two orders in c, good to 1e-3 B within 15 degrees of a right angle. A
 // disc does not separate: where both of its profiles rise, the pixels are left out.
-class CornerModel {
+class CornerModel : public StepModel<kParameters> {
  public:
-  using Scalar = double;
-  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };
-
-  CornerModel(const FeaturePixels& pixels, const Strip& strip, double unit, model::Psf psf,
-              double floor_px)
-      : pixels_(pixels), strip_(strip), unit_(unit), psf_(psf), floor_px_(floor_px) {}
-
-  int NumResiduals() const { return static_cast<int>(pixels_.size()); }
+  using StepModel::StepModel;
 
   bool operator()(const double* p, double* residuals, double* jacobian) const {
     const double angle1 = strip_.normal_rad + p[kTurn];
     const double angle2 = strip_.normal_rad + CV_PI / 2 + p[kSecondTurn];
     const double c1 = std::cos(angle1), s1 = std::sin(angle1);
     const double c2 = std::cos(angle2), s2 = std::sin(angle2);
-    const double widest_px2 = 4 * strip_.half_width_px * strip_.half_width_px;
-    const EdgeProfile profile1(psf_, std::min(p[kVariance], widest_px2), floor_px_, angle1);
-    const EdgeProfile profile2(psf_, std::min(p[kSecondVariance], widest_px2), floor_px_, angle2);
+    const EdgeProfile profile1(psf_, std::min(p[kVariance], LargestVariance()), floor_px_, angle1);
+    const EdgeProfile profile2(psf_, std::min(p[kSecondVariance], LargestVariance()), floor_px_,
+                               angle2);
     const double covariance_px2 =
         (c1 * c2 + s1 * s2) * ((p[kVariance] + p[kSecondVariance]) / 2 + 1.0 / 12);
     const auto n = static_cast<Eigen::Index>(pixels_.size());
-    Eigen::Map<Eigen::MatrixXd> j(jacobian, jacobian != nullptr ? n : 0,
-                                  jacobian != nullptr ? static_cast<Eigen::Index>(kParameters) : 0);
+    Eigen::Map<Eigen::MatrixXd> j = AsMatrix(jacobian);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto pixel = static_cast<std::size_t>(i);
       const double x = pixels_.x_px[pixel] - p[kX], y = pixels_.y_px[pixel] - p[kY];
@@ -94,18 +84,11 @@ class CornerModel {
 
  private:
   double PlaneScale() const { return 1 / strip_.half_width_px; }
-
-  const FeaturePixels& pixels_;
-  Strip strip_;
-  double unit_;
-  model::Psf psf_;
-  double floor_px_;
 };
 
-class Fit {
+class CornerFit : StepSearch<CornerModel> {
  public:
-  Fit(const cv::Mat& grey, const EdgeFeature& feature, model::Psf psf, double floor_px)
-      : grey_(grey), feature_(feature), psf_(psf), floor_px_(floor_px) {}
+  using StepSearch::StepSearch;
 
   std::optional<EdgeSpreadFit> Run() {
     parameters_.setZero();
@@ -165,16 +148,11 @@ class Fit {
   // The sign of d1 d2 in the frame of the first normal; the second is nearly at a right angle.
   bool StartLevels() {
     const double c = std::cos(strip_.normal_rad), s = std::sin(strip_.normal_rad);
-    double sum[2] = {0, 0}, count[2] = {0, 0};
-    for (std::size_t i = 0; i < pixels_.size(); ++i) {
-      const double x = pixels_.x_px[i], y = pixels_.y_px[i];
-      const int side = (x * c + y * s) * (y * c - x * s) > 0 ? 1 : 0;
-      sum[side] += pixels_.grey[i];
-      ++count[side];
-    }
-    if (!(count[0] > 0 && count[1] > 0)) return false;
-    const double low = sum[0] / count[0], high = sum[1] / count[1];
-    if (!(std::abs(high - low) > 0) || !std::isfinite(high - low)) return false;
+    const auto means = MeansOfSides(
+        [&](double x, double y) { return (x * c + y * s) * (y * c - x * s) > 0 ? 1 : 0; });
+    if (!means) return false;
+    const double low = (*means)[0], high = (*means)[1];
+    if (!(std::abs(high - low) > 0)) return false;
     unit_ = std::abs(high - low) / 200;
     parameters_.segment<6>(kMean).setZero();
     parameters_[kMean] = (high + low) / 2 / unit_;
@@ -182,33 +160,14 @@ class Fit {
     return true;
   }
 
-  double Solve() {
-    ceres::TinySolver<CornerModel> solver;
-    solver.options.max_num_iterations = 30;
-    solver.options.function_tolerance = 1e-3;  // of a cost where noise is about 1 a pixel
-    const CornerModel model(pixels_, strip_, unit_, psf_, floor_px_);
-    solver.Solve(model, &parameters_);
-    return solver.summary.final_cost;
-  }
-
   bool Seed() {
     if (!Gather(std::numeric_limits<double>::infinity(), false)) return false;
-    const Parameters levels = parameters_;
-    Parameters best = levels;
-    double best_cost = std::numeric_limits<double>::infinity();
-    for (const double sigma_px : {2.0, 0.7, 7.0}) {
-      if (sigma_px > 1 && sigma_px > feature_.half_width_px / 2) continue;
-      parameters_ = levels;
-      parameters_[kVariance] = parameters_[kSecondVariance] = sigma_px * sigma_px;
-      const double cost = Solve();
-      if (!(cost < best_cost) || !IsPlausible()) continue;
-      best_cost = cost;
-      best = parameters_;
-      // Within 3 % of the contrast there is no other valley.
-      if (std::sqrt(2 * cost / static_cast<double>(pixels_.size())) < 6) break;
-    }
-    parameters_ = best;
-    return std::isfinite(best_cost);
+    return SolveFromSeveral(
+        feature_.half_width_px,
+        [this](double variance_px2) {
+          parameters_[kVariance] = parameters_[kSecondVariance] = variance_px2;
+        },
+        [this] { return IsPlausible(); });
   }
 
   bool IsPlausible() const {
@@ -221,25 +180,17 @@ class Fit {
   }
 
   std::optional<EdgeSpreadFit> Result() const {
-    const CornerModel model(pixels_, strip_, unit_, psf_, floor_px_);
-    const auto n = static_cast<Eigen::Index>(pixels_.size());
-    Eigen::VectorXd residual(n);
-    Eigen::MatrixXd jacobian(n, static_cast<Eigen::Index>(kParameters));
-    model(parameters_.data(), residual.data(), jacobian.data());
+    const Ending end = AtTheEnd();
     std::vector<double> bright(pixels_.size());
     const double sign = parameters_[kHalf] > 0 ? 1 : -1;
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
       // The column of the half contrast is the pattern, -1 to 1.
-      bright[i] = (1 + sign * jacobian(static_cast<Eigen::Index>(i), kHalf)) / 2;
+      bright[i] = (1 + sign * end.jacobian(static_cast<Eigen::Index>(i), kHalf)) / 2;
     }
-    const FitQuality quality = JudgeFit(pixels_, residual, bright, kParameters);
-    if (!IsStep(quality, 2 * std::abs(parameters_[kHalf]))) return std::nullopt;
-    const Eigen::MatrixXd covariance = FitCovariance(jacobian, residual, quality.clumping);
-    if (covariance.size() == 0) return std::nullopt;
-    const auto blur_of = [&](int parameter) {
-      return SigmaWithError(parameters_[parameter], std::sqrt(covariance(parameter, parameter)));
-    };
-    BlurSigma first = blur_of(kVariance), second = blur_of(kSecondVariance);
+    const auto judgement = Judge(end, bright, 2 * std::abs(parameters_[kHalf]));
+    if (!judgement) return std::nullopt;
+    BlurSigma first = BlurOf(kVariance, judgement->covariance);
+    BlurSigma second = BlurOf(kSecondVariance, judgement->covariance);
     if (!IsDetermined(first) || !IsDetermined(second)) return std::nullopt;
 
     EdgeSpreadFit fit;
@@ -255,25 +206,16 @@ class Fit {
     fit.feature.angle_rad = std::remainder(angle1, CV_PI);
     fit.across_x = first;
     fit.across_y = second;
-    fit.chi2_per_dof = quality.chi2_per_dof;
+    fit.chi2_per_dof = judgement->quality.chi2_per_dof;
     return fit;
   }
-
-  const cv::Mat& grey_;
-  EdgeFeature feature_;
-  model::Psf psf_;
-  double floor_px_;
-  Strip strip_;
-  FeaturePixels pixels_;
-  double unit_ = 1;
-  Parameters parameters_;
 };
 
 }  // namespace
 
 std::optional<EdgeSpreadFit> FitCorner(const cv::Mat& grey, const EdgeFeature& feature,
                                        model::Psf psf, double floor_px) {
-  return Fit(grey, feature, psf, floor_px).Run();
+  return CornerFit(grey, feature, psf, floor_px).Run();
 }
 
 }  // namespace thicklens::calib

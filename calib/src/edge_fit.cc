@@ -1,13 +1,10 @@
-#include <ceres/tiny_solver.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 
 #include "edge_profile.h"
 #include "step_fit.h"
+#include "step_search.h"
 
 namespace thicklens::calib {
 namespace {
@@ -18,8 +15,6 @@ constexpr int kMostPixels = 16000;
 // A sag beyond this part of the edge's length is a curve, not an edge bent by distortion.
 constexpr double kLargestSag = 0.02;
 
-// Level planes count in units of the contrast's 200th part, so that the solver's absolute
-// tolerances mean the same for every frame.
 enum Parameter {
   kShift,
   kTurn,
@@ -29,31 +24,21 @@ enum Parameter {
   kRise = kDark + 3,
   kParameters = kRise + 3
 };
-using Parameters = Eigen::Matrix<double, kParameters, 1>;
 
 // The grey of the pixels of a strip (derived here):
 //   I = D + C E(d), d = x cos a + y sin a - shift - sag (t^2/T^2 - 1/3),
 // D (dark) and C (bright less dark) planes in x and y, t along the edge, T half its length, E the
 // profile for the direction a and the blur's variance.
-class EdgeModel {
+class EdgeModel : public StepModel<kParameters> {
  public:
-  using Scalar = double;
-  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = kParameters };
-
-  EdgeModel(const FeaturePixels& pixels, const Strip& strip, double unit, model::Psf psf,
-            double floor_px)
-      : pixels_(pixels), strip_(strip), unit_(unit), psf_(psf), floor_px_(floor_px) {}
-
-  int NumResiduals() const { return static_cast<int>(pixels_.size()); }
+  using StepModel::StepModel;
 
   bool operator()(const double* p, double* residuals, double* jacobian) const {
     const double angle = strip_.normal_rad + p[kTurn];
     const double c = std::cos(angle), s = std::sin(angle);
-    const double widest_px2 = 4 * strip_.half_width_px * strip_.half_width_px;
-    const EdgeProfile profile(psf_, std::min(p[kVariance], widest_px2), floor_px_, angle);
+    const EdgeProfile profile(psf_, std::min(p[kVariance], LargestVariance()), floor_px_, angle);
     const auto n = static_cast<Eigen::Index>(pixels_.size());
-    Eigen::Map<Eigen::MatrixXd> j(jacobian, jacobian != nullptr ? n : 0,
-                                  jacobian != nullptr ? static_cast<Eigen::Index>(kParameters) : 0);
+    Eigen::Map<Eigen::MatrixXd> j = AsMatrix(jacobian);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto pixel = static_cast<std::size_t>(i);
       const double x = pixels_.x_px[pixel], y = pixels_.y_px[pixel];
@@ -97,19 +82,12 @@ class EdgeModel {
     return t * t - 1.0 / 3;
   }
   double PlaneScale() const { return 1 / std::max(strip_.half_width_px, strip_.half_length_px); }
-
-  const FeaturePixels& pixels_;
-  Strip strip_;
-  double unit_;
-  model::Psf psf_;
-  double floor_px_;
 };
 
 // One fit after the other, each in a strip that suits what the one before has found.
-class Fit {
+class EdgeFit : StepSearch<EdgeModel> {
  public:
-  Fit(const cv::Mat& grey, const EdgeFeature& feature, model::Psf psf, double floor_px)
-      : grey_(grey), feature_(feature), psf_(psf), floor_px_(floor_px) {}
+  using StepSearch::StepSearch;
 
   std::optional<EdgeSpreadFit> Run(bool want_profile) {
     if (!EndsAreInside() || !Seed()) return std::nullopt;
@@ -154,18 +132,14 @@ class Fit {
 
   // The means of the two sides, and whether they differ and are numbers at all.
   bool StartLevels() {
-    double sum[2] = {0, 0}, count[2] = {0, 0};
     const double c = std::cos(strip_.normal_rad), s = std::sin(strip_.normal_rad);
-    for (std::size_t i = 0; i < pixels_.size(); ++i) {
-      const double d = pixels_.x_px[i] * c + pixels_.y_px[i] * s;
-      if (std::abs(d) < strip_.half_width_px / 2) continue;
-      const int side = d > 0 ? 1 : 0;
-      sum[side] += pixels_.grey[i];
-      ++count[side];
-    }
-    if (!(count[0] > 0 && count[1] > 0)) return false;
-    const double dark = sum[0] / count[0], rise = sum[1] / count[1] - dark;
-    if (!(rise > 0) || !std::isfinite(rise)) return false;
+    const auto means = MeansOfSides([&](double x, double y) {
+      const double d = x * c + y * s;
+      return std::abs(d) < strip_.half_width_px / 2 ? -1 : d > 0 ? 1 : 0;
+    });
+    if (!means) return false;
+    const double dark = (*means)[0], rise = (*means)[1] - dark;
+    if (!(rise > 0)) return false;
     unit_ = rise / 200;
     parameters_.segment<6>(kDark).setZero();
     parameters_[kDark] = dark / unit_;
@@ -173,36 +147,13 @@ class Fit {
     return true;
   }
 
-  double Solve() {
-    ceres::TinySolver<EdgeModel> solver;
-    solver.options.max_num_iterations = 30;
-    solver.options.function_tolerance = 1e-3;  // of a cost where noise is about 1 a pixel
-    const EdgeModel model(pixels_, strip_, unit_, psf_, floor_px_);
-    solver.Solve(model, &parameters_);
-    return solver.summary.final_cost;
-  }
-
-  // From several blurs, because a start that is far too sharp sees no slope of its cost.
   bool Seed() {
     parameters_.setZero();
     const double width_px = std::min(feature_.half_width_px, 48.0);
     if (!Gather(width_px, kSeedPixels)) return false;
-    const Parameters levels = parameters_;
-    Parameters best = levels;
-    double best_cost = std::numeric_limits<double>::infinity();
-    for (const double sigma_px : {2.0, 0.7, 7.0}) {
-      if (sigma_px > 1 && sigma_px > width_px / 2) continue;
-      parameters_ = levels;
-      parameters_[kVariance] = sigma_px * sigma_px;
-      const double cost = Solve();
-      if (!(cost < best_cost) || !IsPlausible()) continue;
-      best_cost = cost;
-      best = parameters_;
-      // Within 3 % of the contrast there is no other valley.
-      if (std::sqrt(2 * cost / static_cast<double>(pixels_.size())) < 6) break;
-    }
-    parameters_ = best;
-    return std::isfinite(best_cost);
+    return SolveFromSeveral(
+        width_px, [this](double variance_px2) { parameters_[kVariance] = variance_px2; },
+        [this] { return IsPlausible(); });
   }
 
   bool IsPlausible() const {
@@ -214,11 +165,8 @@ class Fit {
   }
 
   std::optional<EdgeSpreadFit> Result(bool want_profile) const {
-    const EdgeModel model(pixels_, strip_, unit_, psf_, floor_px_);
-    const auto n = static_cast<Eigen::Index>(pixels_.size());
-    Eigen::VectorXd residual(n);
-    Eigen::MatrixXd jacobian(n, static_cast<Eigen::Index>(kParameters));
-    model(parameters_.data(), residual.data(), jacobian.data());
+    const Ending end = AtTheEnd();
+    const EdgeModel model = ModelOfPixels();
     const EdgeProfile profile(psf_, parameters_[kVariance], floor_px_,
                               strip_.normal_rad + parameters_[kTurn]);
     std::vector<double> bright(pixels_.size());
@@ -227,12 +175,9 @@ class Fit {
       points[i] = model.Normalised(parameters_.data(), i);
       bright[i] = profile.At(points[i].x()).level;
     }
-    const FitQuality quality = JudgeFit(pixels_, residual, bright, kParameters);
-    if (!IsStep(quality, parameters_[kRise])) return std::nullopt;
-    const Eigen::MatrixXd covariance = FitCovariance(jacobian, residual, quality.clumping);
-    if (covariance.size() == 0) return std::nullopt;
-    const BlurSigma blur =
-        SigmaWithError(parameters_[kVariance], std::sqrt(covariance(kVariance, kVariance)));
+    const auto judgement = Judge(end, bright, parameters_[kRise]);
+    if (!judgement) return std::nullopt;
+    const BlurSigma blur = BlurOf(kVariance, judgement->covariance);
     if (!IsDetermined(blur)) return std::nullopt;
 
     EdgeSpreadFit fit;
@@ -243,7 +188,7 @@ class Fit {
                              Eigen::Vector2d(std::cos(angle), std::sin(angle));
     const bool is_across_x = std::abs(std::cos(angle)) >= std::abs(std::sin(angle));
     (is_across_x ? fit.across_x : fit.across_y) = blur;
-    fit.chi2_per_dof = quality.chi2_per_dof;
+    fit.chi2_per_dof = judgement->quality.chi2_per_dof;
     if (want_profile) FillProfile(points, profile, &fit);
     return fit;
   }
@@ -267,22 +212,13 @@ class Fit {
       fit->fitted.push_back(profile.At(sum.x() / sum.z()).level);
     }
   }
-
-  const cv::Mat& grey_;
-  EdgeFeature feature_;
-  model::Psf psf_;
-  double floor_px_;
-  Strip strip_;
-  FeaturePixels pixels_;
-  double unit_ = 1;
-  Parameters parameters_;
 };
 
 }  // namespace
 
 std::optional<EdgeSpreadFit> FitEdge(const cv::Mat& grey, const EdgeFeature& feature,
                                      model::Psf psf, double floor_px, bool want_profile) {
-  return Fit(grey, feature, psf, floor_px).Run(want_profile);
+  return EdgeFit(grey, feature, psf, floor_px).Run(want_profile);
 }
 
 }  // namespace thicklens::calib
