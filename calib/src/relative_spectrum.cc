@@ -5,19 +5,14 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
 
-#include "thicklens/model/blur_transfer.h"
-#include "thicklens/model/parallel.h"
+#include "spectral_transfer.h"
 
 namespace thicklens::calib {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
-constexpr int kRings = 24;
-constexpr int kLeakageNodes = 12;
-constexpr double kLeakageBand = 4;  // H below exp(-4): no frame uses such a mode
 constexpr int kMostSteps = 30;
 // By how much neighbouring modes, which share a sixth of their noise and of the texture's amplitude
 // (the transform of the squared Hann window), widen the variances of independent ones: (1 +
@@ -25,39 +20,6 @@ constexpr int kMostSteps = 30;
 constexpr double kSharedNoise = 1.114;
 // N is the noise of a complex value; the derivatives see its real part alone.
 constexpr double kRealPart = 0.5;
-
-// A disc's transfer function of v = (R/2)^2, its variance per axis, and d ln/dv. Analytic through
-// v = 0, so that noise may push v below.
-//   D = 2 J1(x)/x, x = 4 pi nu sqrt(v); dD/dv = -(J2(x)/x) 4 pi nu/sqrt(v).
-struct ValueAndSlope {
-  double value = 1, log_slope = 0;
-};
-
-ValueAndSlope Disc(double v, double nu) {
-  const double x2 = 16 * kPi * kPi * nu * nu * v;
-  const double dx2 = 16 * kPi * kPi * nu * nu;
-  if (x2 < 1) {
-    const double value = 1 + x2 * (-1.0 / 8 + x2 * (1.0 / 192 - x2 / 9216));
-    const double slope = -1.0 / 8 + x2 * (1.0 / 96 - x2 / 3072);
-    if (x2 < -20) return {std::exp(-x2 / 8), -dx2 / 8};
-    return {value, slope * dx2 / value};
-  }
-  const double x = std::sqrt(x2);
-  const double value = 2 * ::j1(x) / x;
-  const double slope = -::jn(2, x) / x2;  // dD/d(x^2)
-  return {value, slope * dx2 / value};
-}
-
-ValueAndSlope Transfer(const RelativeBlurOptions& options, double variance_px2, double scale,
-                       double nu) {
-  if (options.psf == model::Psf::kGaussian) {
-    return {std::exp(-kTwoPiSquared * variance_px2 * nu * nu), -kTwoPiSquared * nu * nu};
-  }
-  const double floor = options.floor_variance_px2 / (scale * scale);
-  ValueAndSlope disc = Disc(variance_px2 - floor, nu);
-  disc.value *= std::exp(-kTwoPiSquared * floor * nu * nu);
-  return disc;
-}
 
 // Gauss-Newton with T projected out. Amplitudes (ln g, V) and shifts do not mix in the normal
 // equations: the derivatives of the ones are real multiples of the model, of the others imaginary.
@@ -162,7 +124,8 @@ class Fit {
     model->resize(Count(i));
     slope->resize(Count(i));
     for (Eigen::Index k = 0; k < Count(i); ++k) {
-      const ValueAndSlope h = Transfer(options_, state.variance[i], scale, std::sqrt(norm2_[k]));
+      const TransferAndSlope h = SpectralTransfer(options_.psf, options_.floor_variance_px2,
+                                                  state.variance[i], scale, std::sqrt(norm2_[k]));
       const double phase = -2 * kPi * nu_.col(k).dot(state.shift.col(i));
       (*model)[k] = std::polar(1.0, phase) * (gain * h.value);
       (*slope)[k] = h.log_slope;
@@ -237,7 +200,9 @@ class Fit {
     Eigen::MatrixXd damped = normal;
     damped.diagonal() *= 1 + damping;
     damped.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();
-    return damped.ldlt().solve(gradient);
+    const Eigen::LLT<Eigen::MatrixXd> factor(damped);
+    if (factor.info() == Eigen::Success) return factor.solve(gradient);
+    return damped.ldlt().solve(gradient);  // indefinite by rounding alone
   }
 
   State Moved(const Eigen::VectorXd& amplitude, const Eigen::Matrix2Xd& shifts) const {
@@ -333,16 +298,25 @@ class Fit {
     Eigen::VectorXd gradient;
     const Eigen::MatrixXd normal = AmplitudeNormal(Evaluate(state_), &gradient);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+    // The gains first: what is left of the factor for the variances is that of their own normal
+    // matrix with the gains eliminated.
+    std::vector<Eigen::Index> order;
+    for (const Eigen::Index first : {0, 1}) {
+      for (Eigen::Index k = first; k < size; k += 2) order.push_back(k);
+    }
+    Eigen::MatrixXd scaled = (scale.asDiagonal() * normal * scale.asDiagonal())(order, order);
     scaled.diagonal().array() += 1e-12;
-    const Eigen::LDLT<Eigen::MatrixXd> factor(scaled);
-    if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) {
+    const Eigen::LLT<Eigen::MatrixXd> factor(scaled);
+    if (factor.info() != Eigen::Success) {
       result_.message = "the spectra do not tell the blur of every frame";
       return false;
     }
-    const Eigen::MatrixXd inverse = scale.asDiagonal() *
-                                    factor.solve(Eigen::MatrixXd::Identity(size, size)) *
-                                    scale.asDiagonal();
+    Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(size / 2, size / 2);
+    Eigen::MatrixXd(factor.matrixLLT().bottomRightCorner(size / 2, size / 2))
+        .triangularView<Eigen::Lower>()
+        .solveInPlace(inverse_root);
+    for (Eigen::Index k = 0; k < size / 2; ++k) inverse_root.col(k) *= scale[2 * k + 1];
+    const Eigen::MatrixXd inverse = inverse_root.transpose() * inverse_root;
     std::vector<Eigen::Index> rows;
     for (Eigen::Index i = 0; i < n(); ++i) {
       if (i != static_cast<Eigen::Index>(reference_)) rows.push_back(i);
@@ -352,7 +326,7 @@ class Fit {
       for (std::size_t b = 0; b < rows.size(); ++b) {
         result_.covariance(rows[a], rows[b]) =
             kRealPart * kSharedNoise *
-            inverse(static_cast<Eigen::Index>(2 * a + 1), static_cast<Eigen::Index>(2 * b + 1));
+            inverse(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
       }
     }
     result_.variances_px2 = state_.variance;
@@ -391,171 +365,16 @@ class Fit {
   Evaluation last_;
   RelativeBlur result_;
 };
-
 }  // namespace
-
-WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
-                             const TargetWindow& window, const std::vector<Mode>& modes,
-                             const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px,
-                             int threads) {
-  if (!(largest_sigma_px > 0)) return;
-  step_px_ = largest_sigma_px / (kLeakageNodes - 1);
-  const int pad = static_cast<int>(std::ceil(4 * largest_sigma_px));
-  // Only what the window sees, and what the blur brings into it.
-  const cv::Rect part =
-      cv::Rect(
-          cv::Point(
-              static_cast<int>(origin_px.x() + window.centre_px.x() - 0.5 * window.size_px.x()) -
-                  pad - 1,
-              static_cast<int>(origin_px.y() + window.centre_px.y() - 0.5 * window.size_px.y()) -
-                  pad - 1),
-          cv::Size(static_cast<int>(window.size_px.x()) + 2 * pad + 3,
-                   static_cast<int>(window.size_px.y()) + 2 * pad + 3)) &
-      cv::Rect(cv::Point(0, 0), reference.size());
-  const Eigen::Vector2d part_origin_px = origin_px - Eigen::Vector2d(part.x, part.y);
-  const cv::Size size(cv::getOptimalDFTSize(part.width + 2 * pad),
-                      cv::getOptimalDFTSize(part.height + 2 * pad));
-  cv::Mat padded, transform;
-  // What lies beyond the part is not asked for: borders end in mirrors, not in other pixels.
-  cv::copyMakeBorder(reference(part), padded, pad, size.height - part.height - pad, pad,
-                     size.width - part.width - pad, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
-  cv::dft(padded, transform, cv::DFT_COMPLEX_OUTPUT);
-  nodes_.resize(kLeakageNodes);
-  nodes_[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
-  model::ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
-    const double sigma = step_px_ * (index + 1);
-    std::size_t count = 0;
-    while (count < modes.size() &&
-           kTwoPiSquared * sigma * sigma * ModeFrequency(modes[count], window).squaredNorm() <
-               kLeakageBand)
-      ++count;
-    cv::Mat blurred = transform.clone();
-    for (int v = 0; v < blurred.rows; ++v) {
-      const double fy =
-          static_cast<double>(v <= blurred.rows / 2 ? v : v - blurred.rows) / blurred.rows;
-      auto* row = blurred.ptr<cv::Vec2f>(v);
-      for (int u = 0; u < blurred.cols; ++u) {
-        const double fx =
-            static_cast<double>(u <= blurred.cols / 2 ? u : u - blurred.cols) / blurred.cols;
-        row[u] *= static_cast<float>(model::DefocusTransfer(psf, sigma, fx, fy));
-      }
-    }
-    cv::Mat picture;
-    cv::dft(blurred, picture, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-    const cv::Mat inner = picture(cv::Rect(pad, pad, part.width, part.height));
-    const auto seen = MeasureSpectrum(inner, part_origin_px, {}, window, modes, count);
-    Eigen::ArrayXcd& node = nodes_[static_cast<std::size_t>(index + 1)];
-    node = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(count));
-    if (!seen) return;
-    for (std::size_t k = 0; k < count; ++k) {
-      const Eigen::Vector2d nu = ModeFrequency(modes[k], window);
-      const auto i = static_cast<Eigen::Index>(k);
-      node[i] =
-          seen->values[i] - spectrum.values[i] * model::DefocusTransfer(psf, sigma, nu.x(), nu.y());
-    }
-  });
-}
-
-// Cubic interpolation between the nodes; even in sigma, so the nodes go on mirrored below 0.
-Eigen::ArrayXcd WindowLeakage::At(double variance_px2, std::size_t count) const {
-  const auto n = static_cast<Eigen::Index>(count);
-  Eigen::ArrayXcd result = Eigen::ArrayXcd::Zero(n);
-  if (nodes_.empty() || !(variance_px2 > 0)) return result;
-  const double place = std::min(std::sqrt(variance_px2) / step_px_, kLeakageNodes - 1.0);
-  const int first = std::min(static_cast<int>(place), kLeakageNodes - 3) - 1;
-  for (int a = first; a < first + 4; ++a) {
-    double weight = 1;
-    for (int b = first; b < first + 4; ++b) {
-      if (b != a) weight *= (place - b) / (a - b);
-    }
-    const Eigen::ArrayXcd& node = nodes_[static_cast<std::size_t>(std::abs(a))];
-    const Eigen::Index c = std::min<Eigen::Index>(n, node.size());
-    result.head(c) += weight * node.head(c);
-  }
-  return result;
-}
-
-WindowLeakage WindowLeakage::Of(const std::vector<Eigen::Index>& modes) const {
-  WindowLeakage part;
-  part.step_px_ = step_px_;
-  for (const Eigen::ArrayXcd& node : nodes_) {
-    std::vector<Eigen::Index> present;
-    for (const Eigen::Index k : modes) {
-      if (k < node.size()) present.push_back(k);
-    }
-    part.nodes_.emplace_back(node(present));
-  }
-  return part;
-}
 
 RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
                              const TargetWindow& window, const std::vector<Mode>& modes,
                              const WindowLeakage& leakage, const RelativeBlurOptions& options) {
   return Fit(samples, reference, window, modes, leakage, options).Run();
 }
-
 double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,
                     double nu) {
-  return Transfer(options, variance_px2, scale, nu).value;
-}
-
-std::vector<TransferRing> MeasuredTransfer(const SpectrumSample& sample, const RelativeBlur& fit,
-                                           std::size_t index, double reference_variance_px2,
-                                           const TargetWindow& window,
-                                           const std::vector<Mode>& modes,
-                                           const WindowLeakage& leakage) {
-  constexpr int kPlottedRings = 16;
-  const auto i = static_cast<Eigen::Index>(index);
-  const auto count = std::min<Eigen::Index>(fit.modes_used[index], fit.texture.size());
-  const Eigen::ArrayXcd data =
-      sample.spectrum.values.head(count) -
-      leakage.At(fit.variances_px2[i] - reference_variance_px2, static_cast<std::size_t>(count));
-  std::vector<TransferRing> rings;
-  Eigen::Index k = 0;
-  for (int ring = 1; ring <= kPlottedRings; ++ring) {
-    const Eigen::Index end = count * ring / kPlottedRings;
-    double product = 0, power = 0, nu_sum = 0;
-    const Eigen::Index first = k;
-    for (; k < end; ++k) {
-      const Eigen::Vector2d nu = ModeFrequency(modes[static_cast<std::size_t>(k)], window);
-      const double phase = 2 * kPi * nu.dot(fit.shifts_px.col(i));
-      product += (data[k] * std::conj(fit.texture[k]) * std::polar(1.0, phase)).real();
-      power += std::norm(fit.texture[k]);
-      nu_sum += nu.norm();
-    }
-    if (k == first || !(power > 0)) continue;
-    rings.push_back({nu_sum / static_cast<double>(k - first), product / (power * fit.gains[i])});
-  }
-  return rings;
-}
-
-std::vector<Mode> StrongestModes(const std::vector<Mode>& modes, const Eigen::ArrayXd& power,
-                                 const TargetWindow& window, double least_power,
-                                 int most_per_ring) {
-  if (modes.empty()) return {};
-  const double first = std::log(ModeFrequency(modes.front(), window).norm());
-  const double last = std::log(ModeFrequency(modes.back(), window).norm());
-  std::vector<std::vector<std::size_t>> rings(kRings);
-  for (std::size_t k = 0; k < modes.size(); ++k) {
-    if (!(power[static_cast<Eigen::Index>(k)] > least_power)) continue;
-    const double part =
-        (std::log(ModeFrequency(modes[k], window).norm()) - first) / std::max(last - first, 1e-9);
-    rings[static_cast<std::size_t>(std::clamp(part * kRings, 0.0, kRings - 1.0))].push_back(k);
-  }
-  std::vector<std::size_t> kept;
-  for (std::vector<std::size_t>& ring : rings) {
-    std::stable_sort(ring.begin(), ring.end(), [&](std::size_t a, std::size_t b) {
-      return power[static_cast<Eigen::Index>(a)] > power[static_cast<Eigen::Index>(b)];
-    });
-    if (ring.size() > static_cast<std::size_t>(most_per_ring))
-      ring.resize(static_cast<std::size_t>(most_per_ring));
-    kept.insert(kept.end(), ring.begin(), ring.end());
-  }
-  std::sort(kept.begin(), kept.end());
-  std::vector<Mode> strongest;
-  strongest.reserve(kept.size());
-  for (const std::size_t k : kept) strongest.push_back(modes[k]);
-  return strongest;
+  return SpectralTransfer(options.psf, options.floor_variance_px2, variance_px2, scale, nu).value;
 }
 
 }  // namespace thicklens::calib

@@ -2,13 +2,12 @@
 #define THICKLENS_CALIB_SRC_RELATIVE_SPECTRUM_H_
 
 #include <Eigen/Core>
-#include <functional>
-#include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
 
 #include "frame_spectrum.h"
 #include "thicklens/model/camera.h"
+#include "window_leakage.h"
 
 namespace thicklens::calib {
 
@@ -21,29 +20,6 @@ namespace thicklens::calib {
 // V_i, px^2 of the target: blur variance over scale^2, without the pixel box. T takes up any common
 // blur: V is known up to a constant (Gaussian; a disc's shape would fix it, but the reference's is
 // held there too).
-
-// What the window's edge does to a blurred picture: the spectrum of the blurred picture seen
-// through the window minus the blurred spectrum of the picture seen through it, from the reference
-// frame (sharp, so it stands for the target), as a function of the added blur.
-class WindowLeakage {
- public:
-  WindowLeakage() = default;
-  // `largest_sigma_px`: how far the table reaches. `spectrum` is that of the reference.
-  WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& origin_px,
-                const TargetWindow& window, const std::vector<Mode>& modes,
-                const FrameSpectrum& spectrum, model::Psf psf, double largest_sigma_px,
-                int threads);
-
-  // At the first `count` modes for a blur of `variance_px2` beyond the reference's; 0 for none.
-  Eigen::ArrayXcd At(double variance_px2, std::size_t count) const;
-
-  // The table of some of the modes alone, given by their indices in rising order.
-  WindowLeakage Of(const std::vector<Eigen::Index>& modes) const;
-
- private:
-  double step_px_ = 0;                  // of sigma, between the nodes
-  std::vector<Eigen::ArrayXcd> nodes_;  // may hold fewer modes at strong blur: the rest is 0
-};
 
 struct SpectrumSample {
   double scale = 1;
