@@ -79,10 +79,11 @@ struct BlurFitResult {
 double DefocusVariance(const BlurFitSetup& setup, double focus_depth_mm, double depth_mm);
 
 // Fits (zf, kappa, S0, the targets' c, every reading's error, the scale's law) by Ceres to the
-// blur, the readings and the scales at once. Frames that lie beyond four of their standard
-// deviations lose weight (Huber). Covariance by SVD of the weighted Jacobian; times chi^2 per
-// degree of freedom where that is larger than chance makes it (99 %), or always where nobody knows
-// the readings' error. `start` saves the search for a start.
+// blur, the readings and the scales at once; the readings' errors are eliminated (variable
+// projection). Frames that lie beyond four of their standard deviations lose weight (Huber).
+// Covariance by SVD of the weighted Jacobian of what is left; times chi^2 per degree of freedom
+// where that is larger than chance makes it (99 %), or always where nobody knows the readings'
+// error. `start` saves the search for a start.
 BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start = nullptr);
 
 // A robust parabola V(z) through the samples of a meter, which any target follows whatever c is
@@ -95,7 +96,8 @@ struct Parabola {
   Eigen::VectorXd residuals_px2, sigmas_px2;
   double vertex_mm = 0;
   double At(double depth_mm) const;
-  double Slope(double depth_mm) const;  // px^2 per mm
+  // Where it has a value: the nearer depth to `near_mm` first; nothing below its vertex.
+  std::vector<double> DepthsOf(double variance_px2, double near_mm) const;
 };
 Parabola FitParabola(const Eigen::VectorXd& depths_mm, const Eigen::VectorXd& variances_px2,
                      const Eigen::VectorXd& errors_px2, double reading_sigma_mm);
