@@ -1,5 +1,6 @@
 #include "coarse_registration.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -13,7 +14,6 @@ namespace {
 
 constexpr int kCoarseSizePx = 160;
 constexpr int kSmallestFieldPx = 24;  // of shrunk pictures
-constexpr double kLeastScaleInformation = 0.05;
 constexpr int kPadding = 2;
 constexpr int kIterations = 40;
 constexpr double kPrecision = 1e-4;      // of the correlation
@@ -70,10 +70,9 @@ cv::Point2d ShiftByPhase(const cv::Mat& reference, const cv::Mat& frame) {
   return best;
 }
 
-// How much of a change of scale shows in the picture: 1 where gradients point everywhere, 0 where a
-// change of scale looks like a shift and a turn, or like nothing: a lone edge, a star of spokes.
-// The information on the scale beside shift and rotation, over half the sum of |gradient|^2 |p|^2.
-double ScaleInformation(const cv::Mat& picture) {
+// The information on the scale beside shift and rotation, over half the sum of |gradient|^2 |p|^2;
+// and the gradients' own tensor.
+PictureInformation InformationOfShrunk(const cv::Mat& picture) {
   const Gradient gradient = CentralGradient(Smoothed(picture, 1));
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
   double most = 0;
@@ -89,10 +88,13 @@ double ScaleInformation(const cv::Mat& picture) {
       most += 0.5 * (gx * gx + gy * gy) * (px * px + py * py);
     }
   }
-  if (!(most > 0)) return 0;
+  if (!(most > 0)) return {};
   const Eigen::Matrix3d other = normal.bottomRightCorner<3, 3>();
   const Eigen::Vector3d common = normal.bottomLeftCorner<3, 1>();
-  return (normal(0, 0) - common.dot(other.fullPivLu().solve(common))) / most;
+  const Eigen::Vector2d shift =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(normal.block<2, 2>(1, 1)).eigenvalues();
+  return {(normal(0, 0) - common.dot(other.fullPivLu().solve(common))) / most,
+          std::max(0.0, shift[0]) / shift[1]};
 }
 
 cv::Rect Inside(const cv::Rect2d& field, int factor) {
@@ -102,6 +104,34 @@ cv::Rect Inside(const cv::Rect2d& field, int factor) {
   const int right = static_cast<int>(std::floor((field.x + field.width + 0.5) / factor));
   const int bottom = static_cast<int>(std::floor((field.y + field.height + 0.5) / factor));
   return {left, top, std::max(0, right - left), std::max(0, bottom - top)};
+}
+
+// Both pictures shrunk, one brought to the other's geometry by the scale and the centre alone.
+struct Start {
+  FrameMap map;
+  int factor = 1;
+  cv::Mat small;     // the frame, shrunk
+  cv::Rect region;   // of it, what both show
+  cv::Mat expected;  // the reference there
+};
+
+int CoarseFactor(double field_px) {
+  return std::max(1, static_cast<int>(std::ceil(field_px / kCoarseSizePx)));
+}
+
+std::optional<Start> StartFrom(const cv::Mat& reference, const cv::Mat& frame, double scale,
+                               cv::Point2d centre) {
+  Start start;
+  start.map.linear *= scale;
+  start.map.centre = Eigen::Vector2d(centre.x, centre.y);
+  start.map.offset = (1 - scale) * start.map.centre;
+  const cv::Rect2d field = SharedField(start.map, reference.size(), frame.size());
+  start.factor = CoarseFactor(std::max(field.width, field.height));
+  start.region = Inside(field, start.factor);
+  if (std::min(start.region.width, start.region.height) < kSmallestFieldPx) return std::nullopt;
+  start.small = Shrunk(frame, start.factor);
+  start.expected = InFrameGeometry(reference, start.map, start.factor, start.region);
+  return start;
 }
 
 }  // namespace
@@ -184,20 +214,28 @@ cv::Mat InFrameGeometry(const cv::Mat& reference, const FrameMap& map, int frame
   return out;
 }
 
+PictureInformation InformationOf(const cv::Mat& picture) {
+  return InformationOfShrunk(Shrunk(picture, CoarseFactor(std::max(picture.cols, picture.rows))));
+}
+
+std::optional<FrameMap> ShiftCoarsely(const cv::Mat& reference, const cv::Mat& frame, double scale,
+                                      cv::Point2d centre) {
+  const std::optional<Start> start = StartFrom(reference, frame, scale, centre);
+  if (!start) return std::nullopt;
+  const cv::Point2d shift = ShiftByPhase(start->expected, start->small(start->region));
+  FrameMap map = start->map;
+  map.offset += start->factor * Eigen::Vector2d(shift.x, shift.y);
+  return map;
+}
+
 std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat& frame,
                                          double expected_scale, cv::Point2d centre) {
-  FrameMap start;
-  start.linear *= expected_scale;
-  start.centre = Eigen::Vector2d(centre.x, centre.y);
-  start.offset = (1 - expected_scale) * Eigen::Vector2d(centre.x, centre.y);
-  const cv::Rect2d field = SharedField(start, reference.size(), frame.size());
-  const int factor =
-      std::max(1, static_cast<int>(std::ceil(std::max(field.width, field.height) / kCoarseSizePx)));
-  const cv::Rect region = Inside(field, factor);
-  if (std::min(region.width, region.height) < kSmallestFieldPx) return std::nullopt;
-  const cv::Mat small = Shrunk(frame, factor);
-  const cv::Mat expected = InFrameGeometry(reference, start, factor, region);
-  if (!(ScaleInformation(expected) > kLeastScaleInformation)) return std::nullopt;
+  const std::optional<Start> start = StartFrom(reference, frame, expected_scale, centre);
+  if (!start || !(InformationOfShrunk(start->expected).scale > kLeastScaleInformation))
+    return std::nullopt;
+  const cv::Mat& small = start->small;
+  const cv::Mat& expected = start->expected;
+  const cv::Rect region = start->region;
   const cv::Point2d shift = ShiftByPhase(expected, small(region));
   // ECC takes what lies outside a picture for black, and mixes it into the outermost pixels.
   cv::Mat padded,
@@ -226,10 +264,10 @@ std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat
   offset -= linear * Eigen::Vector2d(region.x, region.y) + Eigen::Vector2d(kPadding, kPadding);
   // Shrunk pixel w stands at full f (w + 1/2) - 1/2.
   const Eigen::Vector2d half(0.5, 0.5);
-  offset = factor * (offset + half - linear * half) - half + linear * half;
-  FrameMap map = start;
-  map.linear = linear * start.linear;
-  map.offset = linear * start.offset + offset;
+  offset = start->factor * (offset + half - linear * half) - half + linear * half;
+  FrameMap map = start->map;
+  map.linear = linear * start->map.linear;
+  map.offset = linear * start->map.offset + offset;
   if (!(map.linear.determinant() > 0)) return std::nullopt;
   return map;
 }

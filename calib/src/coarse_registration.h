@@ -30,9 +30,28 @@ cv::Mat Shrunk(const cv::Mat& picture, int factor);
 cv::Mat InFrameGeometry(const cv::Mat& reference, const FrameMap& map, int frame_factor,
                         cv::Rect region);
 
-// Started from a scale about `centre`, a shift by phase correlation (of several that a periodic
-// target allows the smallest), then ECC on pictures shrunk to at most 160 px. Nothing if that does
-// not converge.
+// What a picture, shrunk as for RegisterCoarsely, would show of where it lies, each 1 where
+// gradients point everywhere alike.
+struct PictureInformation {
+  // Of a change of scale beside a shift and a turn: 0 where it looks like these, or like nothing (a
+  // lone edge or corner, a star of spokes).
+  double scale = 0;
+  // Of the shift along the direction in which it shows worst, over the best: 0 for a lone edge.
+  double worst_shift = 0;
+};
+PictureInformation InformationOf(const cv::Mat& picture);
+
+// Below, a registration could not tell the scale.
+constexpr double kLeastScaleInformation = 0.05;
+
+// The frame shows the reference at `scale` about `centre` and shifted: by phase correlation of
+// shrunk pictures, of several shifts that a periodic target allows the smallest. Good to a shrunk
+// pixel. Nothing if too little of the field is shared.
+std::optional<FrameMap> ShiftCoarsely(const cv::Mat& reference, const cv::Mat& frame, double scale,
+                                      cv::Point2d centre);
+
+// Started from a scale about `centre`, a shift by phase correlation as ShiftCoarsely, then ECC on
+// pictures shrunk to at most 160 px. Nothing if that does not converge.
 std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat& frame,
                                          double expected_scale, cv::Point2d centre);
 

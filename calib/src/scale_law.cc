@@ -359,6 +359,15 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
                      double corner_radius_px) {
   ScaleLaw result;
   result.reference_frame = reference_frame;
+  if (std::any_of(samples.begin(), samples.end(),
+                  [](const ScaleSample& s) { return s.scale_is_from_reading; })) {
+    result.message =
+        "the target looks the same at every scale (spokes from one point), so that its image "
+        "scale tells nothing";
+    // Without an offset no frame has a depth to take a scale from.
+    if (samples.size() < 2) result.message += ": state offset_mm, or use a texture";
+    return result;
+  }
   std::set<double> readings;
   for (const ScaleSample& s : samples) readings.insert(s.reading_mm);
   if (readings.size() < kFewestSamples) {

@@ -6,6 +6,7 @@
 #include "edge_pixels.h"
 #include "radial_distortion.h"
 #include "registration.h"
+#include "shift_registration.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::calib {
@@ -95,6 +96,39 @@ void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& re
   }
 }
 
+// The scales are the readings', as they stand; the shifts are measured. The reference alone where
+// the depths are not known.
+std::vector<ScaleSample> TrackShifts(const FocusSweep& sweep,
+                                     const std::function<cv::Mat(std::size_t)>& read_grey,
+                                     const std::vector<std::size_t>& frames, std::size_t reference,
+                                     std::optional<double> known_offset_mm, int threads,
+                                     const std::function<void()>& tick) {
+  const auto depth_mm = [&](std::size_t frame) {  // without an offset no frame has one
+    return known_offset_mm.value_or(-1e300) +
+           model::DirectionSign(sweep.direction) * sweep.frames[frame].reading_mm;
+  };
+  const cv::Mat reference_grey = read_grey(reference);
+  std::vector<std::optional<Registration>> found(frames.size());
+  model::ParallelFor(static_cast<int>(frames.size()), threads, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    if (frames[index] == reference) return;
+    const double scale = depth_mm(reference) / depth_mm(frames[index]);
+    if (depth_mm(reference) > 0 && scale >= kSmallestScale && scale <= kLargestScale) {
+      found[index] =
+          RegisterShift(reference_grey, read_grey(frames[index]), scale, RegionCentre(sweep));
+    }
+    tick();
+  });
+  std::vector<ScaleSample> samples = {
+      {reference, sweep.frames[reference].reading_mm, 1.0, {}, true}};
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!found[i]) continue;
+    samples.push_back(
+        {frames[i], sweep.frames[frames[i]].reading_mm, found[i]->scale, *found[i], true});
+  }
+  return samples;
+}
+
 }  // namespace
 
 cv::Point2d RegionCentre(const FocusSweep& sweep) {
@@ -116,6 +150,8 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
                                     std::optional<double> known_offset_mm, int threads,
                                     const std::function<void()>& tick) {
   const cv::Mat reference_grey = read_grey(reference);
+  if (sweep.target != model::SweepTarget::kKnifeEdge && ShowsShiftAlone(reference_grey))
+    return TrackShifts(sweep, read_grey, frames, reference, known_offset_mm, threads, tick);
   const cv::Point2d centre = RegionCentre(sweep);
   const double reference_reading_mm = sweep.frames[reference].reading_mm;
   std::vector<std::size_t> order;
@@ -128,7 +164,7 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return distance_mm(a) < distance_mm(b); });
 
-  std::vector<ScaleSample> samples = {{reference, reference_reading_mm, 1.0, {}}};
+  std::vector<ScaleSample> samples = {{reference, reference_reading_mm, 1.0, {}, false}};
   std::vector<FreeRegistration> registrations(1);
   ScalePrediction prediction(sweep, reference, known_offset_mm);
   std::size_t done = 0;
@@ -146,7 +182,7 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
       if (!found[i]) continue;
       const std::size_t frame = order[done + i];
       const Registration alone = found[i]->WithCubic(0, 0);
-      samples.push_back({frame, sweep.frames[frame].reading_mm, alone.scale, alone});
+      samples.push_back({frame, sweep.frames[frame].reading_mm, alone.scale, alone, false});
       registrations.push_back(*found[i]);
     }
     prediction.Learn(samples);

@@ -16,7 +16,9 @@ namespace thicklens::calib {
 // starts it off where the bench zero is given. `read_grey` gives the linear grey light of a frame
 // (CV_32F) and is called from several threads; `tick` is called once a frame. Radial distortion
 // that the frames show together is taken out of the scales, and what is not known of it goes into
-// their errors.
+// their errors. On a target that looks the same at every scale (ShowsShiftAlone; a knife edge is
+// left to the meter of edges) the scales are taken from the readings and only shifts are measured;
+// where no offset is known either, the reference is returned alone. Such samples say so.
 std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
                                     const std::function<cv::Mat(std::size_t)>& read_grey,
                                     const std::vector<std::size_t>& frames, std::size_t reference,

@@ -28,6 +28,17 @@ struct DisplacementField {
 std::optional<DisplacementField> FitDisplacement(const std::vector<TileShift>& shifts,
                                                  double weight_variance_px2);
 
+// displacement(p) = shift + turn (-p_y, p_x), p from the map's centre: of targets on which a change
+// of scale does not show.
+struct RigidDisplacement {
+  Eigen::Vector2d shift_px{0, 0};
+  double turn_rad = 0;
+  Eigen::Matrix2d shift_covariance_px2 = Eigen::Matrix2d::Zero();
+};
+
+// As FitDisplacement.
+std::optional<RigidDisplacement> FitRigid(const std::vector<TileShift>& shifts);
+
 }  // namespace thicklens::calib
 
 #endif  // THICKLENS_CALIB_SRC_TILE_MAP_H_

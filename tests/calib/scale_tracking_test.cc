@@ -18,6 +18,7 @@ namespace thicklens::calib {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using thicklens::testing::SimulatedSweep;
 using thicklens::testing::SweepCase;
 using thicklens::testing::View;
@@ -83,6 +84,60 @@ TEST(TrackScale, FindsTheScalesWithAndWithoutAnOffset) {
   }
 }
 
+// Spokes look the same at every scale: it is the readings', and only the shifts are measured.
+TEST(TrackScale, TakesAStarsScalesFromTheReadings) {
+  SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 15, 8);
+  s.sweep.offset_mm->value = 3;  // the scale is that of the stated depths, right or wrong
+  const auto samples = Track(s.sweep, Reader(s));
+  EXPECT_EQ(samples.size(), 15U);
+  for (const ScaleSample& sample : samples) {
+    EXPECT_TRUE(sample.scale_is_from_reading);
+    EXPECT_EQ(sample.registration.scale_sigma, 0);
+    EXPECT_NEAR(sample.scale,
+                (s.sweep.frames[7].reading_mm + 3) / (s.sweep.frames[sample.frame].reading_mm + 3),
+                1e-12);
+    EXPECT_EQ(sample.registration.scale, sample.scale);
+    EXPECT_LT(sample.registration.shift_px.norm(), 8);  // the bench drifts by 1 px a frame
+    EXPECT_NEAR(sample.registration.rotation_rad, 0, 1e-3);
+  }
+  const auto one = Track(s.sweep, Reader(s), 1);
+  ASSERT_EQ(one.size(), samples.size());
+  for (std::size_t i = 0; i < one.size(); ++i)
+    EXPECT_EQ(one[i].registration.shift_px, samples[i].registration.shift_px);
+  const ScaleLaw law = Fit(s.sweep, samples);
+  EXPECT_FALSE(law.done || law.contradicts_readings);
+  EXPECT_EQ(law.kind, ScaleKind::kUnknown);
+  EXPECT_THAT(law.message, HasSubstr("looks the same at every scale"));
+  EXPECT_THAT(law.message, Not(HasSubstr("state offset_mm")));
+}
+
+TEST(TrackScale, AStarWithoutAnOffsetSaysWhatToDo) {
+  SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 7, 8);
+  s.sweep.offset_mm.reset();
+  const auto samples = Track(s.sweep, Reader(s));
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].frame, 3U);
+  const ScaleLaw law = Fit(s.sweep, samples);
+  EXPECT_THAT(law.message, HasSubstr("looks the same at every scale"));
+  EXPECT_THAT(law.message, HasSubstr("state offset_mm, or use a texture"));
+}
+
+// Depths that cannot be: no scale, no sample.
+TEST(TrackScale, AStarsFramesAtNoDepthAreLeftOut) {
+  SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 7, 8);
+  s.sweep.frames[1].reading_mm = -5;
+  s.sweep.frames[5].reading_mm = 1e5;
+  EXPECT_EQ(Track(s.sweep, Reader(s)).size(), 5U);
+}
+
+// Whose edge the meter of edges measures: there is nothing to be gained by a shift.
+TEST(TrackScale, AKnifeEdgeIsNotGivenAScale) {
+  SimulatedSweep s = Sweep("iii", model::TargetKind::kSiemensStar, 7, 8);
+  s.sweep.target = model::SweepTarget::kKnifeEdge;
+  for (const ScaleSample& sample : Track(s.sweep, Reader(s)))
+    EXPECT_FALSE(sample.scale_is_from_reading);
+}
+
 TEST(TrackScale, ThreadsDoNotChangeABit) {
   const SimulatedSweep s = Sweep("iv", model::TargetKind::kDeadLeaves, 9, 2);
   const auto one = Track(s.sweep, Reader(s), 1);
@@ -101,6 +156,10 @@ TEST(TrackScale, TicksOnceAFrame) {
   int ticks = 0;
   TrackScale(s.sweep, Reader(s), {0, 2, 3, 6}, 3, std::nullopt, 1, [&ticks] { ++ticks; });
   EXPECT_EQ(ticks, 3);  // the reference has nothing to be registered to
+  ticks = 0;
+  const SimulatedSweep star = Sweep("iv", model::TargetKind::kSiemensStar, 7, 2);
+  TrackScale(star.sweep, Reader(star), {0, 2, 3, 6}, 3, 0.0, 1, [&ticks] { ++ticks; });
+  EXPECT_EQ(ticks, 3);
 }
 
 // A wrong reading starts a registration far off; its frame is registered all the same, so that the

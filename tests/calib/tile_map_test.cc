@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -122,6 +123,79 @@ TEST(FitDisplacement, RefusesWhatDoesNotFixTheMap) {
   auto column = tiles;
   for (TileShift& tile : column) tile.centre_px.x() = 20;
   EXPECT_FALSE(FitDisplacement(column, Moment()));
+}
+
+// Tiles that a shift and a turn moved, by the closed form of a rotation.
+std::vector<TileShift> TurnedTiles(const Eigen::Vector2d& shift_px, double turn_rad) {
+  auto tiles = Tiles(DisplacementField(), 0, 1);
+  for (TileShift& tile : tiles) {
+    const Eigen::Vector2d& p = tile.centre_px;
+    tile.shift_px =
+        shift_px + Eigen::Vector2d(-std::sin(turn_rad) * p.y(), std::sin(turn_rad) * p.x());
+  }
+  return tiles;
+}
+
+TEST(FitRigid, FindsShiftAndTurn) {
+  const Eigen::Vector2d shift_px(0.3, -0.2);
+  const auto found = FitRigid(TurnedTiles(shift_px, 2e-3));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR((found->shift_px - shift_px).norm(), 0, 1e-9);
+  EXPECT_NEAR(found->turn_rad, 2e-3, 1e-8);
+}
+
+// Of a star's tiles each tells the shift across its spokes alone; together they tell both.
+TEST(FitRigid, NeedsNoTileThatKnowsBothAxes) {
+  const Eigen::Vector2d shift_px(-0.1, 0.4);
+  auto tiles = TurnedTiles(shift_px, -1e-3);
+  for (TileShift& tile : tiles) {
+    const Eigen::Vector2d along = tile.centre_px.normalized();
+    const Eigen::Vector2d across(-along.y(), along.x());
+    tile.information = across * across.transpose() * 1e4;
+    tile.shift_px += 0.7 * along;  // what it does not know
+  }
+  const auto found = FitRigid(tiles);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR((found->shift_px - shift_px).norm(), 0, 1e-6);
+  EXPECT_NEAR(found->turn_rad, -1e-3, 1e-8);
+}
+
+TEST(FitRigid, WrongTilesLoseTheirWeight) {
+  auto tiles = TurnedTiles({0.2, 0.1}, 0);
+  tiles[3].shift_px.x() += 2;
+  tiles[10].shift_px.y() -= 1;
+  const auto found = FitRigid(tiles);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR((found->shift_px - Eigen::Vector2d(0.2, 0.1)).norm(), 0, 1e-3);
+}
+
+TEST(FitRigid, StatedErrorsCoverTheScatter) {
+  const auto exact = TurnedTiles({0.2, 0.1}, 1e-3);
+  constexpr int kRuns = 300;
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.02);
+  double square = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    auto tiles = exact;
+    for (TileShift& tile : tiles) {
+      tile.shift_px += Eigen::Vector2d(noise(random), noise(random));
+      tile.information = Eigen::Matrix2d::Identity() / (0.02 * 0.02);
+    }
+    const auto found = FitRigid(tiles);
+    ASSERT_TRUE(found);
+    const Eigen::Vector2d error = found->shift_px - Eigen::Vector2d(0.2, 0.1);
+    square += error.dot(found->shift_covariance_px2.inverse() * error) / (2 * kRuns);
+  }
+  EXPECT_LT(square, 0.8);  // as of FitDisplacement
+  EXPECT_GT(square, 0.35);
+}
+
+TEST(FitRigid, RefusesWhatDoesNotFixTheShift) {
+  auto tiles = TurnedTiles({0.2, 0.1}, 0);
+  EXPECT_FALSE(FitRigid({tiles.begin(), tiles.begin() + 5}));
+  for (TileShift& tile : tiles) tile.information(1, 1) = 0;  // all edges upright, in one row
+  for (TileShift& tile : tiles) tile.centre_px.x() = 0;
+  EXPECT_FALSE(FitRigid(tiles));
 }
 
 }  // namespace

@@ -42,6 +42,9 @@ struct ScaleSample {
   double reading_mm = 0;
   double scale = 0;           // relative to the reference frame
   Registration registration;  // where the scale comes from
+  // On a target that looks the same at every scale it was not measured: it is the depth of the
+  // reference over this frame's, from the readings and a stated offset. No law can be fitted to it.
+  bool scale_is_from_reading = false;
 };
 
 // Says by which law the scale goes with the readings (ScaleKind) and, where it is 1/z, fits
