@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 
+#include "blur_examples.h"
 #include "edge_pixels.h"
 #include "thicklens/calib/edge_spread.h"
 #include "thicklens/model/parallel.h"
@@ -15,15 +17,15 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestFrames = 5;
+constexpr int kFewestModesOfFrame = 16;
 constexpr double kUsualRatio = 0.45;  // kappa to start with
 constexpr double kUsualFloor = 0.25;  // S0 to start with, px^2
-constexpr double kGaussianBand = 2;
-constexpr double kDiscBand = 1;  // the first zero is at 1.84
 constexpr double kWholeField = 0.98;
 constexpr std::size_t kFramesForBound = 9;
 constexpr double kModesOfAll = 30000;  // per ring, times frames
 constexpr int kPasses = 3;
-constexpr double kExpectedWell = 1.3;  // a pass whose expectation was this good is the last
+// A pass is the last if no frame's blur was expected farther off than this part of the largest.
+constexpr double kExpectedWell = 0.3;
 
 double FloorToStartWith(const model::FloorKnowledge& floor) {
   if (floor.given_px) return floor.given_px->value * floor.given_px->value;
@@ -42,7 +44,7 @@ class Measurement {
     setup.direction = task.sweep.direction;
     setup.reading_sigma_mm = task.reading_sigma_mm;
     setup.reading_sigma_is_known = task.reading_sigma_is_known;
-    floor_px2_ = FloorToStartWith(task.sweep.floor);
+    evidence_.assumed_floor_px2 = FloorToStartWith(task.sweep.floor);
     focus_mm_ = task.start_focus_depth_mm;
     for (const std::size_t frame : task.frames) {
       evidence_.frames.push_back(frame);
@@ -95,7 +97,7 @@ class Measurement {
     const bool is_sharp = task_.sweep.target == model::SweepTarget::kKnifeEdge;
     const bool for_bound_alone = evidence_.spectrum >= 0 && !is_sharp;
     const model::Psf psf = task_.sweep.camera.psf;
-    const double floor_px = std::sqrt(floor_px2_);
+    const double floor_px = std::sqrt(evidence_.assumed_floor_px2);
     if (!MeasureEdgeSpread(task_.store.Grey(task_.reference), psf, floor_px)) return;
     std::vector<std::size_t> chosen(task_.frames.size());
     std::iota(chosen.begin(), chosen.end(), std::size_t{0});
@@ -134,8 +136,23 @@ class Measurement {
       return;
     }
     if (is_sharp) samples.held_softness_px2 = 0;
+    AddEdgeExamples(samples.frames);
     evidence_.edges = static_cast<int>(evidence_.setup.meters.size());
     evidence_.setup.meters.push_back(std::move(samples));
+  }
+
+  // The nearest, the sharpest and the farthest of the measured frames.
+  void AddEdgeExamples(const std::vector<std::size_t>& measured) {
+    const auto depth_mm = [this](std::size_t i) { return DepthMm(task_.frames[i]); };
+    const auto [nearest, farthest] = std::minmax_element(
+        measured.begin(), measured.end(),
+        [&](std::size_t a, std::size_t b) { return depth_mm(a) < depth_mm(b); });
+    for (const std::size_t frame :
+         {task_.frames[*nearest], task_.reference, task_.frames[*farthest]}) {
+      const auto example = EdgeExample(task_.store.Grey(frame), frame, task_.sweep.camera.psf,
+                                       std::sqrt(evidence_.assumed_floor_px2));
+      if (example) evidence_.examples.push_back(*example);
+    }
   }
 
   // ---- relative spectra ----
@@ -156,7 +173,11 @@ class Measurement {
         NoteNoSpectrum("the target shows too little texture above the noise");
         return;
       }
-      const RelativeBlur blur = Fit(task_.sweep.camera.psf, 1);
+      FittedRegion fitted =
+          FitRegion(std::move(region_),
+                    SpectralOptions(task_.sweep.camera.psf, evidence_.assumed_floor_px2, 1));
+      region_ = std::move(fitted.region);
+      const RelativeBlur& blur = fitted.blur;
       if (!blur.done) {
         NoteNoSpectrum(blur.message);
         return;
@@ -184,8 +205,8 @@ class Measurement {
     meter.modes_per_ring = std::clamp(
         static_cast<int>(kModesOfAll / static_cast<double>(task_.frames.size())), 24, 200);
     meter.tick = task_.tick;
-    meter.read_grey = [this](std::size_t frame) { return task_.store.Grey(frame); };
-    fit_index_.clear();
+    meter.read_grey = [&store = task_.store](std::size_t frame) { return store.Grey(frame); };
+    evidence_.fit_index.clear();
     for (std::size_t i = 0; i < task_.frames.size(); ++i) {
       const std::size_t frame = task_.frames[i];
       const ScaleSample* sample = Registered(frame);
@@ -196,45 +217,35 @@ class Measurement {
       entry.place.shift_px = sample->registration.shift_px;
       entry.rotation_rad = sample->registration.rotation_rad;
       entry.expected_variance_px2 =
-          (floor_px2_ +
+          (evidence_.assumed_floor_px2 +
            ratio * ratio * DefocusVariance(evidence_.setup, focus_mm_, DepthMm(frame))) /
           (sample->scale * sample->scale);
       entry.pixel_noise = std::max(task_.pixel_noise, 1e-5);
       if (frame == task_.reference) meter.reference = meter.frames.size();
       meter.frames.push_back(entry);
-      fit_index_.push_back(i);
+      evidence_.fit_index.push_back(i);
     }
-  }
-
-  RelativeBlur Fit(model::Psf psf, double part) const {
-    return FitRelativeBlur(region_.samples, region_.reference, region_.window, region_.modes,
-                           region_.leakage, SpectralOptions(psf, floor_px2_, part));
-  }
-
-  BlurSamples Samples(const RelativeBlur& blur) const {
-    BlurSamples samples = AsSamples(blur, region_);
-    for (std::size_t& f : samples.frames) f = fit_index_[f];
-    return samples;
   }
 
   // Whether the blur came out so different from what the windows and bands were laid out for that
   // they must be laid out again; then with what was found.
   bool ExpectationWasFarOff(const RelativeBlur& blur, double* ratio) {
     BlurFitSetup setup = evidence_.setup;
-    setup.meters = {Samples(blur)};
-    setup.floor_variance_px2 = model::Estimate{floor_px2_, 0};
+    setup.meters = {FitSamples(evidence_, blur, region_)};
+    setup.floor_variance_px2 = model::Estimate{evidence_.assumed_floor_px2, 0};
     const BlurFitResult fit = FitBlur(setup);
     if (!fit.done) return false;
-    const auto range = [&](double focus_mm, double kappa) {
-      double largest = 0;
-      for (const std::size_t frame : task_.frames) {
-        largest =
-            std::max(largest, kappa * kappa * DefocusVariance(setup, focus_mm, DepthMm(frame)));
-      }
-      return largest;
-    };
-    const double before = range(focus_mm_, *ratio), after = range(fit.values[0], fit.values[1]);
-    const bool far_off = after > kExpectedWell * before || before > kExpectedWell * after;
+    double largest_px2 = 0, farthest_off_px2 = 0;
+    for (const std::size_t frame : task_.frames) {
+      const auto defocus_px2 = [&](double focus_mm, double kappa) {
+        return kappa * kappa * DefocusVariance(setup, focus_mm, DepthMm(frame));
+      };
+      const double found = defocus_px2(fit.values[kFocusDepth], fit.values[kBlurRatio]);
+      largest_px2 = std::max(largest_px2, found);
+      farthest_off_px2 =
+          std::max(farthest_off_px2, std::abs(found - defocus_px2(focus_mm_, *ratio)));
+    }
+    const bool far_off = farthest_off_px2 > kExpectedWell * largest_px2;
     focus_mm_ = fit.values[kFocusDepth];
     *ratio = fit.values[kBlurRatio];
     return far_off;
@@ -242,103 +253,30 @@ class Measurement {
 
   void Keep(const RelativeBlur& blur) {
     evidence_.spectrum = static_cast<int>(evidence_.setup.meters.size());
-    evidence_.setup.meters.push_back(Samples(blur));
+    evidence_.setup.meters.push_back(FitSamples(evidence_, blur, region_));
     evidence_.frame_noise_ratios.assign(evidence_.setup.frames.size(), 0);
     for (std::size_t i = 0; i < region_.frames.size(); ++i)
-      evidence_.frame_noise_ratios[fit_index_[region_.frames[i]]] =
+      evidence_.frame_noise_ratios[evidence_.fit_index[region_.frames[i]]] =
           blur.noise_ratio[static_cast<Eigen::Index>(i)];
-    if (const RelativeBlur narrow = Fit(task_.sweep.camera.psf, 0.5); narrow.done)
-      evidence_.narrow_band = Samples(narrow);
-    CompareShapes(blur);
-  }
-
-  // Both shapes over the same band, each with its own leakage.
-  void CompareShapes(const RelativeBlur& blur) {
-    const model::Psf stated = task_.sweep.camera.psf;
-    const bool is_gaussian = stated == model::Psf::kGaussian;
-    const model::Psf other = is_gaussian ? model::Psf::kDisc : model::Psf::kGaussian;
-    const double part = is_gaussian ? kDiscBand / kGaussianBand : 1;
-    const RelativeBlur as_stated = Fit(stated, part);
-    double largest = 0;
-    for (const std::size_t f : region_.frames) {
-      largest = std::max(largest, evidence_.spectral.frames[f].expected_variance_px2);
-    }
-    const WindowLeakage stated_leakage = region_.leakage;
-    region_.leakage =
-        WindowLeakage(task_.store.Grey(task_.reference), evidence_.spectral.origin_px,
-                      region_.window, region_.modes, region_.samples[region_.reference].spectrum,
-                      other, 1.4 * std::sqrt(largest) + 0.5, task_.threads);
-    const RelativeBlur as_other = Fit(other, is_gaussian ? 1 : kDiscBand / kGaussianBand);
-    region_.leakage = stated_leakage;
-    if (as_stated.done && as_other.done) {
-      evidence_.other_psf = Samples(as_other);
-      evidence_.gaussian_misfit = (is_gaussian ? as_stated : as_other).chi2_per_dof;
-      evidence_.disc_misfit = (is_gaussian ? as_other : as_stated).chi2_per_dof;
-      evidence_.better_psf = *evidence_.gaussian_misfit <= *evidence_.disc_misfit
-                                 ? model::Psf::kGaussian
-                                 : model::Psf::kDisc;
-    }
-    AddExamples(blur, as_other);
-  }
-
-  // The nearest, the sharpest and the farthest frame of the meter.
-  void AddExamples(const RelativeBlur& blur, const RelativeBlur& other) {
-    const auto depth = [&](std::size_t i) {
-      return DepthMm(evidence_.spectral.frames[region_.frames[i]].frame);
-    };
-    std::size_t nearest = 0, farthest = 0;
-    for (std::size_t i = 0; i < region_.frames.size(); ++i) {
-      if (depth(i) < depth(nearest)) nearest = i;
-      if (depth(i) > depth(farthest)) farthest = i;
-    }
-    const auto reference = static_cast<Eigen::Index>(region_.reference);
-    const model::Psf stated = task_.sweep.camera.psf;
-    for (const std::size_t i : {nearest, region_.reference, farthest}) {
-      BlurExample example;
-      example.frame = static_cast<int>(evidence_.spectral.frames[region_.frames[i]].frame);
-      const auto at = [&](const RelativeBlur& fit, model::Psf psf, double nu) {
-        const RelativeBlurOptions options = SpectralOptions(psf, floor_px2_, 1);
-        const double scale = region_.samples[i].scale;
-        const auto k = static_cast<Eigen::Index>(i);
-        return BlurTransfer(options, fit.variances_px2[k], scale, nu) /
-               BlurTransfer(options, fit.variances_px2[reference], 1, nu);
-      };
-      for (const TransferRing& ring :
-           MeasuredTransfer(region_.samples[i], blur, i, blur.variances_px2[reference],
-                            region_.window, region_.modes, region_.leakage)) {
-        const RelativeBlurOptions options = SpectralOptions(stated, floor_px2_, 1);
-        example.x.push_back(ring.nu / region_.samples[i].scale);
-        example.measured.push_back(
-            ring.measured / BlurTransfer(options, blur.variances_px2[reference], 1, ring.nu));
-        const double by_stated = at(blur, stated, ring.nu);
-        const double by_other =
-            other.done
-                ? at(other,
-                     stated == model::Psf::kGaussian ? model::Psf::kDisc : model::Psf::kGaussian,
-                     ring.nu)
-                : by_stated;
-        const bool is_gaussian = stated == model::Psf::kGaussian;
-        example.gaussian.push_back(is_gaussian ? by_stated : by_other);
-        if (other.done || !is_gaussian) example.disc.push_back(is_gaussian ? by_other : by_stated);
-      }
-      evidence_.examples.push_back(std::move(example));
-    }
+    evidence_.blur = blur;
   }
 
   const BlurTask& task_;
   BlurEvidence evidence_;
-  double floor_px2_ = 0;
   double focus_mm_ = 0;
-  std::vector<std::size_t> fit_index_;  // of the spectral meter's frames in setup.frames
   MeterRegion region_;
 };
 
 }  // namespace
 
+double UsualBand(model::Psf psf) {
+  return psf == model::Psf::kGaussian ? 2 : 1;  // a disc's first zero is at 1.84
+}
+
 RelativeBlurOptions SpectralOptions(model::Psf psf, double floor_variance_px2, double part) {
   RelativeBlurOptions options;
   options.psf = psf;
-  options.band = part * (psf == model::Psf::kGaussian ? kGaussianBand : kDiscBand);
+  options.band = part * UsualBand(psf);
   options.floor_variance_px2 = floor_variance_px2;
   return options;
 }
@@ -349,6 +287,36 @@ BlurSamples AsSamples(const RelativeBlur& blur, const MeterRegion& region) {
   samples.variances_px2 = blur.variances_px2;
   samples.covariance = blur.covariance;
   return samples;
+}
+
+BlurSamples FitSamples(const BlurEvidence& evidence, const RelativeBlur& blur,
+                       const MeterRegion& region) {
+  BlurSamples samples = AsSamples(blur, region);
+  for (std::size_t& f : samples.frames) f = evidence.fit_index[f];
+  return samples;
+}
+
+FittedRegion FitRegion(MeterRegion region, const RelativeBlurOptions& options) {
+  while (true) {
+    RelativeBlur blur = FitRelativeBlur(region.samples, region.reference, region.window,
+                                        region.modes, region.leakage, options);
+    if (!blur.done) return {std::move(region), std::move(blur)};
+    std::set<std::size_t> empty;
+    for (std::size_t i = 0; i < region.frames.size(); ++i) {
+      if (i != region.reference && blur.modes_used[i] < kFewestModesOfFrame)
+        empty.insert(region.frames[i]);
+    }
+    if (empty.empty()) return {std::move(region), std::move(blur)};
+    if (region.frames.size() - empty.size() < kFewestFrames) {
+      blur.done = false;
+      blur.message = fmt::format("the texture of {} frames is lost in blur or noise; {} are left",
+                                 empty.size(), region.frames.size() - empty.size());
+      return {std::move(region), std::move(blur)};
+    }
+    region = PartOf(
+        region, [&empty](std::size_t f) { return empty.count(f) == 0; },
+        [](const Mode&) { return true; });
+  }
 }
 
 BlurEvidence MeasureBlur(const BlurTask& task) { return Measurement(task).Run(); }

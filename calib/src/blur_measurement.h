@@ -43,24 +43,44 @@ struct BlurEvidence {
   // Edges of a target that is not stated to be one, where its texture is what is fitted: what the
   // lens floor cannot exceed.
   std::optional<BlurSamples> unstated_edges;
-  // The spectral meter with other choices, for the systematic errors.
+  // The spectral meter with other choices, for the systematic errors: see CompareChoices.
   std::optional<BlurSamples> other_psf, narrow_band;
   model::Psf better_psf = model::Psf::kGaussian;
   std::optional<double> gaussian_misfit, disc_misfit;
   std::vector<BlurExample> examples;
   std::vector<double> frame_noise_ratios;  // spectral scatter over the pixel noise, of setup.frames
   std::string message;                     // why there is no meter
-  // The spectral meter's own set-up with what was found, for parts of the field and channels.
+  // The spectral meter's own set-up with what was found, for parts of the field and channels. It
+  // reads the frames of the task's store.
   SpectralMeterSetup spectral;
-  MeterRegion region;  // the whole field, as measured
+  std::vector<std::size_t> fit_index;  // of spectral.frames in setup.frames
+  double assumed_floor_px2 = 0;        // S0 that a disc's transfer function was told
+  MeterRegion region;                  // the whole field, as measured
+  RelativeBlur blur;                   // and as fitted
 };
 
 // Measures edges where the target has them (and is not stated to be a texture), and the relative
-// spectra of all that could be registered.
+// spectra of all that could be registered. The other choices are left open.
 BlurEvidence MeasureBlur(const BlurTask& task);
 
 // One region's relative blur as samples of a fit, their frames those of the meter.
 BlurSamples AsSamples(const RelativeBlur& blur, const MeterRegion& region);
+
+// The same, their frames those of evidence.setup.
+BlurSamples FitSamples(const BlurEvidence& evidence, const RelativeBlur& blur,
+                       const MeterRegion& region);
+
+// The fit of a region's frames. Frames of which next to no mode is left in the band say nothing of
+// such a blur, and are left out of the region.
+struct FittedRegion {
+  MeterRegion region;
+  RelativeBlur blur;
+};
+FittedRegion FitRegion(MeterRegion region, const RelativeBlurOptions& options);
+
+// 2 pi^2 dV nu^2 up to which modes are fitted: below a disc's first zero, and where a Gaussian has
+// not sunk into the noise.
+double UsualBand(model::Psf psf);
 
 // The options that the camera's PSF asks for, at `part` of the usual band.
 RelativeBlurOptions SpectralOptions(model::Psf psf, double floor_variance_px2, double part);

@@ -12,7 +12,9 @@ namespace thicklens::calib {
 namespace {
 
 constexpr int kTriplets = 400;
-constexpr double kTrimmed = 0.7;       // part of the samples that a candidate is judged by
+constexpr double kTrimmed = 0.7;  // part of the samples that a candidate is judged by
+// A parabola passes three samples exactly and a fourth by chance.
+constexpr std::ptrdiff_t kFewestJudged = 5;
 constexpr double kFarOff = 6;          // standard deviations
 constexpr double kModelError = 0.002;  // of the range of V: no lens follows the law better
 
@@ -90,8 +92,10 @@ class Search {
   double TrimmedCost(const Line& line) const {
     const Eigen::ArrayXd squares = (Residuals(line).array() / Sigmas(line).array()).square();
     std::vector<double> sorted(squares.begin(), squares.end());
-    const auto kept = std::max<std::ptrdiff_t>(
-        4, static_cast<std::ptrdiff_t>(kTrimmed * static_cast<double>(sorted.size())));
+    const auto part =
+        static_cast<std::ptrdiff_t>(std::ceil(kTrimmed * static_cast<double>(sorted.size())));
+    const auto kept =
+        std::min(std::max(kFewestJudged, part), static_cast<std::ptrdiff_t>(sorted.size()));
     std::nth_element(sorted.begin(), sorted.begin() + kept - 1, sorted.end());
     double sum = 0;
     for (auto s = sorted.begin(); s != sorted.begin() + kept; ++s) sum += *s;
@@ -137,8 +141,16 @@ double Parabola::At(double depth_mm) const {
   return ValueAt(coefficients, (depth_mm - middle_mm) / unit_mm);
 }
 
-double Parabola::Slope(double depth_mm) const {
-  return SlopeAt(coefficients, (depth_mm - middle_mm) / unit_mm) / unit_mm;
+std::vector<double> Parabola::DepthsOf(double variance_px2, double near_mm) const {
+  const double middle = -0.5 * coefficients[1] / coefficients[2];
+  const double squared = middle * middle - (coefficients[0] - variance_px2) / coefficients[2];
+  if (!(squared >= 0)) return {};
+  const double apart = std::sqrt(squared);
+  std::vector<double> depths = {middle_mm + unit_mm * (middle - apart),
+                                middle_mm + unit_mm * (middle + apart)};
+  if (std::abs(depths[1] - near_mm) < std::abs(depths[0] - near_mm))
+    std::swap(depths[0], depths[1]);
+  return depths;
 }
 
 Parabola FitParabola(const Eigen::VectorXd& depths_mm, const Eigen::VectorXd& variances_px2,

@@ -84,11 +84,10 @@ class Field {
       *message = "too little texture, or too few frames see it";
       return std::nullopt;
     }
-    const RelativeBlur blur = FitRelativeBlur(
-        region.samples, region.reference, region.window, region.modes, region.leakage,
-        SpectralOptions(sweep_.camera.psf, fit_.values[kFloorVariance], 1));
-    if (!blur.done) {
-      *message = blur.message;
+    const FittedRegion fitted =
+        FitRegion(region, SpectralOptions(sweep_.camera.psf, fit_.values[kFloorVariance], 1));
+    if (!fitted.blur.done) {
+      *message = fitted.blur.message;
       return std::nullopt;
     }
     BlurFitSetup setup = evidence_.setup;
@@ -100,7 +99,7 @@ class Field {
     setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
     for (const MeterFrame& frame : setup_.frames)
       setup.frames.push_back({BelievedReading(frame.frame), frame.place.scale, std::nullopt});
-    setup.meters = {AsSamples(blur, region)};
+    setup.meters = {AsSamples(fitted.blur, fitted.region)};
     const BlurFitResult fit = FitBlur(setup);
     *message = fit.message;
     if (!fit.done) return std::nullopt;

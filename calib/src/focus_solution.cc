@@ -8,31 +8,20 @@
 #include <filesystem>
 #include <limits>
 
+#include "blur_choices.h"
 #include "edge_pixels.h"
+#include "floor_choice.h"
+#include "frame_outliers.h"
 #include "systematic_parts.h"
 
 namespace thicklens::calib {
 namespace {
 
-// A lens floor that nobody measured: between a perfect lens and a soft one, px.
-constexpr double kUnknownFloorFromPx = 0;
-constexpr double kUnknownFloorToPx = 1.0;
 // Weight of the robust loss below which a frame is told.
 constexpr double kOutlierWeight = 0.6;
 constexpr double kSmallestRatio = 0.2, kLargestRatio = 0.8;
 // Beyond these a lens is unusual: the full aperture gives .5 by second moment.
 constexpr double kLowRatio = 0.35, kHighRatio = 0.65;
-constexpr std::size_t kFewestFrames = 5;
-// A frame whose spectrum scatters by so much more than the others' shows something else.
-constexpr double kScatterOfDamage = 30;
-
-// What may be assumed of the variance at focus: a value, or only an interval.
-struct FloorChoice {
-  std::optional<model::Estimate> variance_px2;  // nothing: fitted freely
-  FloorInterval interval_px2;                   // (lo, hi): not known better
-  bool is_measured = false;                     // the fit measures the lens floor itself
-};
-
 class Solution {
  public:
   Solution(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
@@ -41,8 +30,10 @@ class Solution {
 
   void Run() {
     if (evidence_.setup.meters.empty()) return Refuse(evidence_.message);
-    if (!ThrowOut()) return;
-    const FloorChoice choice = ChooseFloor();
+    if (const auto reason = ThrowOutFrames(sweep_.direction, &evidence_, &result_))
+      return Refuse(*reason);
+    CompareChoices(sweep_.camera.psf, &evidence_);
+    const FloorChoice choice = ChooseFloor(sweep_.floor, evidence_, &result_.warnings);
     evidence_.setup.floor_variance_px2 = choice.variance_px2;
     fit_ = FitBlur(evidence_.setup);
     result_.blur.message = fit_.message;
@@ -94,159 +85,6 @@ class Solution {
       if (readings[i] > readings[i - 1]) steps.push_back(readings[i] - readings[i - 1]);
     }
     return Median(steps);
-  }
-
-  // ---- frames that do not follow ----
-  // On the target any blur follows a parabola in depth, whatever floor and texture: what lies far
-  // off it has a wrong reading or is damaged.
-  bool ThrowOut() {
-    RejectScattered();
-    for (BlurSamples& meter : evidence_.setup.meters) RejectOffParabola(meter);
-    for (BlurSamples& meter : evidence_.setup.meters) DropRejected(&meter);
-    std::size_t most = 0;
-    for (const BlurSamples& meter : evidence_.setup.meters)
-      most = std::max(most, meter.frames.size());
-    if (most >= kFewestFrames) return true;
-    Refuse(
-        fmt::format("the blur of {} frames follows one law, {} are needed", most, kFewestFrames));
-    return false;
-  }
-
-  void RejectScattered() {
-    std::vector<double> ratios;
-    for (const double r : evidence_.frame_noise_ratios) {
-      if (r > 0) ratios.push_back(r);
-    }
-    if (ratios.empty()) return;
-    const double typical = Median(ratios);
-    for (std::size_t f = 0; f < evidence_.frame_noise_ratios.size(); ++f) {
-      const double ratio = evidence_.frame_noise_ratios[f] / typical;
-      if (!(ratio > kScatterOfDamage)) continue;
-      Frame(f).rejection = fmt::format(
-          "does not show what the others show: its spectrum lies {:.0f} times farther off than "
-          "theirs (smeared, shifted within the exposure, something in front of the target, or so "
-          "far out of "
-          "focus that the blur law does not hold)",
-          std::sqrt(ratio));
-    }
-  }
-
-  void RejectOffParabola(const BlurSamples& meter) {
-    const auto n = static_cast<Eigen::Index>(meter.frames.size());
-    Eigen::VectorXd depths(n);
-    for (Eigen::Index i = 0; i < n; ++i)
-      depths[i] = DepthMm(meter.frames[static_cast<std::size_t>(i)]);
-    const Parabola parabola =
-        FitParabola(depths, meter.variances_px2, meter.covariance.diagonal().cwiseSqrt(),
-                    evidence_.setup.reading_sigma_mm);
-    if (!parabola.done) return;
-    const double range_mm = depths.maxCoeff() - depths.minCoeff();
-    const double sign = model::DirectionSign(sweep_.direction);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const auto s = static_cast<std::size_t>(i);
-      FrameMeasurement& frame = Frame(meter.frames[s]);
-      if (parabola.follows[s] || !frame.rejection.empty()) continue;
-      const double off = parabola.residuals_px2[i] / parabola.sigmas_px2[i];
-      // Written minus believed: the blur is that of depth + residual/slope.
-      const double error_mm = -sign * parabola.residuals_px2[i] / parabola.Slope(depths[i]);
-      if (std::abs(error_mm) < range_mm) {
-        frame.reading_error_mm = error_mm;
-        frame.rejection = fmt::format(
-            "reading off by {:.1f} mm, or frame damaged: its blur lies {:.0f} standard "
-            "deviations off the others' law",
-            error_mm, std::abs(off));
-      } else {
-        frame.rejection = fmt::format(
-            "frame damaged: its blur lies {:.0f} standard deviations off the others' law",
-            std::abs(off));
-      }
-    }
-  }
-
-  void DropRejected(BlurSamples* meter) {
-    std::vector<Eigen::Index> kept;
-    BlurSamples rest = *meter;
-    rest.frames.clear();
-    for (std::size_t i = 0; i < meter->frames.size(); ++i) {
-      if (!Frame(meter->frames[i]).rejection.empty()) continue;
-      kept.push_back(static_cast<Eigen::Index>(i));
-      rest.frames.push_back(meter->frames[i]);
-    }
-    rest.variances_px2 = meter->variances_px2(kept);
-    rest.covariance = meter->covariance(kept, kept);
-    *meter = std::move(rest);
-  }
-
-  // ---- the floor ----
-  // In one sweep the lens floor and the softness of the target are told apart only by what is known
-  // of the target: a knife edge has none, a print may have all of it. On a texture the floor cannot
-  // be found at all.
-  FloorChoice ChooseFloor() {
-    FloorChoice choice;
-    const model::FloorKnowledge& known = sweep_.floor;
-    if (known.given_px) {
-      const double px = known.given_px->value;
-      choice.variance_px2 = model::Estimate{px * px, 2 * px * known.given_px->sigma};
-    } else if (known.from_px) {
-      choice.interval_px2 =
-          Eigen::Vector2d(*known.from_px * *known.from_px, *known.to_px * *known.to_px);
-    } else if (MeasuresFloor()) {
-      choice.is_measured = true;
-    } else {
-      choice.interval_px2 = UnknownFloor();
-    }
-    if (choice.interval_px2) choice.variance_px2 = model::Estimate{choice.interval_px2->mean(), 0};
-    return choice;
-  }
-
-  bool MeasuresFloor() const {
-    return std::any_of(evidence_.setup.meters.begin(), evidence_.setup.meters.end(),
-                       [](const BlurSamples& m) { return m.held_softness_px2.has_value(); });
-  }
-
-  Eigen::Vector2d UnknownFloor() {
-    if (const std::optional<double> softness_px2 = EdgeSoftness()) {
-      // From none of the edge's softness to all of it.
-      result_.warnings.push_back(fmt::format(
-          "the edges are {:.2f} px soft at focus; how much of it is the lens and how much the "
-          "target is not known: photograph a knife edge, or state blur_floor_px",
-          std::sqrt(*softness_px2)));
-      return {0, *softness_px2};
-    }
-    result_.warnings.push_back(fmt::format(
-        "the lens floor cannot be found from this target; {} to {} px is allowed for, a "
-        "softer lens is not: measure it on a knife edge, or state blur_floor_px",
-        kUnknownFloorFromPx, kUnknownFloorToPx));
-    return {kUnknownFloorFromPx * kUnknownFloorFromPx, kUnknownFloorToPx * kUnknownFloorToPx};
-  }
-
-  // sigma^2 of the target's edges in the plane of focus, lens and ink together, if it has edges.
-  std::optional<double> EdgeSoftness() {
-    BlurFitSetup setup = evidence_.setup;
-    if (evidence_.edges >= 0) {
-      setup.meters = {setup.meters[static_cast<std::size_t>(evidence_.edges)]};
-      setup.meters[0].held_softness_px2 = 0;
-      setup.floor_variance_px2.reset();
-      const BlurFitResult fit = FitBlur(setup);
-      if (!fit.done || !(fit.values[kFloorVariance] > 0)) return std::nullopt;
-      return fit.values[kFloorVariance];
-    }
-    if (!evidence_.unstated_edges) return std::nullopt;
-    setup.floor_variance_px2 = model::Estimate{kUnknownFloorToPx * kUnknownFloorToPx / 2, 0};
-    const BlurFitResult fit = FitBlur(setup);
-    if (!fit.done) return std::nullopt;
-    std::vector<double> rests;
-    for (std::size_t i = 0; i < evidence_.unstated_edges->frames.size(); ++i) {
-      const std::size_t f = evidence_.unstated_edges->frames[i];
-      const double defocus = std::pow(fit.values[kBlurRatio], 2) *
-                             DefocusVariance(setup, fit.values[kFocusDepth], DepthMm(f));
-      const double scale = setup.frames[f].scale;
-      rests.push_back(evidence_.unstated_edges->variances_px2[static_cast<Eigen::Index>(i)] *
-                          scale * scale -
-                      defocus);
-    }
-    const double softness = Median(rests);
-    return softness > 0 ? std::optional<double>(softness) : std::nullopt;
   }
 
   // ---- results ----
@@ -313,9 +151,14 @@ class Solution {
     std::string names;
     for (std::size_t i = 0; i < std::min<std::size_t>(light.size(), 3); ++i) {
       const FrameMeasurement& frame = Frame(light[i]);
-      names += fmt::format("{}{} (reading {} mm, off by {:.2f} mm or damaged)", i == 0 ? "" : ", ",
+      // Readings that are stated to be exact have no error that could be told.
+      const std::string why =
+          evidence_.setup.reading_sigma_mm > 0
+              ? fmt::format("off by {:.2f} mm or damaged", frame.reading_error_mm)
+              : std::string("damaged, or its reading is not exact");
+      names += fmt::format("{}{} (reading {} mm, {})", i == 0 ? "" : ", ",
                            std::filesystem::path(frame.image).filename().string(), frame.reading_mm,
-                           frame.reading_error_mm);
+                           why);
     }
     if (light.size() > 3) names += fmt::format(" and {} more", light.size() - 3);
     result_.warnings.push_back(

@@ -8,6 +8,7 @@
 namespace thicklens::calib {
 namespace {
 
+constexpr std::size_t kFewestFrames = 5;
 constexpr std::size_t kFewestOnASide = 6;
 constexpr double kSidesDisagree = 3;  // of their standard deviations
 // What the meters themselves are good for, relative to kappa: measured on simulated sweeps.
@@ -18,6 +19,10 @@ struct Trial {
   BlurFitResult fit;
   model::ThickLens lens;
 };
+
+std::string SideInWords(const SideFit& side) {
+  return side.done ? fmt::format("{} frames", side.frames_used) : side.message;
+}
 
 double Width(const Eigen::Vector2d& interval) { return interval.y() - interval.x(); }
 
@@ -116,9 +121,9 @@ class Parts {
     const SideFit& farther = result_.farther;
     if (!nearer.done || !farther.done) {
       result_.warnings.push_back(
-          fmt::format("the two sides of focus cannot be compared ({} frames nearer, {} farther): a "
-                      "lens that blurs differently on them would not be noticed",
-                      nearer.frames_used, farther.frames_used));
+          fmt::format("the two sides of focus cannot be compared (nearer: {}; farther: {}): a lens "
+                      "that blurs differently on them would not be noticed",
+                      SideInWords(nearer), SideInWords(farther)));
       return;
     }
     const double apart_mm = nearer.focus_depth_mm.value - farther.focus_depth_mm.value;
@@ -156,6 +161,7 @@ class Parts {
           place.frames.end())
         kept.push_back(static_cast<Eigen::Index>(i));
     }
+    if (kept.size() < kFewestFrames) return std::nullopt;
     BlurSamples chosen;
     chosen.variances_px2 = samples->variances_px2(kept);
     chosen.covariance = samples->covariance(kept, kept);
@@ -340,9 +346,9 @@ void WidenFocus(const std::string& name, double move_mm, const std::string& reme
   SystematicPart part;
   part.name = name;
   part.remedy = remedy;
-  part.focus_depth_mm = {-move_mm, move_mm};
-  // d1 falls as zf grows; nearer than the focal point there is none.
-  const double nearest_mm = std::max(zf - move_mm, 1.01 * lens.front_focal_length_mm);
+  // d1 falls as zf grows; nearer than the focal point nothing comes into focus.
+  const double nearest_mm = std::max(zf - move_mm, std::min(zf, 1.01 * lens.front_focal_length_mm));
+  part.focus_depth_mm = {nearest_mm - zf, move_mm};
   part.image_distance_mm = {model::ImageDistanceMm(lens, zf + move_mm) - d1_mm,
                             model::ImageDistanceMm(lens, nearest_mm) - d1_mm};
   if (calibration->focus_depth_mm->systematic)

@@ -43,8 +43,13 @@ TEST(FitParabola, ExactSamplesGiveTheParabola) {
   EXPECT_NEAR(parabola.vertex_mm, kVertexMm, 1e-8);
   for (const double z_mm : {300.0, 395.0, 401.0, 470.0}) {
     EXPECT_NEAR(parabola.At(z_mm), Law(z_mm), 1e-8);
-    EXPECT_NEAR(parabola.Slope(z_mm), 2 * kCurve * (z_mm - kVertexMm), 1e-9);
+    if (z_mm == kVertexMm) continue;
+    const std::vector<double> depths_mm = parabola.DepthsOf(Law(z_mm), z_mm + 0.1);
+    ASSERT_EQ(depths_mm.size(), 2U);
+    EXPECT_NEAR(depths_mm[0], z_mm, 1e-6);
+    EXPECT_NEAR(depths_mm[1], 2 * kVertexMm - z_mm, 1e-6);
   }
+  EXPECT_TRUE(parabola.DepthsOf(kLeastPx2 - 0.01, kVertexMm).empty());
   for (const bool follows : parabola.follows) EXPECT_TRUE(follows);
   EXPECT_LT(parabola.residuals_px2.cwiseAbs().maxCoeff(), 1e-9);
 }

@@ -1,0 +1,24 @@
+#ifndef THICKLENS_CALIB_SRC_BLUR_EXAMPLES_H_
+#define THICKLENS_CALIB_SRC_BLUR_EXAMPLES_H_
+
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "blur_measurement.h"
+
+namespace thicklens::calib {
+
+// Curves of single frames with both shapes of the blur fitted, for the eye.
+
+// The transfer of the nearest, the sharpest and the farthest frame of the spectral meter; `other`
+// is the fit with the shape that is not stated (left out where it is not done, or without the
+// frame).
+void AddTransferExamples(model::Psf stated, const FittedRegion& other, BlurEvidence* evidence);
+
+// The profile of a frame's strongest straight edge; nothing where it has none that can be fitted.
+std::optional<BlurExample> EdgeExample(const cv::Mat& grey, std::size_t frame, model::Psf stated,
+                                       double floor_px);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_SRC_BLUR_EXAMPLES_H_
