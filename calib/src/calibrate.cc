@@ -5,23 +5,19 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
-#include <map>
 #include <mutex>
-#include <numeric>
 #include <set>
 
 #include "blur_measurement.h"
-#include "edge_pixels.h"
+#include "calibration_checks.h"
 #include "field_map.h"
 #include "focus_solution.h"
+#include "frame_selection.h"
 #include "frame_store.h"
 #include "reading_gates.h"
 #include "scale_tracking.h"
 #include "sharpness_peak.h"
 #include "source_recipe.h"
-#include "systematic_parts.h"
-#include "target_period.h"
 #include "thicklens/calib/edge_blur.h"
 #include "thicklens/calib/sharpness.h"
 #include "thicklens/error.h"
@@ -30,52 +26,78 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr std::size_t kFewestFrames = 5;
-// Edge pixels of the sharpness index: gradients above this part of the sweep's steepest.
-constexpr double kEdgeThreshold = 0.25;
-// Fewer edges than this and a contrast below this part of the median: the target is not to be seen.
-constexpr int kFewestEdges = 12;
-constexpr double kFaintContrast = 0.5;
-// Unless it still shows where the noise is averaged out.
-constexpr double kClearTexture = 3;
-// Files are named as the table of readings names them, not by where they lie on this machine.
-std::string FileName(const std::string& image) {
-  return std::filesystem::path(image).filename().string();
-}
-
 class Calibrator {
  public:
   Calibrator(const FocusSweep& sweep, const CalibrationOptions& options)
-      : sweep_(sweep), options_(options), store_(sweep) {
+      : sweep_(sweep), options_(options), store_(sweep), result_(Begun(sweep)) {
     total_steps_ = 4 * static_cast<int>(sweep.frames.size());
-    for (const model::SweepFrame& frame : sweep.frames) {
-      FrameMeasurement measurement;
-      measurement.image = frame.image;
-      measurement.reading_mm = frame.reading_mm;
-      result_.frames.push_back(measurement);
-    }
   }
 
   Calibration Run() {
     const auto begin = std::chrono::steady_clock::now();
-    if (MeasureAndGate() && MeasureSharpness() && FindDepths()) {
-      result_.source = RunSourceRecipe(sweep_.camera, result_.frames, used_);
-      FitPeak();
-      MeasureAndSolve();
+    std::string why;
+    if (!HasEnoughFrames(sweep_, &why)) {
+      Refuse(why);
+    } else if (RegionSidePx(sweep_) < kSmallestRegionPx) {
+      Refuse(RegionAdvice(sweep_));
+    } else {
+      Measure();
     }
     result_.frames_used =
-        result_.blur.done ? result_.blur.frames_used : static_cast<int>(used_.size());
+        result_.blur.done ? result_.blur.frames_used : static_cast<int>(used().size());
     result_.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return std::move(result_);
   }
 
  private:
+  static Calibration Begun(const FocusSweep& sweep) {
+    Calibration result;
+    for (const model::SweepFrame& frame : sweep.frames) {
+      FrameMeasurement measurement;
+      measurement.image = frame.image;
+      measurement.reading_mm = frame.reading_mm;
+      result.frames.push_back(measurement);
+    }
+    return result;
+  }
+
   bool Refuse(const std::string& reason) {
     result_.outcome = Outcome::kRefused;
     result_.reason = reason;
     return false;
   }
+  // Of a gate: whether it let enough frames pass.
+  bool Passed(const std::optional<std::string>& refusal) { return !refusal || Refuse(*refusal); }
+
+  void Measure() {
+    if (MeasureAndGate() && MeasureSharpness() && FindDepths()) {
+      result_.source = RunSourceRecipe(sweep_.camera, result_.frames, used());
+      FitPeak();
+      MeasureAndSolve();
+    }
+    NamePlainCause();
+  }
+
+  // What the frames that are left fail for is often only the consequence of something plainer.
+  void NamePlainCause() {
+    const std::string exposure = ExposureAdvice(result_.frames);
+    if (result_.outcome != Outcome::kRefused) {
+      if (!exposure.empty())
+        result_.warnings.insert(result_.warnings.begin(),
+                                exposure + "; the results come from the others alone");
+      return;
+    }
+    for (const std::string& cause :
+         {exposure, RegionAdvice(sweep_),
+          RegistrationAdvice(sweep_, result_.frames, used(), result_.scale)}) {
+      if (cause.empty()) continue;
+      result_.reason = cause + "; as it is, " + result_.reason;
+      return;
+    }
+  }
+
+  const std::vector<std::size_t>& used() const { return selection_.used(); }
 
   void Tick() {
     if (!options_.progress) return;
@@ -86,8 +108,8 @@ class Calibrator {
 
   template <typename Work>
   void ForEachUsed(const Work& work) {
-    model::ParallelFor(static_cast<int>(used_.size()), options_.threads, [&](int i) {
-      work(used_[static_cast<std::size_t>(i)]);
+    model::ParallelFor(static_cast<int>(used().size()), options_.threads, [&](int i) {
+      work(used()[static_cast<std::size_t>(i)]);
       Tick();
     });
   }
@@ -96,8 +118,6 @@ class Calibrator {
 
   // Absolute gates on every frame, then the blank gate against the median of those that passed.
   bool MeasureAndGate() {
-    std::string why;
-    if (!HasEnoughFrames(sweep_, &why)) return Refuse(why);
     model::ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
       const auto index = static_cast<std::size_t>(i);
       result_.frames[index].statistics =
@@ -106,24 +126,12 @@ class Calibrator {
     });
     GateOptions gates = options_.gates;
     gates.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
-    std::vector<double> contrasts;
-    for (const FrameMeasurement& frame : result_.frames) {
-      if (!RejectionReason(frame.statistics, 0, gates))
-        contrasts.push_back(frame.statistics.contrast);
-    }
-    const double median_contrast = Median(contrasts);
-    used_.resize(sweep_.frames.size());
-    std::iota(used_.begin(), used_.end(), std::size_t{0});
-    const auto reason = [&](std::size_t i) {
-      return RejectionReason(result_.frames[i].statistics, median_contrast, gates);
-    };
-    return KeepOnly([&](std::size_t i) { return !reason(i); },
-                    [&](std::size_t i) { return *reason(i); });
+    return Passed(selection_.KeepMeasurable(gates));
   }
 
   bool MeasureSharpness() {
     double steepest = 0, steepest_relative = 0;
-    for (const std::size_t i : used_) {
+    for (const std::size_t i : used()) {
       const FrameStatistics& s = result_.frames[i].statistics;
       steepest = std::max(steepest, s.top_gradient);
       steepest_relative = std::max(steepest_relative, s.top_gradient / s.mean_linear);
@@ -140,90 +148,37 @@ class Calibrator {
       if (const auto blur = MeasureSourceEdgeBlur(grey))
         frame.source_blur_sigma_px = blur->sigma_px;
     });
-    reference_ = *std::max_element(used_.begin(), used_.end(), [&](std::size_t a, std::size_t b) {
+    reference_ = SharpestUsed();
+    return Passed(selection_.KeepThoseWithEdges());
+  }
+
+  std::size_t SharpestUsed() const {
+    return *std::max_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
       return result_.frames[a].normalised_edge_slope < result_.frames[b].normalised_edge_slope;
     });
-    return RejectFramesWithoutEdges();
-  }
-
-  // Shading alone passes the gates of contrast and gradient. What has no edge worth the name and
-  // little contrast besides does not show the target any more.
-  bool RejectFramesWithoutEdges() {
-    std::vector<double> contrasts;
-    for (const std::size_t i : used_) contrasts.push_back(result_.frames[i].statistics.contrast);
-    const double median_contrast = Median(contrasts);
-    const auto shows_target = [&](std::size_t i) {
-      const FrameMeasurement& frame = result_.frames[i];
-      return frame.edge_count >= kFewestEdges ||
-             frame.statistics.contrast >= kFaintContrast * median_contrast ||
-             frame.statistics.coarse_texture >= kClearTexture;
-    };
-    return KeepOnly(shows_target, [&](std::size_t i) {
-      return fmt::format(
-          "no edges: {} above {:.0f} % of the sweep's steepest, contrast {:.3f} against a median "
-          "of {:.3f}",
-          result_.frames[i].edge_count, 100 * kEdgeThreshold, result_.frames[i].statistics.contrast,
-          median_contrast);
-    });
-  }
-
-  // Rejects the used frames that fail; refuses if too few are left.
-  template <typename Passes, typename Reason>
-  bool KeepOnly(const Passes& passes, const Reason& reason) {
-    std::set<double> distinct;
-    std::vector<std::size_t> kept;
-    for (const std::size_t i : used_) {
-      if (passes(i)) {
-        kept.push_back(i);
-        distinct.insert(result_.frames[i].reading_mm);
-      } else {
-        result_.frames[i].rejection = reason(i);
-      }
-    }
-    used_ = kept;
-    if (distinct.size() >= kFewestFrames) return true;
-    return Refuse(TooFewUsable(distinct.size()));
-  }
-
-  // "3 of 35 frames are usable, 5 at different readings are needed: 30 dark, 2 blank
-  // (frame_000.png: ...)".
-  std::string TooFewUsable(std::size_t distinct_readings) const {
-    std::map<std::string, int> counts;
-    std::string first;
-    for (const FrameMeasurement& frame : result_.frames) {
-      if (frame.rejection.empty()) continue;
-      ++counts[frame.rejection.substr(0, frame.rejection.find_first_of(":,0123456789"))];
-      if (first.empty()) first = FileName(frame.image) + ": " + frame.rejection;
-    }
-    std::string reasons;
-    for (const auto& [name, count] : counts) {
-      reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", count, name);
-    }
-    return fmt::format(
-        "{} of {} frames are usable, at {} different readings; {} are needed: {} ({})",
-        used_.size(), sweep_.frames.size(), distinct_readings, kFewestFrames, reasons, first);
   }
 
   // The bench zero, given or from the image scale; then every frame's depth.
   bool FindDepths() {
     std::optional<double> known_mm;
     if (sweep_.offset_mm) known_mm = sweep_.offset_mm->value;
-    const std::vector<ScaleSample> samples = TrackScale(
-        sweep_, [this](std::size_t frame) { return Grey(frame); }, used_, reference_, known_mm,
+    std::vector<ScaleSample> samples = TrackScale(
+        sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_, known_mm,
         options_.threads, [this] { Tick(); });
+    result_.scale = FitScaleLaw(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
+                                sweep_.direction, RegionCornerRadiusPx(sweep_));
+    const bool is_lone_edge = IsLoneEdge(sweep_, used().size(), samples.size(), result_.scale);
+    if (is_lone_edge) ForgetScales(sweep_, &samples, &result_.scale);
     for (const ScaleSample& sample : samples) {
+      if (sample.scale_is_from_reading) continue;
       result_.frames[sample.frame].image_scale = sample.scale;
       result_.frames[sample.frame].image_scale_sigma = sample.registration.scale_sigma;
     }
-    result_.scale = FitScaleLaw(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
-                                sweep_.direction, RegionCornerRadiusPx(sweep_));
-    if (const auto reason = ReasonAgainstScales(sweep_, result_.frames, used_, result_.scale))
+    if (const auto reason = ReasonAgainstScales(sweep_, result_.frames, used(), result_.scale))
       return Refuse(*reason);
-    RejectUnregistered(samples);
+    RejectUnregistered(samples, used(), reference_, result_.scale, &result_.frames);
     RejectWrongReadings(sweep_, samples, result_.scale, &result_.frames);
-    if (!KeepOnly([&](std::size_t i) { return result_.frames[i].rejection.empty(); },
-                  [&](std::size_t i) { return result_.frames[i].rejection; }))
-      return false;
+    if (!Passed(selection_.KeepUnrejected())) return false;
     for (const ScaleSample& sample : samples) {
       if (!result_.frames[sample.frame].rejection.empty()) continue;
       scales_.push_back(sample);
@@ -233,19 +188,21 @@ class Calibrator {
     if (sweep_.offset_mm) {
       result_.bench_offset_mm =
           Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
-      WarnOfScale();
+      if (!is_lone_edge) CheckGivenOffset(sweep_, &result_);
     } else if (result_.scale.done) {
       result_.bench_offset_mm = result_.scale.offset_mm;
     } else {
       return Refuse("offset_mm is unknown and was not found: " + result_.scale.message);
     }
-    WarnOfDistortion();
+    CheckDistortion(&result_);
     slip_ = FindSlip(scales_, result_.scale);
+    bend_ = CheckBend(sweep_, scales_, &result_);
     const double sign = model::DirectionSign(sweep_.direction);
     for (FrameMeasurement& frame : result_.frames) {
       frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
     }
-    return RejectImpossibleDepths();
+    return Passed(selection_.KeepPossibleDepths(result_.bench_offset_mm->value,
+                                                sweep_.camera.lens.front_focal_length_mm));
   }
 
   // The sharpest frame may be the one whose reading is wrong: the next sharpest takes its place,
@@ -261,7 +218,7 @@ class Calibrator {
         next = &sample;
     }
     if (next == nullptr) {
-      reference_ = used_.front();
+      reference_ = SharpestUsed();
       return;
     }
     const Registration base = next->registration;
@@ -282,63 +239,9 @@ class Calibrator {
     }
   }
 
-  // Where the others follow a law, a frame that does not register shows something else.
-  void RejectUnregistered(const std::vector<ScaleSample>& samples) {
-    if (!result_.scale.done) return;
-    std::set<std::size_t> registered;
-    for (const ScaleSample& sample : samples) registered.insert(sample.frame);
-    for (const std::size_t i : used_) {
-      if (registered.count(i) > 0) continue;
-      result_.frames[i].rejection =
-          fmt::format("does not show the target of {}: the two cannot be registered",
-                      FileName(result_.frames[reference_].image));
-    }
-  }
-
-  void WarnOfDistortion() {
-    const auto& distortion = result_.scale.distortion_at_corner;
-    if (!distortion || !(std::abs(distortion->value) > std::max(0.005, 4 * distortion->sigma)))
-      return;
-    result_.warnings.push_back(
-        fmt::format("the pictures are distorted: {:+.1f} +- {:.1f} % at the corner ({}); undistort "
-                    "them first, depth and blur are those of an undistorted camera",
-                    100 * distortion->value, 100 * distortion->sigma,
-                    distortion->value > 0 ? "pincushion" : "barrel"));
-  }
-
-  // Nearer than the front focal point no image forms: such a frame shows something else, such as
-  // the lens resting on the target.
-  bool RejectImpossibleDepths() {
-    const double nearest_mm = sweep_.camera.lens.front_focal_length_mm;
-    return KeepOnly(
-        [&](std::size_t i) { return result_.frames[i].depth_mm > nearest_mm; },
-        [&](std::size_t i) {
-          return fmt::format(
-              "depth {:.3f} mm with the bench zero at {:.3f} mm, nearer than the front focal "
-              "point ({} mm): check offset_mm, direction and units",
-              result_.frames[i].depth_mm, result_.bench_offset_mm->value, nearest_mm);
-        });
-  }
-
-  void WarnOfScale() {
-    const ScaleLaw& law = result_.scale;
-    if (!law.done) {
-      result_.warnings.push_back("the given offset_mm could not be checked: " + law.message);
-      return;
-    }
-    const double apart_mm = law.offset_mm.value - sweep_.offset_mm->value;
-    const double sigma_mm = std::hypot(law.offset_mm.sigma, sweep_.offset_mm->sigma);
-    if (std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm) {
-      result_.warnings.push_back(
-          fmt::format("the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from "
-                      "the given one",
-                      law.offset_mm.value, law.offset_mm.sigma, apart_mm));
-    }
-  }
-
   void FitPeak() {
     std::vector<SharpnessSample> samples;
-    for (const std::size_t i : used_) {
+    for (const std::size_t i : used()) {
       samples.push_back({result_.frames[i].depth_mm, result_.frames[i].normalised_edge_slope});
     }
     result_.sharpness = FitSharpnessPeak(samples);
@@ -347,7 +250,7 @@ class Calibrator {
   // Flat and defocused frames show the noise alone; a fine texture in focus passes for noise.
   double SweepNoise() const {
     std::vector<double> noises;
-    for (const std::size_t i : used_) noises.push_back(result_.frames[i].statistics.noise_sigma);
+    for (const std::size_t i : used()) noises.push_back(result_.frames[i].statistics.noise_sigma);
     std::sort(noises.begin(), noises.end());
     return noises[noises.size() / 10];
   }
@@ -356,7 +259,7 @@ class Calibrator {
     const double start_mm = result_.sharpness.done ? result_.sharpness.focus_depth_mm
                                                    : result_.frames[reference_].depth_mm;
     BlurTask task(sweep_, store_);
-    task.frames = used_;
+    task.frames = used();
     task.reference = reference_;
     task.scales = scales_;
     task.law =
@@ -376,58 +279,41 @@ class Calibrator {
     task.tick = [this] { Tick(); };
     BlurEvidence evidence = MeasureBlur(task);
     BlurFitResult fit;
+    const Calibration before = result_;
     SolveFocus(sweep_, &evidence, &fit, &result_);
-    CheckMagnification();
-    if (slip_ && result_.outcome != Outcome::kRefused) {
-      const FrameMeasurement& frame = result_.frames[slip_->frame];
-      result_.warnings.push_back(fmt::format(
-          "the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} (reading {} "
-          "mm) "
-          "on: check the clamp and the table of readings there",
-          slip_->jump_mm.value, slip_->jump_mm.sigma, FileName(frame.image), frame.reading_mm));
-      WidenFocus("jump of the readings", std::abs(slip_->jump_mm.value),
-                 "find what slipped, or take the sweep again", sweep_.camera.lens, &result_);
-    }
-    if (options_.map_field && result_.outcome != Outcome::kRefused)
-      MapField(sweep_, evidence, fit, &store_, &result_);
+    if (ReplaceRejectedReference(before)) return MeasureAndSolve();
+    if (!result_.frames[reference_].rejection.empty()) return;
+    if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
+    if (result_.outcome == Outcome::kRefused) return;
+    if (slip_) CheckSlip(sweep_, *slip_, &result_);
+    if (bend_ && !sweep_.offset_mm) WidenByBend(sweep_, *bend_, &result_);
+    if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
   }
 
-  // m = f1 D/(f2 z) on the sensor over the target, so D = m z f2/f1.
-  void CheckMagnification() {
-    if (!sweep_.target_period_mm || !result_.image_distance_mm) return;
-    const std::optional<PeriodEstimate> period = MeasurePeriodPx(Grey(reference_));
-    if (!period) {
-      result_.warnings.push_back(
-          "target_period_mm is stated, but the sharpest frame shows no period to compare with");
-      return;
+  // Everything was measured against the reference; if its blur turns out not to follow the others',
+  // the next sharpest takes its place.
+  bool ReplaceRejectedReference(const Calibration& before) {
+    if (result_.frames[reference_].rejection.empty()) return false;
+    std::vector<std::pair<std::string, double>> rejections;
+    for (const FrameMeasurement& frame : result_.frames)
+      rejections.emplace_back(frame.rejection, frame.reading_error_mm);
+    result_ = before;
+    for (std::size_t i = 0; i < rejections.size(); ++i) {
+      result_.frames[i].rejection = rejections[i].first;
+      result_.frames[i].reading_error_mm = rejections[i].second;
     }
-    const model::ThickLens& lens = sweep_.camera.lens;
-    const double depth_mm = result_.frames[reference_].depth_mm;
-    const double rear_mm = period->period_px * sweep_.camera.sensor.pixel_pitch_mm /
-                           *sweep_.target_period_mm * depth_mm * lens.rear_focal_length_mm /
-                           lens.front_focal_length_mm;
-    MagnificationCheck check;
-    check.period_px = period->period_px;
-    check.period_mm = *sweep_.target_period_mm;
-    check.image_distance_mm = {lens.lens_thickness_mm + rear_mm,
-                               rear_mm * std::hypot(period->sigma_px / period->period_px,
-                                                    result_.bench_offset_mm->sigma / depth_mm)};
-    result_.magnification = check;
-    const double apart_mm = check.image_distance_mm.value - result_.image_distance_mm->value;
-    const double sigma_mm =
-        std::hypot(check.image_distance_mm.sigma, result_.image_distance_mm->sigma);
-    if (std::abs(apart_mm) > 3 * sigma_mm) {
-      result_.warnings.push_back(fmt::format(
-          "the image scale of the target puts d1 at {:.4g} +- {:.2g} mm, {:+.1f} % from the focus: "
-          "focal length, pixel pitch, target_period_mm or the readings are off by as much",
-          check.image_distance_mm.value, check.image_distance_mm.sigma,
-          100 * apart_mm / result_.image_distance_mm->value));
-    }
+    const auto is_rejected = [this](const ScaleSample& sample) {
+      return !result_.frames[sample.frame].rejection.empty();
+    };
+    scales_.erase(std::remove_if(scales_.begin(), scales_.end(), is_rejected), scales_.end());
+    if (!Passed(selection_.KeepUnrejected())) return false;
+    ReplaceReference();
+    return true;
   }
 
   std::pair<double, double> DepthRange() const {
     const auto [low, high] =
-        std::minmax_element(used_.begin(), used_.end(), [&](std::size_t a, std::size_t b) {
+        std::minmax_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
           return result_.frames[a].depth_mm < result_.frames[b].depth_mm;
         });
     return {result_.frames[*low].depth_mm, result_.frames[*high].depth_mm};
@@ -437,10 +323,11 @@ class Calibrator {
   const CalibrationOptions& options_;
   FrameStore store_;
   Calibration result_;
-  std::vector<std::size_t> used_;    // frames that passed the gates
-  std::size_t reference_ = 0;        // the sharpest of them, normalised
-  std::vector<ScaleSample> scales_;  // registered frames
+  FrameSelection selection_{&result_.frames};  // frames that passed the gates
+  std::size_t reference_ = 0;                  // the sharpest of them, normalised
+  std::vector<ScaleSample> scales_;            // registered frames
   std::optional<Slip> slip_;
+  std::optional<Bend> bend_;
   std::mutex progress_mutex_;
   int steps_done_ = 0;
   int total_steps_ = 0;

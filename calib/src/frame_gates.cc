@@ -165,6 +165,19 @@ double CoarseTexture(const cv::Mat& grey, const cv::Mat& slow, double noise_sigm
 
 }  // namespace
 
+std::string RejectionKind(const std::string& rejection) {
+  std::string kind = rejection.substr(0, rejection.find_first_of(":,0123456789"));
+  const auto trim = [&kind] { kind.erase(kind.find_last_not_of(" -+.") + 1); };
+  trim();
+  // What is left where the amount stands in the middle: "reading off by 15.1 mm".
+  const std::string preposition = " by";
+  if (kind.size() > preposition.size() &&
+      kind.compare(kind.size() - preposition.size(), preposition.size(), preposition) == 0)
+    kind.resize(kind.size() - preposition.size());
+  trim();
+  return kind;
+}
+
 FrameStatistics MeasureFrame(const cv::Mat& stored, const cv::Mat& linear_grey) {
   FrameStatistics result;
   const double full_scale = stored.depth() == CV_8U ? 255 : 65535;
@@ -201,24 +214,27 @@ FrameStatistics MeasureFrame(const cv::Mat& stored, const cv::Mat& linear_grey) 
 std::optional<std::string> RejectionReason(const FrameStatistics& frame, double median_contrast,
                                            const GateOptions& options) {
   if (!(frame.mean_stored >= options.min_mean_stored)) {
-    return fmt::format("dark: mean {:.3f} of full scale, at least {:.3f} is needed",
-                       frame.mean_stored, options.min_mean_stored);
+    return fmt::format("{}: mean {:.4f} of full scale, at least {:.4f} is needed: expose longer",
+                       kKindDark, frame.mean_stored, options.min_mean_stored);
   }
   if (frame.is_mosaic) {
     return "raw mosaic: develop it first (the pixels of a colour filter stand side by side in one "
            "channel)";
   }
   if (!(frame.saturated_fraction <= options.max_saturated_fraction)) {
-    return fmt::format("saturated: {:.0f} % of the pixels pile up at {:.0f}, at most {:.0f} % may",
-                       100 * frame.saturated_fraction, frame.saturation_level,
-                       100 * options.max_saturated_fraction);
+    return fmt::format(
+        "{}: {:.0f} % of the pixels pile up at {:.0f}, at most {:.0f} % may: lower the exposure",
+        kKindSaturated, 100 * frame.saturated_fraction, frame.saturation_level,
+        100 * options.max_saturated_fraction);
   }
   if (!options.edge_target && !frame.black_is_one_side &&
       !(frame.black_fraction <= options.max_black_fraction)) {
     return fmt::format(
-        "black: {:.0f} % of the pixels pile up at {:.0f}, at most {:.0f} % may unless the target "
-        "is an edge: expose longer or lower the camera's black level",
-        100 * frame.black_fraction, frame.black_level, 100 * options.max_black_fraction);
+        "{}: {:.0f} % of the pixels pile up at {:.0f}, at most {:.0f} % may unless the target is "
+        "an "
+        "edge: expose longer or lower the camera's black level",
+        kKindBlack, 100 * frame.black_fraction, frame.black_level,
+        100 * options.max_black_fraction);
   }
   // White noise of standard deviation n, smoothed by sigma 1 px: derivative n/sqrt(8 pi) per axis.
   const double noise_gradient = frame.noise_sigma / std::sqrt(8 * CV_PI);

@@ -5,18 +5,15 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <set>
+
+#include "frame_selection.h"
 
 namespace thicklens::calib {
 namespace {
 
 constexpr double kFarOff = 6;  // standard deviations
-
-std::string FileName(const FrameMeasurement& frame) {
-  return std::filesystem::path(frame.image).filename().string();
-}
 
 // A frame whose scale says another reading than the one that was written.
 struct WrongReading {
@@ -71,13 +68,48 @@ void RejectRepeated(std::vector<FrameMeasurement>* frames) {
       const std::size_t other = *std::find_if(members.begin(), members.end(), [&](std::size_t m) {
         return (*frames)[m].reading_mm != (*frames)[i].reading_mm;
       });
-      (*frames)[i].rejection = fmt::format("repeated picture: the same as {} at reading {} mm",
-                                           FileName((*frames)[other]), (*frames)[other].reading_mm);
+      (*frames)[i].rejection =
+          fmt::format("repeated picture: the same as {} at reading {:.6g} mm",
+                      FileName((*frames)[other].image), (*frames)[other].reading_mm);
     }
   }
 }
 
+bool IsStatedEdge(const FocusSweep& sweep) {
+  return sweep.target == model::SweepTarget::kKnifeEdge ||
+         sweep.target == model::SweepTarget::kPrintedEdge;
+}
+
 }  // namespace
+
+bool IsLoneEdge(const FocusSweep& sweep, std::size_t used, std::size_t registered,
+                const ScaleLaw& law) {
+  return IsStatedEdge(sweep) && law.kind == ScaleKind::kUnknown &&
+         (law.contradicts_readings || 2 * registered < used);
+}
+
+std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
+                               const std::vector<std::size_t>& used, const ScaleLaw& law) {
+  const auto registered = static_cast<std::size_t>(std::count_if(
+      used.begin(), used.end(), [&](std::size_t i) { return frames[i].image_scale.has_value(); }));
+  const bool was_tried = law.reference_frame >= 0;
+  if (!was_tried || law.done || IsStatedEdge(sweep) || 2 * registered >= used.size()) return "";
+  return fmt::format(
+      "only {} of {} frames could be registered to one another: every frame must show the same "
+      "part of the target, or, if it is a lone edge, which shows no image scale, state target: "
+      "knife-edge or printed-edge",
+      registered, used.size());
+}
+
+void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, ScaleLaw* law) {
+  const auto is_other = [&](const ScaleSample& sample) {
+    return static_cast<int>(sample.frame) != law->reference_frame;
+  };
+  samples->erase(std::remove_if(samples->begin(), samples->end(), is_other), samples->end());
+  law->contradicts_readings = false;
+  law->message = "a lone edge shows no image scale: ";
+  law->message += sweep.offset_mm ? "offset_mm is taken as given" : "state offset_mm";
+}
 
 std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
                                                const std::vector<FrameMeasurement>& frames,
@@ -109,7 +141,21 @@ void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>
         "that of reading {:.1f} mm",
         one.error_mm, frame.reading_mm - one.error_mm);
     if (const auto other = SwappedWith(one, wrong, sweep))
-      frame.rejection += fmt::format("; swapped with {}", FileName((*frames)[*other]));
+      frame.rejection += fmt::format("; swapped with {}", FileName((*frames)[*other].image));
+  }
+}
+
+void RejectUnregistered(const std::vector<ScaleSample>& samples,
+                        const std::vector<std::size_t>& used, std::size_t reference,
+                        const ScaleLaw& law, std::vector<FrameMeasurement>* frames) {
+  if (!law.done) return;
+  std::set<std::size_t> registered;
+  for (const ScaleSample& sample : samples) registered.insert(sample.frame);
+  for (const std::size_t i : used) {
+    if (registered.count(i) > 0) continue;
+    (*frames)[i].rejection =
+        fmt::format("does not show the target: it cannot be registered to {}, the sharpest frame",
+                    FileName((*frames)[reference].image));
   }
 }
 

@@ -10,6 +10,18 @@
 
 namespace thicklens::calib {
 
+// Whether the target, stated to be an edge, is nothing but one straight edge. It shows no image
+// scale: it registers seldom, and wherever along itself it happens to.
+bool IsLoneEdge(const FocusSweep& sweep, std::size_t used, std::size_t registered,
+                const ScaleLaw& law);
+// Then only the reference is left, and the law says what takes its place.
+void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, ScaleLaw* law);
+
+// What to do where most of the used frames could not be registered and no law was found; else
+// empty.
+std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
+                               const std::vector<std::size_t>& used, const ScaleLaw& law);
+
 // Why the image scales of the used frames forbid any result, or nothing: the readings run the other
 // way or are in no order at all, or one picture was repeated for all of them.
 std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
@@ -21,6 +33,12 @@ std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
 // picture stands at another reading too: sets their `rejection`.
 void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>& samples,
                          const ScaleLaw& law, std::vector<FrameMeasurement>* frames);
+
+// Where the others follow a law, a frame that does not register to the reference shows something
+// else: sets its `rejection`.
+void RejectUnregistered(const std::vector<ScaleSample>& samples,
+                        const std::vector<std::size_t>& used, std::size_t reference,
+                        const ScaleLaw& law, std::vector<FrameMeasurement>* frames);
 
 // From one frame on all readings are off by as much: a clamp that slipped, a table moved by a row.
 struct Slip {

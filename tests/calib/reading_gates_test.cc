@@ -227,5 +227,76 @@ TEST(ReasonAgainstScales, AConstantScaleNeedsTheBenchZero) {
   EXPECT_FALSE(bench.Reason());
 }
 
+TEST(RegistrationAdvice, SpeaksWhereFewRegisterAndNoLawIsFound) {
+  Bench bench;
+  const auto advice = [&] {
+    return RegistrationAdvice(bench.sweep, bench.frames, bench.Used(), bench.law);
+  };
+  bench.law = {};
+  for (std::size_t i = 0; i < 10; ++i) bench.frames[i].image_scale = 1;
+  EXPECT_EQ(advice(), "") << "registration was not tried";
+  bench.law.reference_frame = 3;
+  EXPECT_THAT(advice(), AllOf(HasSubstr("only 10 of 21 frames could be registered"),
+                              HasSubstr("state target: knife-edge")));
+  bench.sweep.target = model::SweepTarget::kKnifeEdge;
+  EXPECT_EQ(advice(), "") << "it is stated already";
+  bench.sweep.target = model::SweepTarget::kAuto;
+  bench.law.done = true;
+  EXPECT_EQ(advice(), "");
+  bench.law.done = false;
+  bench.frames[10].image_scale = 1;
+  EXPECT_EQ(advice(), "");
+}
+
+TEST(RejectUnregistered, NamesFramesThatShowSomethingElseWhereTheOthersFollowALaw) {
+  Bench bench;
+  bench.samples.erase(bench.samples.begin() + 6);
+  bench.law.done = false;
+  RejectUnregistered(bench.samples, bench.Used(), 12, bench.law, &bench.frames);
+  EXPECT_EQ(bench.frames[6].rejection, "");
+  bench.law.done = true;
+  RejectUnregistered(bench.samples, bench.Used(), 12, bench.law, &bench.frames);
+  EXPECT_THAT(bench.frames[6].rejection,
+              AllOf(HasSubstr("does not show the target: "), HasSubstr("frame-12.png")));
+  for (std::size_t i = 0; i < bench.frames.size(); ++i) {
+    EXPECT_EQ(bench.frames[i].rejection.empty(), i != 6) << i;
+  }
+}
+
+TEST(IsLoneEdge, AStatedEdgeWithoutALawWhoseScalesAreFewOrInDisorder) {
+  Bench bench;
+  bench.law = {};
+  for (const auto target : {model::SweepTarget::kKnifeEdge, model::SweepTarget::kPrintedEdge}) {
+    bench.sweep.target = target;
+    EXPECT_TRUE(IsLoneEdge(bench.sweep, 21, 10, bench.law));
+    EXPECT_FALSE(IsLoneEdge(bench.sweep, 21, 11, bench.law));
+    bench.law.contradicts_readings = true;
+    EXPECT_TRUE(IsLoneEdge(bench.sweep, 21, 20, bench.law));
+    bench.law.contradicts_readings = false;
+  }
+  bench.law.kind = ScaleKind::kInverseDepth;
+  EXPECT_FALSE(IsLoneEdge(bench.sweep, 21, 6, bench.law)) << "a texture around it tells the scale";
+  bench.law.kind = ScaleKind::kUnknown;
+  for (const auto target : {model::SweepTarget::kAuto, model::SweepTarget::kTexture}) {
+    bench.sweep.target = target;
+    EXPECT_FALSE(IsLoneEdge(bench.sweep, 21, 1, bench.law));
+  }
+}
+
+TEST(ForgetScales, KeepsTheReferenceAloneAndSaysWhatIsTaken) {
+  Bench bench;
+  bench.law = {};
+  bench.law.reference_frame = 12;
+  bench.law.contradicts_readings = true;
+  ForgetScales(bench.sweep, &bench.samples, &bench.law);
+  ASSERT_EQ(bench.samples.size(), 1u);
+  EXPECT_EQ(bench.samples[0].frame, 12u);
+  EXPECT_FALSE(bench.law.contradicts_readings);
+  EXPECT_THAT(bench.law.message, HasSubstr("state offset_mm"));
+  bench.sweep.offset_mm = model::Estimate{30, 0.1};
+  ForgetScales(bench.sweep, &bench.samples, &bench.law);
+  EXPECT_THAT(bench.law.message, HasSubstr("offset_mm is taken as given"));
+}
+
 }  // namespace
 }  // namespace thicklens::calib

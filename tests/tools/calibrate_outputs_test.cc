@@ -89,6 +89,24 @@ TEST_F(CalibrateOutputs, FiguresLieBesideThePageAndAreReplaced) {
   EXPECT_FALSE(json.at("field").at("done").get<bool>());
 }
 
+// The field of so small a picture may have no map; what tells is whether one was tried.
+TEST_F(CalibrateOutputs, NoFieldLeavesTheMapOut) {
+  fs::create_directories(folder_ / "out");
+  std::string message[2];
+  for (const bool without : {false, true}) {
+    Arguments options = {"--json", folder_ / "result.json"};
+    if (without) options.emplace_back("--no-field");
+    const ProgramResult result = Calibrate(options);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    message[without ? 1 : 0] = nlohmann::json::parse(ContentOf(folder_ / "result.json"))
+                                   .at("field")
+                                   .at("message")
+                                   .get<std::string>();
+  }
+  EXPECT_NE(message[0], "not run");
+  EXPECT_EQ(message[1], "not run");
+}
+
 TEST_F(CalibrateOutputs, FilesOfOthersAmongTheFiguresStopTheRunAtOnce) {
   folder_.Put("out/report/figures/captions.txt", "of an older run");
   folder_.Put("out/report/figures/mine.svg", "mine");

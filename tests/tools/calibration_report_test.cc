@@ -125,10 +125,11 @@ TEST(CalibrationReport, RefusalSaysWhyAndShowsNoEmptyFigures) {
   ASSERT_EQ(document.error, "");
   EXPECT_THAT(html, HasSubstr("Refused: no usable frame (20 dark, 11 blank)"));
   EXPECT_TRUE(document.Named("svg").empty());
-  EXPECT_THAT(html, HasSubstr("frame_000.png … frame_019.png"));
+  EXPECT_THAT(html, HasSubstr("frame_020.png … frame_030.png (11 frames)"));
   for (const char* count : {"20", "11"}) EXPECT_TRUE(HasCell(document, count)) << count;
-  // Two runs, each frame of them, five numbers of the camera, and the three heads.
-  EXPECT_EQ(document.Named("tr").size(), 2u + 31u + 5u + 3u);
+  // Twelve dark frames and how many more, one run of blank ones, each frame of them, five numbers
+  // of the camera, and the three heads.
+  EXPECT_EQ(document.Named("tr").size(), 13u + 1u + 31u + 5u + 3u);
 }
 
 TEST(CalibrationReport, WithoutDepthsPlotsAgainstReadings) {
@@ -312,6 +313,24 @@ TEST(CalibrationReport, ShowsRejectedFramesAndCountsTheRest) {
   EXPECT_EQ(asked.count(2) + asked.count(40), 2u);
   EXPECT_THAT(MakeCalibrationReport(made.sweep, made.calibration, nullptr, kOrigin, picture).html,
               HasSubstr("… and 10 more."));
+}
+
+TEST(CalibrationReport, GivesEveryRejectedFrameItsOwnAmount) {
+  MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
+  RejectFrame(4, "reading off by -4.1 mm, or frame damaged", &made.calibration);
+  RejectFrame(5, "reading off by 4.0 mm, or frame damaged", &made.calibration);
+  for (int i = 10; i < 30; ++i)
+    RejectFrame(i, "dark: mean 0.0" + std::to_string(i), &made.calibration);
+  const std::string html =
+      MakeCalibrationReport(made.sweep, made.calibration, nullptr, kOrigin, {}).html;
+  const std::string table = html.substr(html.find("<h2>Rejected frames"));
+  const std::string overview = table.substr(0, table.find("<details>"));
+  EXPECT_THAT(overview, HasSubstr("by −4.1 mm")) << "the numbers of the one";
+  EXPECT_THAT(overview, HasSubstr("by 4.0 mm")) << "and of the other";
+  EXPECT_THAT(overview, HasSubstr("mean 0.021"));
+  EXPECT_THAT(overview, Not(HasSubstr("mean 0.022")));
+  EXPECT_THAT(overview, HasSubstr("and 8 more"));
+  EXPECT_THAT(table, HasSubstr("mean 0.029")) << "each is named further down";
 }
 
 // Linear cameras' pictures would look nearly black.

@@ -46,27 +46,6 @@ TEST(Rounding, WithoutAnErrorShowsFiveDigits) {
   EXPECT_EQ(RoundedTo(kNan, 0.1), "nan");
 }
 
-TEST(RejectionRuns, JoinsNeighboursOfOneKind) {
-  std::vector<calib::FrameMeasurement> frames(9);
-  frames[0].rejection = "dark: mean 0.001 below 0.016";
-  frames[1].rejection = "dark: mean 0.002 below 0.016";
-  frames[2].rejection = "saturated: 12 % of samples";
-  frames[4].rejection = "dark: mean 0.003 below 0.016";
-  frames[7].rejection = "blank";
-  frames[8].rejection = "blank";
-  const std::vector<RejectionRun> runs = RejectionRuns(frames);
-  ASSERT_EQ(runs.size(), 4u);
-  EXPECT_EQ(runs[0].first, 0);
-  EXPECT_EQ(runs[0].last, 1);
-  EXPECT_FALSE(runs[0].identical);
-  EXPECT_EQ(runs[0].reason, "dark: mean 0.001 below 0.016");
-  EXPECT_EQ(runs[1].first, 2);
-  EXPECT_EQ(runs[1].last, 2);
-  EXPECT_EQ(runs[2].first, 4);
-  EXPECT_EQ(runs[3].last, 8);
-  EXPECT_TRUE(runs[3].identical);
-}
-
 TEST(CalibrationText, PutsBothMethodsBesideTheTruth) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const std::string text = CalibrationText(made.sweep, made.calibration, &made.truth);
@@ -110,7 +89,7 @@ TEST(CalibrationText, TellsWhyFramesWereRejected) {
   made.calibration.reason = "floor unknown";
   const std::string text = CalibrationText(made.sweep, made.calibration, nullptr);
   EXPECT_THAT(text, HasSubstr("41 frames: 38 used, 3 rejected\n"));
-  EXPECT_THAT(text, HasSubstr("  frame_000.png .. frame_001.png (2 frames): dark: mean 0.001"));
+  EXPECT_THAT(text, HasSubstr("  dark (2 frames):\n    frame_000.png: mean 0.001"));
   EXPECT_THAT(text, HasSubstr("  frame_009.png: blank\n"));
   EXPECT_THAT(text, HasSubstr("warning: focus extrapolated by 3 mm\n"));
   EXPECT_THAT(text, HasSubstr("partial: floor unknown (2.7 s)\n"));

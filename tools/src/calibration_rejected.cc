@@ -9,6 +9,7 @@
 #include "page_pictures.h"
 #include "page_style.h"
 #include "printable_text.h"
+#include "rejection_groups.h"
 
 namespace thicklens::tools {
 namespace {
@@ -18,25 +19,34 @@ using calib::FocusSweep;
 using calib::FrameMeasurement;
 
 constexpr std::size_t kMostThumbnails = 12;
-constexpr int kThumbnailPx = 220;  // longest edge
+constexpr std::size_t kMostRuns = 12;  // of one kind in the table
+constexpr int kThumbnailPx = 220;      // longest edge
 
-std::string RunsTable(const Calibration& calibration, const std::vector<RejectionRun>& runs) {
-  const auto name_of = [&](int index) {
-    return FrameName(calibration.frames[static_cast<std::size_t>(index)].image);
-  };
-  std::string html =
-      "<div class=\"wide\"><table>\n<thead><tr><th>frames</th><th class=\"number\">how many</th>"
-      "<th>reason</th></tr></thead>\n<tbody>\n";
-  for (const RejectionRun& run : runs) {
-    const int count = run.last - run.first + 1;
-    const std::string first = name_of(run.first);
-    html +=
-        "<tr>" +
-        TableCell(count == 1 ? first : fmt::format("{} … {}", first, name_of(run.last)), "name") +
-        TableCell(fmt::format("{}", count)) +
-        TableCell(run.reason + (run.identical ? "" : " (numbers of the first of them)"), "") +
-        "</tr>\n";
+std::string GroupRows(const Calibration& calibration, const RejectionGroup& group) {
+  const std::vector<std::string> details = TextsOfRuns(calibration.frames, group);
+  std::string html;
+  int told = 0;
+  for (std::size_t i = 0; i < std::min(group.runs.size(), kMostRuns); ++i) {
+    const RejectionRun& run = group.runs[i];
+    html += "<tr>" + TableCell(i == 0 ? group.kind : "", "name") +
+            TableCell(i == 0 ? fmt::format("{}", group.frames) : "") +
+            TableCell(Typeset(RunName(calibration.frames, run)), "name") +
+            TableCell(Typeset(details[i]), "") + "</tr>\n";
+    told += run.count();
   }
+  if (told < group.frames) {
+    html += "<tr>" + TableCell("", "name") + TableCell("") +
+            TableCell(fmt::format("and {} more", group.frames - told), "name") +
+            TableCell("in the table below", "") + "</tr>\n";
+  }
+  return html;
+}
+
+std::string GroupsTable(const Calibration& calibration, const std::vector<RejectionGroup>& groups) {
+  std::string html =
+      "<div class=\"wide\"><table>\n<thead><tr><th>reason</th><th class=\"number\">how many</th>"
+      "<th>frames</th><th>in each</th></tr></thead>\n<tbody>\n";
+  for (const RejectionGroup& group : groups) html += GroupRows(calibration, group);
   return html + "</tbody></table></div>\n";
 }
 
@@ -59,14 +69,23 @@ std::string LevelsTable(const Calibration& calibration, std::size_t rejected) {
   return html + "</tbody></table></div></details>\n";
 }
 
-// The first of every run, then the second of every run, and so on: each kind of damage is seen.
-std::vector<std::size_t> ChosenForShow(const std::vector<RejectionRun>& runs) {
+std::vector<int> FramesOf(const RejectionGroup& group) {
+  std::vector<int> frames;
+  for (const RejectionRun& run : group.runs)
+    for (int i = run.first; i <= run.last; ++i) frames.push_back(i);
+  return frames;
+}
+
+// The first of every kind, then the second of every kind, and so on: each kind of damage is seen.
+std::vector<std::size_t> ChosenForShow(const std::vector<RejectionGroup>& groups) {
   std::vector<std::size_t> chosen;
-  for (int turn = 0;; ++turn) {
+  for (std::size_t turn = 0;; ++turn) {
     const std::size_t before = chosen.size();
-    for (const RejectionRun& run : runs)
-      if (run.first + turn <= run.last && chosen.size() < kMostThumbnails)
-        chosen.push_back(static_cast<std::size_t>(run.first + turn));
+    for (const RejectionGroup& group : groups) {
+      const std::vector<int> frames = FramesOf(group);
+      if (turn < frames.size() && chosen.size() < kMostThumbnails)
+        chosen.push_back(static_cast<std::size_t>(frames[turn]));
+    }
     if (chosen.size() == before) break;
   }
   std::sort(chosen.begin(), chosen.end());
@@ -122,14 +141,14 @@ std::string Thumbnails(const FocusSweep& sweep, const Calibration& calibration,
 
 std::string RejectedSection(const FocusSweep& sweep, const Calibration& calibration,
                             const FramePictures& pictures) {
-  const std::vector<RejectionRun> runs = RejectionRuns(calibration.frames);
+  const std::vector<RejectionGroup> groups = RejectionGroups(calibration.frames);
   std::string html = "<h2>Rejected frames</h2>\n";
-  if (runs.empty()) return html + "<p>None.</p>\n";
+  if (groups.empty()) return html + "<p>None.</p>\n";
   const auto rejected = static_cast<std::size_t>(
       std::count_if(calibration.frames.begin(), calibration.frames.end(),
                     [](const FrameMeasurement& frame) { return !frame.rejection.empty(); }));
-  html += RunsTable(calibration, runs);
-  if (pictures) html += Thumbnails(sweep, calibration, ChosenForShow(runs), rejected, pictures);
+  html += GroupsTable(calibration, groups);
+  if (pictures) html += Thumbnails(sweep, calibration, ChosenForShow(groups), rejected, pictures);
   return html + LevelsTable(calibration, rejected);
 }
 

@@ -9,18 +9,13 @@
 
 #include "calibration_words.h"
 #include "printable_text.h"
+#include "rejection_groups.h"
 
 namespace thicklens::tools {
 namespace {
 
 constexpr char kNotRun[] = "not run";
 constexpr std::size_t kPartsTold = 3;  // systematic parts in the text; the rest is in the JSON
-
-// What a rejection is about: its words before the numbers of the single frame.
-std::string ReasonKind(const std::string& reason) {
-  const std::string kind = reason.substr(0, reason.find_first_of("(:,;0123456789"));
-  return kind.substr(0, kind.find_last_not_of(" -") + 1);
-}
 
 std::optional<std::string> ImageOf(const calib::Calibration& calibration, int index) {
   if (index < 0 || index >= static_cast<int>(calibration.frames.size())) return std::nullopt;
@@ -84,16 +79,6 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
     rows.push_back(std::move(row));
   }
   return AlignedTable(rows);
-}
-
-std::string RejectionLine(const calib::Calibration& calibration, const RejectionRun& run) {
-  const std::string first = ImageOf(calibration, run.first).value_or("");
-  const std::string last = ImageOf(calibration, run.last).value_or("");
-  const std::string reason = PrintableUtf8(run.reason);
-  if (run.first == run.last) return fmt::format("  {}: {}\n", FrameName(first), reason);
-  return fmt::format("  {} .. {} ({} frames): {}{}\n", FrameName(first), FrameName(last),
-                     run.last - run.first + 1, reason,
-                     run.identical ? "" : " [the first frame's numbers]");
 }
 
 void AddLine(const char* about, const std::string& line, std::string* text) {
@@ -205,22 +190,6 @@ std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
   return rows;
 }
 
-std::vector<RejectionRun> RejectionRuns(const std::vector<calib::FrameMeasurement>& frames) {
-  std::vector<RejectionRun> runs;
-  for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
-    const std::string& reason = frames[static_cast<std::size_t>(i)].rejection;
-    if (reason.empty()) continue;
-    if (!runs.empty() && runs.back().last == i - 1 &&
-        ReasonKind(runs.back().reason) == ReasonKind(reason)) {
-      runs.back().last = i;
-      runs.back().identical = runs.back().identical && reason == runs.back().reason;
-    } else {
-      runs.push_back({i, i, reason, true});
-    }
-  }
-  return runs;
-}
-
 std::string FrameName(const std::string& image) {
   const std::string name = std::filesystem::path(image).filename().string();
   return PrintableUtf8(name.empty() ? image : name);
@@ -244,9 +213,7 @@ std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibra
         "part of the target that all frames share\n",
         not_in_fit);
   }
-  for (const RejectionRun& run : RejectionRuns(calibration.frames))
-    text += RejectionLine(calibration, run);
-  text += '\n';
+  text += RejectionLines(calibration.frames) + '\n';
   if (std::any_of(rows.begin(), rows.end(),
                   [](const ResultRow& row) { return row.fit || row.source || row.peak; }))
     text += ResultTable(rows, truth != nullptr) + '\n';

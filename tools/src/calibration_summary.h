@@ -26,14 +26,6 @@ struct ResultRow {
 std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
                                   const model::SweepTruth* truth);
 
-// Neighbouring frames of the sweep that were rejected for the same kind of reason.
-struct RejectionRun {
-  int first = 0, last = 0;  // indices into the frames
-  std::string reason;       // of the first
-  bool identical = true;    // false: the others' reasons differ in their numbers
-};
-std::vector<RejectionRun> RejectionRuns(const std::vector<calib::FrameMeasurement>& frames);
-
 // The file's own name out of a path, printable.
 std::string FrameName(const std::string& image);
 

@@ -8,6 +8,15 @@
 
 namespace thicklens::calib {
 
+// What a rejection is about, without the numbers and names of the single frame: "dark" of "dark:
+// mean 0.003 of full scale", "reading off" of "reading off by 15.1 mm, or frame damaged". Every
+// rejection begins with it.
+std::string RejectionKind(const std::string& rejection);
+// Those that are the light's fault.
+inline constexpr char kKindDark[] = "dark";
+inline constexpr char kKindBlack[] = "black";
+inline constexpr char kKindSaturated[] = "saturated";
+
 // What a frame is like before anything is normalised; levels in units of full scale.
 struct FrameStatistics {
   double mean_stored = 0;   // mean of the stored grey values

@@ -1,0 +1,117 @@
+#include "calibration_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "frame_selection.h"
+#include "systematic_parts.h"
+#include "target_period.h"
+
+namespace thicklens::calib {
+namespace {
+
+// m = f1 D/(f2 z) on the sensor over the target, so D = m z f2/f1.
+MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstimate& period,
+                                      double depth_mm, double offset_sigma_mm) {
+  const model::ThickLens& lens = sweep.camera.lens;
+  const double rear_mm = period.period_px * sweep.camera.sensor.pixel_pitch_mm /
+                         *sweep.target_period_mm * depth_mm * lens.rear_focal_length_mm /
+                         lens.front_focal_length_mm;
+  MagnificationCheck check;
+  check.period_px = period.period_px;
+  check.period_mm = *sweep.target_period_mm;
+  check.image_distance_mm = {
+      lens.lens_thickness_mm + rear_mm,
+      rear_mm * std::hypot(period.sigma_px / period.period_px, offset_sigma_mm / depth_mm)};
+  return check;
+}
+
+}  // namespace
+
+void CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) {
+  const ScaleLaw& law = calibration->scale;
+  if (!law.done) {
+    calibration->warnings.push_back("the given offset_mm could not be checked: " + law.message);
+    return;
+  }
+  const double apart_mm = law.offset_mm.value - sweep.offset_mm->value;
+  const double sigma_mm = std::hypot(law.offset_mm.sigma, sweep.offset_mm->sigma);
+  if (std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm) {
+    calibration->warnings.push_back(
+        fmt::format("the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from "
+                    "the given one",
+                    law.offset_mm.value, law.offset_mm.sigma, apart_mm));
+  }
+}
+
+void CheckDistortion(Calibration* calibration) {
+  const auto& distortion = calibration->scale.distortion_at_corner;
+  if (!distortion || !(std::abs(distortion->value) > std::max(0.005, 4 * distortion->sigma)))
+    return;
+  calibration->warnings.push_back(
+      fmt::format("the pictures are distorted: {:+.1f} +- {:.1f} % at the corner ({}); undistort "
+                  "them first, depth and blur are those of an undistorted camera",
+                  100 * distortion->value, 100 * distortion->sigma,
+                  distortion->value > 0 ? "pincushion" : "barrel"));
+}
+
+std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSample>& scales,
+                              Calibration* calibration) {
+  const std::optional<Bend> bend = FindBend(scales, calibration->scale, sweep);
+  if (!bend) return std::nullopt;
+  calibration->warnings.push_back(fmt::format(
+      "the readings bend against the image scale: in the middle of the sweep they lie {:+.2f} +- "
+      "{:.2f} mm off the straight line through its ends. The rail's scale is not linear, the "
+      "pictures are distorted, or the lens breathes. A bench zero from the image scale is then "
+      "less certain than its error says: the farther half of the sweep alone puts it {:+.1f} mm "
+      "from where the nearer half does",
+      bend->bow_mm.value, bend->bow_mm.sigma, bend->zero_spread_mm));
+  return bend;
+}
+
+void WidenByBend(const FocusSweep& sweep, const Bend& bend, Calibration* calibration) {
+  const double half_mm = 0.5 * std::abs(bend.zero_spread_mm);
+  Result& zero = *calibration->bench_offset_mm;
+  zero.systematic = Eigen::Vector2d(zero.value - half_mm, zero.value + half_mm);
+  WidenFocus("bend of the image scale", half_mm,
+             "measure offset_mm, check the rail's scale, undistort the pictures", sweep.camera.lens,
+             calibration);
+}
+
+void CheckSlip(const FocusSweep& sweep, const Slip& slip, Calibration* calibration) {
+  const FrameMeasurement& frame = calibration->frames[slip.frame];
+  calibration->warnings.push_back(
+      fmt::format("the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} "
+                  "(reading {:.6g} mm) "
+                  "on: check the clamp and the table of readings there",
+                  slip.jump_mm.value, slip.jump_mm.sigma, FileName(frame.image), frame.reading_mm));
+  WidenFocus("jump of the readings", std::abs(slip.jump_mm.value),
+             "find what slipped, or take the sweep again", sweep.camera.lens, calibration);
+}
+
+void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv::Mat& grey,
+                        Calibration* calibration) {
+  if (!calibration->image_distance_mm) return;
+  const std::optional<PeriodEstimate> period = MeasurePeriodPx(grey);
+  if (!period) {
+    calibration->warnings.emplace_back(
+        "target_period_mm is stated, but the sharpest frame shows no period to compare with");
+    return;
+  }
+  const MagnificationCheck check = DistanceFromPeriod(
+      sweep, *period, calibration->frames[reference].depth_mm, calibration->bench_offset_mm->sigma);
+  calibration->magnification = check;
+  const Result& focus = *calibration->image_distance_mm;
+  const double apart_mm = check.image_distance_mm.value - focus.value;
+  if (std::abs(apart_mm) > 3 * std::hypot(check.image_distance_mm.sigma, focus.sigma)) {
+    calibration->warnings.push_back(fmt::format(
+        "the image scale of the target puts d1 at {:.4g} +- {:.2g} mm, {:+.1f} % from the focus: "
+        "focal length, pixel pitch, target_period_mm or the readings are off by as much",
+        check.image_distance_mm.value, check.image_distance_mm.sigma,
+        100 * apart_mm / focus.value));
+  }
+}
+
+}  // namespace thicklens::calib
