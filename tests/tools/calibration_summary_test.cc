@@ -65,6 +65,19 @@ TEST(CalibrationText, PutsBothMethodsBesideTheTruth) {
   EXPECT_THAT(text, HasSubstr("\nok (2.7 s)\n"));
 }
 
+TEST(CalibrationText, AnErrorThatTheIntervalAllowsForIsNotCountedInSigmas) {
+  MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
+  made.calibration.image_distance_mm->value = 16.2159;  // 16.2129 is the truth: 2.5 sigma
+  made.calibration.image_distance_mm->systematic = Eigen::Vector2d(16.2128, 16.2190);
+  const auto d1 = [&] {
+    return LineWith(CalibrationText(made.sweep, made.calibration, &made.truth),
+                    "image distance d1 [mm]");
+  };
+  EXPECT_THAT(d1(), HasSubstr("+0.0030 (within the interval)"));
+  made.calibration.image_distance_mm->systematic = Eigen::Vector2d(16.2130, 16.2190);
+  EXPECT_THAT(d1(), HasSubstr("+0.0030 (+2.5 sigma)"));
+}
+
 TEST(CalibrationText, AlignsItsColumns) {
   const MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const std::string text = CalibrationText(made.sweep, made.calibration, &made.truth);

@@ -67,9 +67,17 @@ std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
       row.push_back(rounded(result.truth));
       std::string error = "-";
       if (result.truth && result.fit && std::isfinite(result.fit->value)) {
-        error = SignedRoundedTo(result.fit->value - *result.truth, sigma);
-        if (UsableSigma(sigma))
-          error += fmt::format(" ({:+.1f} sigma)", (result.fit->value - *result.truth) / sigma);
+        const double off = result.fit->value - *result.truth;
+        const auto& interval = result.fit->systematic;
+        const bool is_within =
+            interval && interval->x() <= *result.truth && *result.truth <= interval->y();
+        error = SignedRoundedTo(off, sigma);
+        // sigma is the statistical part alone.
+        if (is_within && std::abs(off) > 2 * sigma) {
+          error += " (within the interval)";
+        } else if (UsableSigma(sigma)) {
+          error += fmt::format(" ({:+.1f} sigma)", off / sigma);
+        }
       }
       row.push_back(error);
       row.push_back(result.truth && result.source
