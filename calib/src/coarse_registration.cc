@@ -13,6 +13,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr int kCoarseSizePx = 160;
+constexpr int kAgreementSizePx = 100;
 constexpr int kSmallestFieldPx = 24;  // of shrunk pictures
 constexpr int kPadding = 2;
 constexpr int kIterations = 40;
@@ -31,8 +32,12 @@ inline void CubicWeights(float t, float* w) {
 }
 
 // Where the frame's content lies against the reference's, both of one size, from the peak of the
-// cross-correlation with half-whitened spectra.
-cv::Point2d ShiftByPhase(const cv::Mat& reference, const cv::Mat& frame) {
+// cross-correlation with half-whitened spectra; the peak is 1 where all phases agree.
+struct PhasePeak {
+  cv::Point2d shift{0, 0};
+  double height = 0;
+};
+PhasePeak PeakByPhase(const cv::Mat& reference, const cv::Mat& frame) {
   cv::Mat window, spectra[2];
   cv::createHanningWindow(window, reference.size(), CV_32F);
   for (int i = 0; i < 2; ++i) {
@@ -40,6 +45,7 @@ cv::Point2d ShiftByPhase(const cv::Mat& reference, const cv::Mat& frame) {
     cv::Mat windowed = (picture - cv::mean(picture)).mul(window);
     cv::dft(windowed, spectra[i], cv::DFT_COMPLEX_OUTPUT);
   }
+  double amplitudes = 0;
   for (int y = 0; y < spectra[0].rows; ++y) {
     auto* r = spectra[0].ptr<cv::Vec2f>(y);
     const auto* f = spectra[1].ptr<cv::Vec2f>(y);
@@ -48,12 +54,13 @@ cv::Point2d ShiftByPhase(const cv::Mat& reference, const cv::Mat& frame) {
       const float imaginary = f[x][1] * r[x][0] - f[x][0] * r[x][1];
       const float root = std::sqrt(std::hypot(real, imaginary)) + 1e-12F;
       r[x] = cv::Vec2f(real / root, imaginary / root);
+      amplitudes += static_cast<double>(root);
     }
   }
   cv::Mat correlation;
   cv::dft(spectra[0], correlation, cv::DFT_INVERSE | cv::DFT_REAL_OUTPUT);
   const double width = kLikelyShift * std::max(reference.cols, reference.rows);
-  cv::Point2d best(0, 0);
+  PhasePeak best;
   double highest = -1e300;
   for (int y = 0; y < correlation.rows; ++y) {
     const int dy = y <= correlation.rows / 2 ? y : y - correlation.rows;
@@ -63,10 +70,11 @@ cv::Point2d ShiftByPhase(const cv::Mat& reference, const cv::Mat& frame) {
       const double value = static_cast<double>(correlation.at<float>(y, x)) * prior;
       if (value > highest) {
         highest = value;
-        best = cv::Point2d(dx, dy);
+        best.shift = cv::Point2d(dx, dy);
       }
     }
   }
+  best.height = highest / amplitudes;
   return best;
 }
 
@@ -115,19 +123,31 @@ struct Start {
   cv::Mat expected;  // the reference there
 };
 
-int CoarseFactor(double field_px) {
-  return std::max(1, static_cast<int>(std::ceil(field_px / kCoarseSizePx)));
+int FactorFor(double field_px, int size_px) {
+  return std::max(1, static_cast<int>(std::ceil(field_px / size_px)));
+}
+
+// The middle of a region, cut to sides that have fast transforms.
+cv::Rect FastPart(const cv::Rect& region) {
+  const auto fast = [](int side) {
+    while (side > 1 && cv::getOptimalDFTSize(side) != side) --side;
+    return side;
+  };
+  const cv::Size size(fast(region.width), fast(region.height));
+  return {region.x + (region.width - size.width) / 2, region.y + (region.height - size.height) / 2,
+          size.width, size.height};
 }
 
 std::optional<Start> StartFrom(const cv::Mat& reference, const cv::Mat& frame, double scale,
-                               cv::Point2d centre) {
+                               cv::Point2d centre, int size_px) {
   Start start;
   start.map.linear *= scale;
   start.map.centre = Eigen::Vector2d(centre.x, centre.y);
   start.map.offset = (1 - scale) * start.map.centre;
   const cv::Rect2d field = SharedField(start.map, reference.size(), frame.size());
-  start.factor = CoarseFactor(std::max(field.width, field.height));
+  start.factor = FactorFor(std::max(field.width, field.height), size_px);
   start.region = Inside(field, start.factor);
+  if (size_px == kAgreementSizePx) start.region = FastPart(start.region);
   if (std::min(start.region.width, start.region.height) < kSmallestFieldPx) return std::nullopt;
   start.small = Shrunk(frame, start.factor);
   start.expected = InFrameGeometry(reference, start.map, start.factor, start.region);
@@ -215,28 +235,36 @@ cv::Mat InFrameGeometry(const cv::Mat& reference, const FrameMap& map, int frame
 }
 
 PictureInformation InformationOf(const cv::Mat& picture) {
-  return InformationOfShrunk(Shrunk(picture, CoarseFactor(std::max(picture.cols, picture.rows))));
+  return InformationOfShrunk(
+      Shrunk(picture, FactorFor(std::max(picture.cols, picture.rows), kCoarseSizePx)));
 }
 
 std::optional<FrameMap> ShiftCoarsely(const cv::Mat& reference, const cv::Mat& frame, double scale,
                                       cv::Point2d centre) {
-  const std::optional<Start> start = StartFrom(reference, frame, scale, centre);
+  const std::optional<Start> start = StartFrom(reference, frame, scale, centre, kCoarseSizePx);
   if (!start) return std::nullopt;
-  const cv::Point2d shift = ShiftByPhase(start->expected, start->small(start->region));
+  const cv::Point2d shift = PeakByPhase(start->expected, start->small(start->region)).shift;
   FrameMap map = start->map;
   map.offset += start->factor * Eigen::Vector2d(shift.x, shift.y);
   return map;
 }
 
+double CoarseAgreement(const cv::Mat& reference, const cv::Mat& frame, double scale,
+                       cv::Point2d centre) {
+  const std::optional<Start> start = StartFrom(reference, frame, scale, centre, kAgreementSizePx);
+  return start ? PeakByPhase(start->expected, start->small(start->region)).height : 0;
+}
+
 std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat& frame,
                                          double expected_scale, cv::Point2d centre) {
-  const std::optional<Start> start = StartFrom(reference, frame, expected_scale, centre);
+  const std::optional<Start> start =
+      StartFrom(reference, frame, expected_scale, centre, kCoarseSizePx);
   if (!start || !(InformationOfShrunk(start->expected).scale > kLeastScaleInformation))
     return std::nullopt;
   const cv::Mat& small = start->small;
   const cv::Mat& expected = start->expected;
   const cv::Rect region = start->region;
-  const cv::Point2d shift = ShiftByPhase(expected, small(region));
+  const cv::Point2d shift = PeakByPhase(expected, small(region)).shift;
   // ECC takes what lies outside a picture for black, and mixes it into the outermost pixels.
   cv::Mat padded,
       mask = cv::Mat::zeros(small.rows + 2 * kPadding, small.cols + 2 * kPadding, CV_8U);

@@ -50,6 +50,11 @@ constexpr double kLeastScaleInformation = 0.05;
 std::optional<FrameMap> ShiftCoarsely(const cv::Mat& reference, const cv::Mat& frame, double scale,
                                       cv::Point2d centre);
 
+// How well the phases of the two agree at that scale, at the best shift: from 0 to 1. Blur leaves
+// it alone. Costs a tenth of a registration.
+double CoarseAgreement(const cv::Mat& reference, const cv::Mat& frame, double scale,
+                       cv::Point2d centre);
+
 // Started from a scale about `centre`, a shift by phase correlation as ShiftCoarsely, then ECC on
 // pictures shrunk to at most 160 px. Nothing if that does not converge.
 std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat& frame,

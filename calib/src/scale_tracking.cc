@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "coarse_registration.h"
 #include "edge_pixels.h"
 #include "radial_distortion.h"
 #include "registration.h"
@@ -18,6 +19,7 @@ constexpr std::size_t kEnoughToLearn = 5;
 // Steps of the ladder are half of what a registration finds its way over.
 constexpr double kRung = 1.1;
 constexpr int kRungs = 12;  // up, and as many down: 1.1^12 = 3.1
+constexpr std::ptrdiff_t kTriedRungs = 4;
 // Relative change of the image height at the corner that a lens is expected to have at most.
 constexpr double kLikelyDistortion = 0.02;
 
@@ -62,15 +64,20 @@ class ScalePrediction {
   bool is_known_ = false;
 };
 
-// Starts from the scale expected, then from others, the nearest first.
+// Starts from the scale expected, then from those of a ladder at which the phases agree best.
 std::optional<FreeRegistration> RegisterAnyhow(const cv::Mat& reference, const cv::Mat& frame,
                                                double expected, cv::Point2d centre) {
   if (auto found = RegisterFreely(reference, frame, expected, centre)) return found;
-  for (int rung = 1; rung <= kRungs; ++rung) {
-    for (const double start : {std::pow(kRung, rung), std::pow(kRung, -rung)}) {
-      if (std::abs(std::log(start / expected)) < 0.3 * std::log(kRung)) continue;
-      if (auto found = RegisterFreely(reference, frame, start, centre)) return found;
-    }
+  std::vector<std::pair<double, double>> starts;  // agreement, scale
+  for (int rung = -kRungs; rung <= kRungs; ++rung) {
+    const double scale = std::pow(kRung, rung);
+    if (std::abs(std::log(scale / expected)) < 0.3 * std::log(kRung)) continue;
+    starts.emplace_back(CoarseAgreement(reference, frame, scale, centre), scale);
+  }
+  const auto tried = std::min(kTriedRungs, static_cast<std::ptrdiff_t>(starts.size()));
+  std::partial_sort(starts.begin(), starts.begin() + tried, starts.end(), std::greater<>());
+  for (auto start = starts.begin(); start != starts.begin() + tried; ++start) {
+    if (auto found = RegisterFreely(reference, frame, start->second, centre)) return found;
   }
   return std::nullopt;
 }

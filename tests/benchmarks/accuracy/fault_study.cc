@@ -18,6 +18,7 @@ struct Damage {
   std::string name;
   std::function<void(model::SweepSimulationOptions*)> before;  // of the simulation
   std::function<void(SimulatedSweep*)> after;
+  int fewest_frames = 0;  // that there must be for it
 };
 
 std::vector<Damage> Damages() {
@@ -29,7 +30,7 @@ std::vector<Damage> Damages() {
       {"flicker 20 %", options([](auto* o) { o->flicker = 0.2; }), {}},
       {"JPEG quality 90", {}, [](SimulatedSweep* s) { StoreAsJpeg(s, 90); }},
       {"dust", {}, [](SimulatedSweep* s) { AddDust(s); }},
-      {"faults planted", {}, [](SimulatedSweep* s) { PlantFaults(s); }},
+      {"faults planted", {}, [](SimulatedSweep* s) { PlantFaults(s); }, 30},
       {"JPEG quality 20", {}, [](SimulatedSweep* s) { StoreAsJpeg(s, 20); }},
       {"sRGB taken as linear",
        options([](auto* o) { o->camera.sensor.transfer = model::TransferCurve::Srgb(); }),
@@ -64,6 +65,13 @@ Row RunOne(const std::string& case_name, const Damage& damage, const TrialSettin
   TrialKey key;
   key.case_name = case_name;
   model::SweepSimulationOptions options = Simulation(key, settings);
+  if (options.frame_count < damage.fewest_frames) {
+    Row row;
+    row.outcome = "not run";
+    row.first_warning =
+        fmt::format("of {} frames, {} are needed", options.frame_count, damage.fewest_frames);
+    return row;
+  }
   if (damage.before) damage.before(&options);
   SimulatedSweep simulated = testing::Simulate(options);
   GiveFloor(&simulated);
