@@ -10,6 +10,8 @@ namespace {
 
 // How many of a frame's features are looked at for a straight edge.
 constexpr int kMostFeatures = 8;
+// How much of an edge's profile is shown on each side.
+constexpr double kShownSigmas = 4, kShownBeyondPx = 1.5;
 
 model::Psf Other(model::Psf psf) {
   return psf == model::Psf::kGaussian ? model::Psf::kDisc : model::Psf::kGaussian;
@@ -91,14 +93,20 @@ std::optional<BlurExample> EdgeExample(const cv::Mat& grey, std::size_t frame, m
     BlurExample example;
     example.frame = static_cast<int>(frame);
     example.is_edge = true;
-    example.x = fit->distance_px;
-    example.measured = fit->level;
     const bool is_gaussian = stated == model::Psf::kGaussian;
-    (is_gaussian ? example.gaussian : example.disc) = fit->fitted;
     const auto other = FitEdgeSpread(grey, feature, Other(stated), floor_px, true);
-    std::vector<double>& curve = is_gaussian ? example.disc : example.gaussian;
-    for (const double distance_px : fit->distance_px)
-      curve.push_back(FittedAt(other && !other->fitted.empty() ? *other : *fit, distance_px));
+    const bool has_other = other && !other->fitted.empty();
+    const double sigma_px = fit->across_x ? fit->across_x->sigma_px : fit->across_y->sigma_px;
+    for (std::size_t i = 0; i < fit->distance_px.size(); ++i) {
+      const double distance_px = fit->distance_px[i];
+      // The plateaus farther out tell nothing.
+      if (std::abs(distance_px) > kShownSigmas * sigma_px + kShownBeyondPx) continue;
+      const double by_other = has_other ? FittedAt(*other, distance_px) : fit->fitted[i];
+      example.x.push_back(distance_px);
+      example.measured.push_back(fit->level[i]);
+      example.gaussian.push_back(is_gaussian ? fit->fitted[i] : by_other);
+      example.disc.push_back(is_gaussian ? by_other : fit->fitted[i]);
+    }
     return example;
   }
   return std::nullopt;
