@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "simulated_sweep.h"
@@ -68,6 +69,26 @@ TEST(StarSweep, AWrongReadingIsNamedByItsBlur) {
     for (const FrameMeasurement& frame : c.frames) rejected += frame.rejection.empty() ? 0 : 1;
     EXPECT_EQ(rejected, 1);
   }
+}
+
+// All others are compared with the sharpest frame. If that one is wrong, another takes its place.
+TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
+  SimulatedSweep s = StarSweep("iii", 3);
+  const Calibration clean = Calibrated(s);
+  const auto sharpest = static_cast<std::size_t>(
+      std::max_element(clean.frames.begin(), clean.frames.end(),
+                       [](const FrameMeasurement& a, const FrameMeasurement& b) {
+                         return a.normalised_edge_slope < b.normalised_edge_slope;
+                       }) -
+      clean.frames.begin());
+  s.sweep.frames[sharpest].reading_mm += 40;
+  const Calibration c = Calibrated(s);
+  ExpectRight(c, s.truth, 4);
+  EXPECT_THAT(c.frames[sharpest].rejection, HasSubstr("reading off by"));
+  EXPECT_FALSE(c.frames[sharpest].in_blur_fit);
+  // Bands and shapes could be compared, which needs a reference.
+  EXPECT_EQ(clean.systematic_parts.size(), c.systematic_parts.size());
+  EXPECT_TRUE(c.blur.disc_misfit);
 }
 
 TEST(StarSweep, WithoutAnOffsetItSaysWhatToDo) {
