@@ -533,5 +533,115 @@ TEST(CalibrationReport, ScaleResidualsVanishOnTheLaw) {
   }
 }
 
+TEST(CalibrationReport, NamesTheBenchZeroWhereItIsMostOfTheError) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  RemoveDetails(&made.calibration);
+  *made.calibration.focus_depth_mm = {400, 0.57, Eigen::Vector2d(399.9, 400.1)};
+  made.calibration.bench_offset_mm->sigma = 0.56;
+  EXPECT_THAT(Page(made), HasSubstr("What limits it is statistical: the bench zero leaves ±0.57"));
+  EXPECT_THAT(Page(made), Not(HasSubstr("noise and readings leave")));
+  made.calibration.bench_offset_mm->sigma = 0.3;
+  EXPECT_THAT(Page(made), HasSubstr("What limits it is statistical: noise and readings leave"));
+}
+
+TEST(CalibrationReport, SaysWhichTolerancesAreMissing) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  EXPECT_THAT(Page(made, false),
+              HasSubstr("No tolerance is stated for the focal lengths and the pixel pitch"));
+  EXPECT_THAT(Page(made, true), Not(HasSubstr("No tolerance is stated")));
+  auto& statements = made.sweep.camera.statements;
+  statements["sensor.pixel_pitch_mm"] = {1e-5, false};
+  statements["lens.front_focal_length_mm"] = {0.1, false};
+  statements["lens.rear_focal_length_mm"] = {0, true};  // assumed, but not how well
+  const std::string html = Page(made, false);
+  EXPECT_THAT(html, HasSubstr("No tolerance is stated for the focal lengths: the intervals"));
+  EXPECT_THAT(html, Not(HasSubstr("of the pixel pitch")));
+  statements["lens.rear_focal_length_mm"] = {0.1, true};
+  EXPECT_THAT(Page(made, false), Not(HasSubstr("No tolerance is stated")));
+}
+
+TEST(CalibrationReport, AccountsForFramesThatAreNotInTheFit) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  EXPECT_THAT(Page(made), Not(HasSubstr("nothing of the blur")));
+  for (const std::size_t i : {3u, 4u, 5u, 9u})
+    made.calibration.frames[i].not_in_fit = "too strongly blurred";
+  made.calibration.frames[20].not_in_fit = "not registered";
+  const std::string html = Page(made);
+  ASSERT_EQ(ParseXml(html).error, "");
+  EXPECT_THAT(html, HasSubstr("5 more frames passed the gates and say nothing of the blur:"));
+  EXPECT_THAT(html, HasSubstr("too strongly blurred (4): frame_003.png … frame_005.png (3 frames), "
+                              "frame_009.png</li>"));
+  EXPECT_THAT(html, HasSubstr("not registered (1): frame_020.png</li>"));
+  RejectFrame(0, "dark", &made.calibration);
+  EXPECT_THAT(Page(made), HasSubstr("5 more frames passed"));
+}
+
+TEST(CalibrationReport, TellsTheWorstKnownOnlyWhereThatSaysSomething) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  const auto page_with = [&](const char* correlation) {
+    made.calibration.blur.weak_direction = fmt::format("a with b (correlation {})", correlation);
+    return Page(made);
+  };
+  EXPECT_THAT(page_with("+0.05"), Not(HasSubstr("Known worst")));
+  EXPECT_THAT(page_with("-0.49"), Not(HasSubstr("Known worst")));
+  EXPECT_THAT(page_with("-0.93"), HasSubstr("Known worst: a with b"));
+}
+
+TEST(CalibrationReport, SaysWhatWasNotStatedOfTheReadings) {
+  MadeUpCalibration made = MakeUpCalibration(9, 340, 15);
+  EXPECT_THAT(Page(made), HasSubstr("deviation of a reading 0.07 mm."));
+  ReportOrigin origin = kOrigin;
+  origin.reading_sigma_stated = false;
+  EXPECT_THAT(MakeCalibrationReport(made.sweep, made.calibration, nullptr, origin).html,
+              HasSubstr("deviation of a reading not stated."));
+}
+
+TEST(CalibrationReport, SaysWhereTheFramesLieOffTheLaw) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  EXPECT_THAT(Page(made), Not(HasSubstr("farther off the law")));
+  made.calibration.blur.chi2_per_dof = 2.5;
+  const std::string widened =
+      "The frames lie farther off the law than their errors (χ²/dof 2.5); the errors were widened";
+  EXPECT_THAT(Page(made), HasSubstr(widened));
+  // Of few frames chance may do as much, and then nothing was widened.
+  made.calibration.blur.frames_used = 8;
+  EXPECT_THAT(Page(made), HasSubstr("than their errors (χ²/dof 2.5)."));
+}
+
+// Tiles that differ by noise alone stay near the middle of the colours, all with as many digits.
+TEST(CalibrationReport, NoiseDoesNotFillTheColoursOfTheField) {
+  MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
+  auto& tiles = made.calibration.field.tiles;
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    tiles[i].focus_depth_mm = {400 + (i % 2 == 0 ? 0.1 : -0.1), i == 0 ? 0.031 : 0.21};
+  const XmlDocument document = ParseXml(Page(made));
+  const int plot = PlotNamed(document, "field");
+  // 400 +- 3 * .21: the tiles lie at (.63 -+ .1)/1.26 = .42 and .58 of the colours.
+  std::set<std::string> colours, words;
+  for (const XmlElement& rect : document.Named("rect", plot))
+    if (rect.Number("width") > 20 && !rect.Attribute("fill").empty())
+      colours.insert(rect.Attribute("fill"));
+  EXPECT_EQ(colours, (std::set<std::string>{MapColourCss(0.53 / 1.26), MapColourCss(0.73 / 1.26)}));
+  for (const XmlElement& text : document.Named("text", plot)) words.insert(text.text);
+  for (const char* word : {"400.10", "399.90", "± 0.21", "± 0.03", "399.370 … 400.630 mm"})
+    EXPECT_EQ(words.count(word), 1u) << word;
+}
+
+// Long names must not push the reasons off the page.
+TEST(CalibrationReport, LongNamesWrapAndLeaveRoomForTheReasons) {
+  MadeUpCalibration made = MakeUpCalibration(9, 340, 15);
+  RejectFrame(2, "dark: mean 0.001", &made.calibration);
+  const XmlDocument document = ParseXml(Page(made));
+  int reasons = 0;
+  for (const XmlElement& cell : document.Named("td"))
+    if (cell.text == "mean 0.001" || cell.text == "have the lens measured") {
+      EXPECT_EQ(cell.Attribute("class"), "words");
+      ++reasons;
+    }
+  EXPECT_EQ(reasons, 2);
+  const std::string style = Page(made).substr(0, Page(made).find("</style>"));
+  EXPECT_THAT(style, HasSubstr("tbody th, .name, .words { overflow-wrap: anywhere; }"));
+}
+
 }  // namespace
 }  // namespace thicklens::tools

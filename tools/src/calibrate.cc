@@ -133,7 +133,8 @@ model::Camera CameraWithEvidence(const SweepInput& input, const calib::Calibrati
 
 CalibrationReport Report(const CalibrateOptions& options, const SweepInput& input,
                          const calib::Calibration& calibration, const std::string& date) {
-  const ReportOrigin origin{options.sweep.input, Version(), date, input.notices};
+  const ReportOrigin origin{options.sweep.input, Version(), date, input.notices,
+                            input.file.reading_sigma_stated};
   return MakeCalibrationReport(input.sweep, calibration, TruthOf(input), origin,
                                input.sweep.read_frame);
 }

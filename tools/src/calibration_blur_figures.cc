@@ -6,6 +6,8 @@
 
 #include "blur_law.h"
 #include "calibration_figures.h"
+#include "calibration_sections.h"
+#include "calibration_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -124,7 +126,7 @@ std::string BlurCaption(const std::optional<BlurLaw>& law) {
   return caption + ".";
 }
 
-ReportFigure ResidualFigure(BlurPoints points, const Abscissa& abscissa,
+ReportFigure ResidualFigure(const calib::BlurFit& fit, BlurPoints points, const Abscissa& abscissa,
                             const std::pair<double, double>& x_range) {
   if (points.fitted_residuals.x.size() + points.doubted_residuals.x.size() < 2) return {};
   Plot plot;
@@ -138,11 +140,13 @@ ReportFigure ResidualFigure(BlurPoints points, const Abscissa& abscissa,
   plot.height_px = 210;
   plot.lines = {Level(0), Level(2), Level(-2)};
   plot.series = {std::move(points.fitted_residuals), std::move(points.doubted_residuals)};
+  const std::string widened = Typeset(AsSentence(WidenedLine(fit)));
   return FigureOf({plot},
                   "Nearly all points should scatter between the dotted lines without a trend; a "
                   "bow says that lens and law differ, one far point that its reading or its frame "
                   "is bad (each residual is in units of its standard deviation, from blur and "
-                  "reading).");
+                  "reading)." +
+                      (widened.empty() ? "" : " " + widened));
 }
 
 }  // namespace
@@ -172,7 +176,8 @@ std::vector<ReportFigure> BlurFigures(const FocusSweep& sweep, const Calibration
   const double pad = 0.04 * (x_range.second - x_range.first);
   x_range = {x_range.first - pad, x_range.second + pad};
   plot.x_axis.range = x_range;
-  return {FigureOf({plot}, BlurCaption(law)), ResidualFigure(std::move(points), abscissa, x_range)};
+  return {FigureOf({plot}, BlurCaption(law)),
+          ResidualFigure(calibration.blur, std::move(points), abscissa, x_range)};
 }
 
 ReportFigure ReadingErrorFigure(const FocusSweep& sweep, const Calibration& calibration,

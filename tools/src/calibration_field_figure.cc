@@ -55,6 +55,27 @@ ColourRange RangeOf(const FieldMap& field) {
   return range;
 }
 
+// The median standard deviation of the tiles; 0 where none has one.
+double MedianSigmaMm(const FieldMap& field) {
+  std::vector<double> sigmas_mm;
+  for (const FieldTile& tile : field.tiles)
+    if (tile.done && UsableSigma(tile.focus_depth_mm.sigma))
+      sigmas_mm.push_back(tile.focus_depth_mm.sigma);
+  if (sigmas_mm.empty()) return 0;
+  const auto middle = sigmas_mm.begin() + static_cast<std::ptrdiff_t>(sigmas_mm.size() / 2);
+  std::nth_element(sigmas_mm.begin(), middle, sigmas_mm.end());
+  return *middle;
+}
+
+// The range of the colours: wide enough that noise alone does not run through all of them.
+ColourRange WideEnough(ColourRange range, double sigma_mm) {
+  constexpr double kFewestSigmas = 3;  // on each side of the middle
+  const double middle = (range.lo + range.hi) / 2;
+  range.lo = std::min(range.lo, middle - kFewestSigmas * sigma_mm);
+  range.hi = std::max(range.hi, middle + kFewestSigmas * sigma_mm);
+  return range;
+}
+
 std::string Word(double x, double y, const std::string& css_class, const std::string& text) {
   return fmt::format("<text{} text-anchor=\"middle\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>",
                      css_class.empty() ? "" : " class=\"" + css_class + "\"", x, y,
@@ -62,7 +83,7 @@ std::string Word(double x, double y, const std::string& css_class, const std::st
 }
 
 std::string TileDrawing(const FieldMap& field, const FieldTile& tile, const Layout& layout,
-                        int index, const ColourRange& range) {
+                        int index, const ColourRange& range, double digits_mm) {
   const double x = layout.X(index % field.columns), y = layout.Y(index / field.columns);
   const double middle_x = x + layout.tile_width_px / 2, middle_y = y + layout.tile_height_px / 2;
   const std::string where =
@@ -77,8 +98,8 @@ std::string TileDrawing(const FieldMap& field, const FieldTile& tile, const Layo
                        Word(middle_x, middle_y + 4, "", "–"));
   const double position = range.Position(focus.value);
   const std::string css_class = position < kDarkWordsFrom ? "on-dark" : "on-light";
-  std::vector<std::string> lines = {RoundedTo(focus.value, focus.sigma)};
-  if (UsableSigma(focus.sigma)) lines.push_back("± " + RoundedSigma(focus.sigma));
+  std::vector<std::string> lines = {RoundedTo(focus.value, digits_mm)};
+  if (UsableSigma(focus.sigma)) lines.push_back("± " + RoundedTo(focus.sigma, digits_mm));
   if (field.clusters.size() > 1) lines.push_back(fmt::format("depth {}", tile.cluster + 1));
   std::string words;
   const double first_y = middle_y + 4 - kLineHeightPx * (static_cast<double>(lines.size()) - 1) / 2;
@@ -137,6 +158,8 @@ ReportFigure FieldFigure(const FieldMap& field) {
     return {};
   const ColourRange range = RangeOf(field);
   if (!(range.lo <= range.hi)) return {};
+  const double sigma_mm = MedianSigmaMm(field);
+  const ColourRange colours = WideEnough(range, sigma_mm);
   const Layout layout = LayoutOf(field);
   const double bar_top = layout.Y(field.rows) + 52;
   const double width_px = std::max(layout.X(field.columns) + 8, kLeftPx + 420);
@@ -148,14 +171,15 @@ ReportFigure FieldFigure(const FieldMap& field) {
       width_px, bar_top + 18, RoundedTo(range.lo, (range.hi - range.lo) / 20),
       RoundedTo(range.hi, (range.hi - range.lo) / 20));
   for (std::size_t i = 0; i < field.tiles.size(); ++i)
-    svg += TileDrawing(field, field.tiles[i], layout, static_cast<int>(i), range);
+    svg += TileDrawing(field, field.tiles[i], layout, static_cast<int>(i), colours, sigma_mm);
   svg += Margins(field, layout);
-  if (range.hi > range.lo) svg += ColourBar(range, bar_top);
+  if (colours.hi > colours.lo) svg += ColourBar(colours, bar_top);
   svg += "</svg>\n";
   return {{{"field", svg}},
           "Depth of focus zf [mm] of each part of the picture fitted alone, with its standard "
           "deviation. One side brighter than the other: the target is tilted; bright or dark from "
-          "the centre outward: the field is curved.",
+          "the centre outward: the field is curved. The colours span at least ± 3 of the median "
+          "standard deviation.",
           false};
 }
 

@@ -180,7 +180,8 @@ ReportFigure SharpnessFigure(const Calibration& calibration, const std::vector<R
       {plot},
       "Look for one clear peak with frames on both sides of it; where the raw sharpness "
       "(rings) peaks elsewhere than the normalised one (dots), the lamp's falling "
-      "brightness has pulled it.");
+      "brightness has pulled it. An index in image pixels is also pulled by the image scale, "
+      "which changes along the sweep, so that both may peak elsewhere than the fit.");
 }
 
 ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration) {

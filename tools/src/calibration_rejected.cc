@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -31,13 +32,13 @@ std::string GroupRows(const Calibration& calibration, const RejectionGroup& grou
     html += "<tr>" + TableCell(i == 0 ? group.kind : "", "name") +
             TableCell(i == 0 ? fmt::format("{}", group.frames) : "") +
             TableCell(Typeset(RunName(calibration.frames, run)), "name") +
-            TableCell(Typeset(details[i]), "") + "</tr>\n";
+            TableCell(Typeset(details[i]), "words") + "</tr>\n";
     told += run.count();
   }
   if (told < group.frames) {
     html += "<tr>" + TableCell("", "name") + TableCell("") +
             TableCell(fmt::format("and {} more", group.frames - told), "name") +
-            TableCell("in the table below", "") + "</tr>\n";
+            TableCell("in the table below", "words") + "</tr>\n";
   }
   return html;
 }
@@ -64,7 +65,7 @@ std::string LevelsTable(const Calibration& calibration, std::size_t rejected) {
             TableCell(fmt::format("{:.4f}", frame.statistics.mean_stored)) +
             TableCell(fmt::format("{:.3f}", frame.statistics.contrast)) +
             TableCell(fmt::format("{:.1f} %", 100 * frame.statistics.saturated_fraction)) +
-            TableCell(frame.rejection, "") + "</tr>\n";
+            TableCell(frame.rejection, "words") + "</tr>\n";
   }
   return html + "</tbody></table></div></details>\n";
 }
@@ -137,17 +138,46 @@ std::string Thumbnails(const FocusSweep& sweep, const Calibration& calibration,
   return html;
 }
 
+// Frames that passed the gates and still say nothing of the blur, by reason.
+std::string NotInFit(const Calibration& calibration) {
+  std::map<std::string, RejectionGroup> groups;
+  int count = 0;
+  for (int i = 0; i < static_cast<int>(calibration.frames.size()); ++i) {
+    const FrameMeasurement& frame = calibration.frames[static_cast<std::size_t>(i)];
+    if (frame.not_in_fit.empty() || !frame.rejection.empty()) continue;
+    RejectionGroup& group = groups[frame.not_in_fit];
+    if (!group.runs.empty() && group.runs.back().last == i - 1)
+      group.runs.back().last = i;
+    else
+      group.runs.push_back({i, i, ""});
+    ++group.frames;
+    ++count;
+  }
+  if (count == 0) return "";
+  std::string html =
+      fmt::format("<p>{} more {} the gates and {} nothing of the blur:</p>\n<ul>\n", count,
+                  count == 1 ? "frame passed" : "frames passed", count == 1 ? "says" : "say");
+  for (const auto& [reason, group] : groups) {
+    std::vector<std::string> names;
+    for (const RejectionRun& run : group.runs)
+      names.push_back(Typeset(RunName(calibration.frames, run)));
+    html += fmt::format("<li class=\"words\">{} ({}): {}</li>\n", EscapeXml(Typeset(reason)),
+                        group.frames, EscapeXml(fmt::format("{}", fmt::join(names, ", "))));
+  }
+  return html + "</ul>\n";
+}
+
 }  // namespace
 
 std::string RejectedSection(const FocusSweep& sweep, const Calibration& calibration,
                             const FramePictures& pictures) {
   const std::vector<RejectionGroup> groups = RejectionGroups(calibration.frames);
   std::string html = "<h2>Rejected frames</h2>\n";
-  if (groups.empty()) return html + "<p>None.</p>\n";
+  if (groups.empty()) return html + "<p>None.</p>\n" + NotInFit(calibration);
   const auto rejected = static_cast<std::size_t>(
       std::count_if(calibration.frames.begin(), calibration.frames.end(),
                     [](const FrameMeasurement& frame) { return !frame.rejection.empty(); }));
-  html += GroupsTable(calibration, groups);
+  html += GroupsTable(calibration, groups) + NotInFit(calibration);
   if (pictures) html += Thumbnails(sweep, calibration, ChosenForShow(groups), rejected, pictures);
   return html + LevelsTable(calibration, rejected);
 }

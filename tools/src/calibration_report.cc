@@ -99,9 +99,11 @@ std::string HowItWasMade(const FocusSweep& sweep, const Calibration& calibration
                             });
     item(
         fmt::format("{} frames, bench readings {:.6g} to {:.6g} mm, direction {}, standard "
-                    "deviation of a reading {:.3g} mm.",
+                    "deviation of a reading {}.",
                     sweep.frames.size(), lo->reading_mm, hi->reading_mm,
-                    model::BenchDirectionName(sweep.direction), sweep.reading_sigma_mm));
+                    model::BenchDirectionName(sweep.direction),
+                    origin.reading_sigma_stated ? fmt::format("{:.3g} mm", sweep.reading_sigma_mm)
+                                                : std::string("not stated")));
   }
   item(sweep.offset_mm ? fmt::format("Bench offset given: {:.6g} ± {:.3g} mm.",
                                      sweep.offset_mm->value, sweep.offset_mm->sigma)
@@ -164,7 +166,7 @@ CalibrationReport MakeCalibrationReport(const FocusSweep& sweep, const Calibrati
                              EscapeXml(about));
   report.html += VerdictSection(sweep, calibration);
   report.html += ResultsSection(rows, truth != nullptr);
-  report.html += SystematicSection(calibration);
+  report.html += SystematicSection(sweep, calibration, truth != nullptr);
   report.html += OtherWaysSection(calibration, rows);
   report.html += MeasuredSection(sweep, calibration, rows, truth, &figures);
   report.html += FieldSection(calibration, &figures);

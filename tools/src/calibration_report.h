@@ -17,6 +17,7 @@ struct ReportOrigin {
   std::string version;             // of thicklens
   std::string date;                // ISO 8601
   std::vector<std::string> notes;  // one line each
+  bool reading_sigma_stated = true;
 };
 
 struct ReportFile {

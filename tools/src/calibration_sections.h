@@ -20,8 +20,10 @@ std::string VerdictSection(const calib::FocusSweep& sweep, const calib::Calibrat
 
 // The results with both kinds of error; with a truth, the errors too.
 std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth);
-// Each source of systematic error, largest first, and what would shrink it.
-std::string SystematicSection(const calib::Calibration& calibration);
+// Each source of systematic error, largest first, what would shrink it, and the tolerances that are
+// not stated. With a truth the camera's numbers are exact.
+std::string SystematicSection(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
+                              bool has_truth);
 // The depth of focus by everything else that tells it.
 std::string OtherWaysSection(const calib::Calibration& calibration,
                              const std::vector<ResultRow>& rows);
@@ -38,6 +40,8 @@ std::string RejectedSection(const calib::FocusSweep& sweep, const calib::Calibra
 // What was typed in plain letters as a page has it: "+-" as ±, hyphens of numbers as minus signs,
 // " .. " as an ellipsis, "chi2" as χ², " deg" as °.
 std::string Typeset(const std::string& text);
+// With a capital and a full stop.
+std::string AsSentence(std::string text);
 // With no-break spaces. Without a sigma it was not fitted: given, or taken for granted.
 std::string WithSigma(const calib::Result& result);
 

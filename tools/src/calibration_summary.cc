@@ -142,8 +142,7 @@ std::string SecondaryLines(const calib::Calibration& calibration,
                     : fmt::format("blur fit: none, {}\n", PrintableUtf8(blur.message));
   for (const std::string& name : blur.undetermined)
     text += fmt::format("blur fit: the data do not determine {}\n", PrintableUtf8(name));
-  if (!blur.weak_direction.empty())
-    AddLine("blur fit", "known worst: " + blur.weak_direction, &text);
+  AddLine("blur fit", WorstKnownLine(blur), &text);
   AddLine("blur fit", OutsideLine(blur), &text);
   return text;
 }

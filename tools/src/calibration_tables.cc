@@ -14,6 +14,7 @@ namespace thicklens::tools {
 namespace {
 
 using calib::Calibration;
+using calib::FocusSweep;
 
 constexpr char kNone[] = "–";
 constexpr char kNotRun[] = "not run";
@@ -203,15 +204,17 @@ std::string ResultsSection(const std::vector<ResultRow>& rows, bool has_truth) {
   }
   html += kTableEnd;
   html +=
-      "<p class=\"soft\">Statistical: one standard deviation from noise and readings. Systematic: "
-      "the interval that the lens floor where it is not known, the two sides of focus where they "
-      "disagree, the blur meter and the stated tolerances leave open. The source's recipe has no "
-      "error estimate.</p>\n";
+      "<p class=\"soft\">Statistical: one standard deviation from noise, readings and the bench "
+      "zero. "
+      "Systematic: the interval that what the table below lists leaves open, taken together. The "
+      "source's recipe has no error estimate.</p>\n";
   return html + (has_truth ? ErrorsTable(rows) : "");
 }
 
-std::string SystematicSection(const Calibration& calibration) {
+std::string SystematicSection(const FocusSweep& sweep, const Calibration& calibration,
+                              bool has_truth) {
   if (calibration.systematic_parts.empty()) return "";
+  const std::string missing = has_truth ? "" : MissingTolerancesLine(sweep.camera);
   std::string html = "<h2>Where the systematic error comes from</h2>\n" +
                      TableBegin({{"because of", false},
                                  {"zf [mm]"},
@@ -223,11 +226,12 @@ std::string SystematicSection(const Calibration& calibration) {
     for (const Eigen::Vector2d& range :
          {part.focus_depth_mm, part.image_distance_mm, part.blur_ratio})
       html += TableCell(Typeset(PartRange(range)));
-    html += TableCell(part.remedy, "") + "</tr>\n";
+    html += TableCell(Typeset(part.remedy), "words") + "</tr>\n";
   }
   return html + kTableEnd +
          "<p class=\"soft\">How far each result may lie from its value because of it, largest "
-         "first.</p>\n";
+         "first.</p>\n" +
+         (missing.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeXml(AsSentence(missing))));
 }
 
 std::string OtherWaysSection(const Calibration& calibration, const std::vector<ResultRow>& rows) {

@@ -14,6 +14,9 @@ namespace {
 using calib::Calibration;
 using calib::FocusSweep;
 
+// Of the sigma of the depth of focus: from here on the bench zero's is most of it.
+constexpr double kDominantShare = 0.7;
+
 std::string Paragraph(const std::string& text) {
   return text.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeXml(text));
 }
@@ -44,10 +47,12 @@ std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration
   if (!focus.systematic || !focus.systematic->allFinite() || !(focus.sigma > 0)) return "";
   const double half_mm =
       std::max(focus.systematic->y() - focus.value, focus.value - focus.systematic->x());
-  const std::string numbers = fmt::format(
-      "noise and readings leave ±{} mm of the depth of focus open, the systematic interval up to "
-      "{:.2g} mm.",
-      RoundedSigma(focus.sigma), half_mm);
+  const bool zero_dominates = calibration.bench_offset_mm &&
+                              calibration.bench_offset_mm->sigma > kDominantShare * focus.sigma;
+  const std::string numbers =
+      fmt::format("{} ±{} mm of the depth of focus open, the systematic interval up to {:.2g} mm.",
+                  zero_dominates ? "the bench zero leaves" : "noise and readings leave",
+                  RoundedSigma(focus.sigma), half_mm);
   std::string text, help;
   if (half_mm > 2 * focus.sigma) {
     text = "What limits it is systematic: ";
@@ -56,18 +61,13 @@ std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration
         sweep.floor.given_px ? "" : "a blur floor measured on a knife edge, ");
   } else if (half_mm < 0.5 * focus.sigma) {
     text = "What limits it is statistical: ";
-    help = " More frames, more light or better readings would help.";
+    help = zero_dominates ? " Measuring offset_mm, or a longer sweep, would help."
+                          : " More frames, more light or better readings would help.";
   } else {
-    text = "Noise and systematic errors limit it alike: ";
+    text = zero_dominates ? "Bench zero and systematic errors limit it alike: "
+                          : "Noise and systematic errors limit it alike: ";
   }
   return text + numbers + (calibration.advice.empty() ? help : "");
-}
-
-std::string AsSentence(std::string text) {
-  if (text.empty()) return text;
-  if (text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
-  if (text.back() != '.') text += '.';
-  return text;
 }
 
 std::string Outcome(const Calibration& calibration, std::string* css_class) {
@@ -81,6 +81,13 @@ std::string Outcome(const Calibration& calibration, std::string* css_class) {
 }
 
 }  // namespace
+
+std::string AsSentence(std::string text) {
+  if (text.empty()) return text;
+  if (text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  if (text.back() != '.') text += '.';
+  return text;
+}
 
 std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibration) {
   std::string css_class;
@@ -97,8 +104,7 @@ std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibrati
   if (!blur.undetermined.empty())
     html +=
         Paragraph(fmt::format("The data do not determine {}.", fmt::join(blur.undetermined, ", ")));
-  if (!blur.weak_direction.empty())
-    html += Paragraph(AsSentence("Known worst: " + blur.weak_direction));
+  html += Paragraph(AsSentence(WorstKnownLine(blur)));
   html += Paragraph(AsSentence(Typeset(ShapeLine(sweep, blur))));
   html += "</div>\n";
   if (calibration.warnings.empty()) return html;

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdlib>
 
 #include "rounding.h"
 
@@ -165,10 +167,57 @@ std::string OutsideLine(const calib::BlurFit& blur) {
                      blur.outside_mm);
 }
 
+std::string WorstKnownLine(const calib::BlurFit& blur) {
+  constexpr double kWorthTelling = 0.5;
+  constexpr char kMark[] = "(correlation ";
+  if (blur.weak_direction.empty()) return "";
+  const std::size_t mark = blur.weak_direction.find(kMark);
+  if (mark != std::string::npos) {
+    const double correlation =
+        std::strtod(blur.weak_direction.c_str() + mark + sizeof(kMark) - 1, nullptr);
+    if (std::abs(correlation) < kWorthTelling) return "";
+  }
+  return "known worst: " + blur.weak_direction;
+}
+
+std::string WidenedLine(const calib::BlurFit& blur) {
+  constexpr double kWorthTelling = 2;
+  // Chance alone reaches this with few frames, and the fit widens nothing for chance.
+  constexpr double kBeyondChance = 3.5;
+  constexpr int kManyFrames = 20;
+  if (!blur.done || !(blur.chi2_per_dof > kWorthTelling)) return "";
+  const bool widened = blur.chi2_per_dof > kBeyondChance || blur.frames_used >= kManyFrames;
+  return fmt::format("the frames lie farther off the law than their errors (chi2/dof {:.3g}){}",
+                     blur.chi2_per_dof, widened ? "; the errors were widened for it" : "");
+}
+
+std::string MissingTolerancesLine(const model::Camera& camera) {
+  const auto is_missing = [&](const std::string& field) {
+    const auto statement = camera.statements.find(field);
+    return statement == camera.statements.end() || !(statement->second.tolerance > 0);
+  };
+  const bool focal_length =
+      is_missing("lens.front_focal_length_mm") || is_missing("lens.rear_focal_length_mm");
+  const bool pitch = is_missing("sensor.pixel_pitch_mm");
+  if (!focal_length && !pitch) return "";
+  std::string effect;
+  if (focal_length) effect = "d1 moves about 1 % for each 1 % of the focal length";
+  if (pitch)
+    effect += focal_length ? ", kappa about 1 % for each 1 % of the pixel pitch"
+                           : "kappa moves about 1 % for each 1 % of the pixel pitch";
+  return fmt::format(
+      "no tolerance is stated for the {}: the intervals take {} as exact, but {}; give {{value: "
+      ".., tolerance: ..}} in the camera file",
+      focal_length && pitch ? "focal lengths and the pixel pitch"
+      : focal_length        ? "focal lengths"
+                            : "pixel pitch",
+      focal_length ? "them" : "it", effect);
+}
+
 std::string PartRange(const Eigen::Vector2d& range) {
   if (!range.allFinite()) return "-";
   const double largest = range.cwiseAbs().maxCoeff();
-  if (!(largest > 5e-7)) return "0";  // nothing that any of the units could show
+  if (!(largest > 5e-6)) return "0";  // nothing that any of the units could show
   return fmt::format("{} .. {}", SignedRoundedTo(range.x(), largest),
                      SignedRoundedTo(range.y(), largest));
 }

@@ -28,6 +28,12 @@ std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur
 std::string MagnificationLine(const calib::Calibration& calibration);
 std::string DistortionLine(const calib::ScaleLaw& scale);
 std::string OutsideLine(const calib::BlurFit& blur);
+// The combination of parameters known worst; nothing where they are hardly correlated.
+std::string WorstKnownLine(const calib::BlurFit& blur);
+// That the frames lie off the law by more than their errors, where they do.
+std::string WidenedLine(const calib::BlurFit& blur);
+// Which numbers of the camera that the results hang on are stated without a tolerance.
+std::string MissingTolerancesLine(const model::Camera& camera);
 
 // (lowest, highest) of one systematic part, with the digits of the larger: "-3.1 .. +3.9".
 std::string PartRange(const Eigen::Vector2d& range);

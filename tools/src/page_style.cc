@@ -37,7 +37,8 @@ h2 { font-size: 18px; margin: 40px 0 10px; font-weight: 600; }
 table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; }
 th, td { padding: 5px 16px 5px 0; text-align: left; vertical-align: top;
   border-bottom: 1px solid var(--rule); }
-th { font-weight: 500; } tbody th, .name { white-space: nowrap; }
+th { font-weight: 500; } tbody th { min-width: 8em; } .name { min-width: 11em; }
+.words { min-width: 12em; } tbody th, .name, .words { overflow-wrap: anywhere; }
 thead th { color: var(--soft); font-weight: 500; vertical-align: bottom; }
 .number { text-align: right; white-space: nowrap; }
 .soft { color: var(--soft); }
@@ -57,7 +58,7 @@ figcaption b { color: var(--ink); font-weight: 600; }
 .thumbnails b { color: var(--ink); font-weight: 500; }
 details { margin-top: 12px; } summary { cursor: pointer; color: var(--soft); }
 @media print { body { font-size: 11pt; } main { padding: 0; max-width: none; }
-  h2 { break-after: avoid; } tr { break-inside: avoid; } }
+  h2 { break-after: avoid; } tr { break-inside: avoid; } .wide { overflow-x: visible; } }
 )";
 }
 

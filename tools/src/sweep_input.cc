@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "calibration_words.h"
 #include "option_values.h"
 #include "thicklens/error.h"
 #include "thicklens/model/camera_file.h"
@@ -154,6 +155,10 @@ SweepInput ReadSweepInput(const SweepArguments& arguments) {
   TakeArguments(arguments, &input.file);
   input.truth = ReadTruth(arguments, SweepYamlOf(arguments), &input.notices);
   input.sweep = calib::MakeFocusSweep(input.file, model::ReadCamera(input.file.camera_path));
+  if (!input.truth) {  // a simulated camera's numbers are exact
+    const std::string missing = MissingTolerancesLine(input.sweep.camera);
+    if (!missing.empty()) input.notices.push_back(missing);
+  }
   input.frame_files = std::make_shared<FrameFiles>(input.file.frames);
   input.sweep.read_frame = [files = input.frame_files](std::size_t i) { return files->Read(i); };
   return input;
