@@ -84,13 +84,14 @@ void AddTransferExamples(model::Psf stated, const FittedRegion& other, BlurEvide
     evidence->examples.push_back(TransferExample(stated, other, *evidence, i));
 }
 
-std::optional<BlurExample> EdgeExample(const cv::Mat& grey, std::size_t frame, model::Psf stated,
-                                       double floor_px) {
+std::optional<EdgeComparison> EdgeExample(const cv::Mat& grey, std::size_t frame, model::Psf stated,
+                                          double floor_px) {
   for (const EdgeFeature& feature : FindEdges(grey, kMostFeatures)) {
     if (feature.kind != EdgeFeature::Kind::kEdge) continue;
     const auto fit = FitEdgeSpread(grey, feature, stated, floor_px, true);
     if (!fit || fit->distance_px.empty()) continue;
-    BlurExample example;
+    EdgeComparison comparison;
+    BlurExample& example = comparison.curves;
     example.frame = static_cast<int>(frame);
     example.is_edge = true;
     const bool is_gaussian = stated == model::Psf::kGaussian;
@@ -107,7 +108,10 @@ std::optional<BlurExample> EdgeExample(const cv::Mat& grey, std::size_t frame, m
       example.gaussian.push_back(is_gaussian ? fit->fitted[i] : by_other);
       example.disc.push_back(is_gaussian ? by_other : fit->fitted[i]);
     }
-    return example;
+    (is_gaussian ? comparison.gaussian_chi2 : comparison.disc_chi2) = fit->chi2_per_dof;
+    if (has_other)
+      (is_gaussian ? comparison.disc_chi2 : comparison.gaussian_chi2) = other->chi2_per_dof;
+    return comparison;
   }
   return std::nullopt;
 }

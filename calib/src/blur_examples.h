@@ -15,9 +15,14 @@ namespace thicklens::calib {
 // frame).
 void AddTransferExamples(model::Psf stated, const FittedRegion& other, BlurEvidence* evidence);
 
-// The profile of a frame's strongest straight edge; nothing where it has none that can be fitted.
-std::optional<BlurExample> EdgeExample(const cv::Mat& grey, std::size_t frame, model::Psf stated,
-                                       double floor_px);
+// The profile of a frame's strongest straight edge, with chi^2 per degree of freedom of each shape
+// where it can be fitted; nothing where there is no such edge.
+struct EdgeComparison {
+  BlurExample curves;
+  std::optional<double> gaussian_chi2, disc_chi2;
+};
+std::optional<EdgeComparison> EdgeExample(const cv::Mat& grey, std::size_t frame, model::Psf stated,
+                                          double floor_px);
 
 }  // namespace thicklens::calib
 

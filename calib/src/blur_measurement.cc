@@ -109,6 +109,25 @@ class Measurement {
                        [&](std::size_t a, std::size_t b) { return blur(a) < blur(b); });
       chosen.resize(std::min(chosen.size(), kFramesForBound));
     }
+    std::optional<BlurSamples> samples = EdgeSamples(chosen, psf);
+    if (!samples) return;
+    if (for_bound_alone) {
+      evidence_.unstated_edges = std::move(samples);
+      return;
+    }
+    if (is_sharp) samples->held_softness_px2 = 0;
+    AddEdgeExamples(samples->frames);
+    if (evidence_.disc_misfit && evidence_.better_psf != psf) {
+      evidence_.other_psf = EdgeSamples(chosen, evidence_.better_psf);
+      if (evidence_.other_psf) evidence_.other_psf->held_softness_px2 = samples->held_softness_px2;
+    }
+    evidence_.edges = static_cast<int>(evidence_.setup.meters.size());
+    evidence_.setup.meters.push_back(std::move(*samples));
+  }
+
+  // Of the chosen of the task's frames, with one shape of the blur.
+  std::optional<BlurSamples> EdgeSamples(const std::vector<std::size_t>& chosen, model::Psf psf) {
+    const double floor_px = std::sqrt(evidence_.assumed_floor_px2);
     std::vector<std::optional<FrameEdgeSpread>> found(task_.frames.size());
     model::ParallelFor(static_cast<int>(chosen.size()), task_.threads, [&](int i) {
       const std::size_t index = chosen[static_cast<std::size_t>(i)];
@@ -126,33 +145,38 @@ class Measurement {
       errors.push_back(std::max(2 * both.sigma_px * both.error_px, both.error_px * both.error_px) /
                        s2);
     }
-    if (samples.frames.size() < kFewestFrames) return;
+    if (samples.frames.size() < kFewestFrames) return std::nullopt;
     const auto n = static_cast<Eigen::Index>(variances.size());
     samples.variances_px2 = Eigen::Map<Eigen::VectorXd>(variances.data(), n);
     samples.covariance =
         Eigen::Map<Eigen::VectorXd>(errors.data(), n).array().square().matrix().asDiagonal();
-    if (for_bound_alone) {
-      evidence_.unstated_edges = std::move(samples);
-      return;
-    }
-    if (is_sharp) samples.held_softness_px2 = 0;
-    AddEdgeExamples(samples.frames);
-    evidence_.edges = static_cast<int>(evidence_.setup.meters.size());
-    evidence_.setup.meters.push_back(std::move(samples));
+    return samples;
   }
 
-  // The nearest, the sharpest and the farthest of the measured frames.
+  // The nearest, the sharpest and the farthest of the measured frames; on them both shapes of the
+  // blur are compared.
   void AddEdgeExamples(const std::vector<std::size_t>& measured) {
     const auto depth_mm = [this](std::size_t i) { return DepthMm(task_.frames[i]); };
     const auto [nearest, farthest] = std::minmax_element(
         measured.begin(), measured.end(),
         [&](std::size_t a, std::size_t b) { return depth_mm(a) < depth_mm(b); });
+    double as_gaussian = 0, as_disc = 0;
+    int compared = 0;
     for (const std::size_t frame :
          {task_.frames[*nearest], task_.reference, task_.frames[*farthest]}) {
       const auto example = EdgeExample(task_.store.Grey(frame), frame, task_.sweep.camera.psf,
                                        std::sqrt(evidence_.assumed_floor_px2));
-      if (example) evidence_.examples.push_back(*example);
+      if (!example) continue;
+      evidence_.examples.push_back(example->curves);
+      if (!example->gaussian_chi2 || !example->disc_chi2) continue;
+      as_gaussian += *example->gaussian_chi2;
+      as_disc += *example->disc_chi2;
+      ++compared;
     }
+    if (compared == 0) return;
+    evidence_.gaussian_misfit = as_gaussian / compared;
+    evidence_.disc_misfit = as_disc / compared;
+    evidence_.better_psf = as_gaussian <= as_disc ? model::Psf::kGaussian : model::Psf::kDisc;
   }
 
   // ---- relative spectra ----

@@ -10,6 +10,7 @@
 
 #include "blur_measurement.h"
 #include "calibration_checks.h"
+#include "change_of_reference.h"
 #include "field_map.h"
 #include "focus_solution.h"
 #include "frame_selection.h"
@@ -18,6 +19,7 @@
 #include "scale_tracking.h"
 #include "sharpness_peak.h"
 #include "source_recipe.h"
+#include "systematic_advice.h"
 #include "thicklens/calib/edge_blur.h"
 #include "thicklens/calib/sharpness.h"
 #include "thicklens/error.h"
@@ -89,10 +91,11 @@ class Calibrator {
       return;
     }
     for (const std::string& cause :
-         {exposure, RegionAdvice(sweep_),
+         {exposure, RegionAdvice(sweep_), UnitAdvice(sweep_, result_.frames, result_.scale),
           RegistrationAdvice(sweep_, result_.frames, used(), result_.scale)}) {
       if (cause.empty()) continue;
-      result_.reason = cause + "; as it is, " + result_.reason;
+      // What is missing because of the light is not to be advised on.
+      result_.reason = cause == exposure ? cause : cause + "; as it is, " + result_.reason;
       return;
     }
   }
@@ -188,14 +191,19 @@ class Calibrator {
     if (sweep_.offset_mm) {
       result_.bench_offset_mm =
           Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
-      if (!is_lone_edge) CheckGivenOffset(sweep_, &result_);
+      if (!is_lone_edge) {
+        const OffsetCheck check = CheckGivenOffset(sweep_, &result_);
+        if (check.refusal) return Refuse(*check.refusal);
+        conflicting_offset_mm_ = check.conflicting_mm;
+      }
     } else if (result_.scale.done) {
       result_.bench_offset_mm = result_.scale.offset_mm;
     } else {
-      return Refuse("offset_mm is unknown and was not found: " + result_.scale.message);
+      return Refuse(ReasonOfUnknownOffset(result_.scale));
     }
-    CheckDistortion(&result_);
+    if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
     slip_ = FindSlip(scales_, result_.scale);
+    if (slip_) WarnOfSlip(*slip_, &result_);
     bend_ = CheckBend(sweep_, scales_, &result_);
     const double sign = model::DirectionSign(sweep_.direction);
     for (FrameMeasurement& frame : result_.frames) {
@@ -207,8 +215,6 @@ class Calibrator {
 
   // The sharpest frame may be the one whose reading is wrong: the next sharpest takes its place,
   // and what was registered to the one is said of the other.
-  //   p = c + t_i + s_i R_i (p_0 - c) for the frame and for the new reference r gives
-  //   scale s_i/s_r, rotation R_i R_r^-1, shift t_i - (s_i/s_r) R_i R_r^-1 t_r.
   void ReplaceReference() {
     if (result_.frames[reference_].rejection.empty()) return;
     const ScaleSample* next = nullptr;
@@ -217,26 +223,8 @@ class Calibrator {
                                  result_.frames[next->frame].normalised_edge_slope)
         next = &sample;
     }
-    if (next == nullptr) {
-      reference_ = SharpestUsed();
-      return;
-    }
-    const Registration base = next->registration;
-    reference_ = next->frame;
-    for (ScaleSample& sample : scales_) {
-      Registration& r = sample.registration;
-      const double ratio = r.scale / base.scale;
-      const double angle = r.rotation_rad - base.rotation_rad;
-      const double c = std::cos(angle), s = std::sin(angle);
-      const Eigen::Vector2d turned(c * base.shift_px.x() - s * base.shift_px.y(),
-                                   s * base.shift_px.x() + c * base.shift_px.y());
-      r.shift_px -= ratio * turned;
-      r.scale = ratio;
-      r.scale_x /= base.scale_x;
-      r.scale_y /= base.scale_y;
-      r.rotation_rad = angle;
-      sample.scale = ratio;
-    }
+    reference_ = next == nullptr ? SharpestUsed() : next->frame;
+    if (next != nullptr) ReferTo(next->registration, &scales_);
   }
 
   void FitPeak() {
@@ -285,9 +273,28 @@ class Calibrator {
     if (!result_.frames[reference_].rejection.empty()) return;
     if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.outcome == Outcome::kRefused) return;
-    if (slip_) CheckSlip(sweep_, *slip_, &result_);
-    if (bend_ && !sweep_.offset_mm) WidenByBend(sweep_, *bend_, &result_);
+    WidenByContradictions(evidence.setup, fit);
     if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
+  }
+
+  // What the checks found, as far as it moves the results.
+  void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
+    if (conflicting_offset_mm_) {
+      WidenByTrials("given offset_mm", "measure offset_mm again: the image scale contradicts it",
+                    WithOffsets(setup, {*conflicting_offset_mm_}), fit, &result_);
+    }
+    if (slip_) {
+      WidenByTrials("jump of the readings", "find what slipped, or take the sweep again",
+                    WithoutSlip(sweep_, setup, *slip_, scales_, reference_, result_), fit,
+                    &result_);
+    }
+    if (bend_ && !sweep_.offset_mm) {
+      const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);
+      const double zero_mm = setup.offset_mm.value;
+      WidenByTrials("bend of the image scale",
+                    "measure offset_mm, check the rail's scale, undistort the pictures",
+                    WithOffsets(setup, {zero_mm - half_mm, zero_mm + half_mm}), fit, &result_);
+    }
   }
 
   // Everything was measured against the reference; if its blur turns out not to follow the others',
@@ -328,6 +335,7 @@ class Calibrator {
   std::vector<ScaleSample> scales_;            // registered frames
   std::optional<Slip> slip_;
   std::optional<Bend> bend_;
+  std::optional<double> conflicting_offset_mm_;  // what the image scale says of a given bench zero
   std::mutex progress_mutex_;
   int steps_done_ = 0;
   int total_steps_ = 0;

@@ -6,11 +6,16 @@
 #include <cmath>
 
 #include "frame_selection.h"
-#include "systematic_parts.h"
+#include "scale_tracking.h"
 #include "target_period.h"
 
 namespace thicklens::calib {
 namespace {
+
+// A given bench zero that lies farther off than this part of the depth is no error of measurement.
+constexpr double kGrossOffset = 0.1;
+// Relative change of the image height at the corner.
+constexpr double kGrossDistortion = 0.05;
 
 // m = f1 D/(f2 z) on the sensor over the target, so D = m z f2/f1.
 MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstimate& period,
@@ -30,31 +35,41 @@ MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstim
 
 }  // namespace
 
-void CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) {
+OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) {
+  OffsetCheck check;
   const ScaleLaw& law = calibration->scale;
   if (!law.done) {
     calibration->warnings.push_back("the given offset_mm could not be checked: " + law.message);
-    return;
+    return check;
   }
   const double apart_mm = law.offset_mm.value - sweep.offset_mm->value;
   const double sigma_mm = std::hypot(law.offset_mm.sigma, sweep.offset_mm->sigma);
-  if (std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm) {
-    calibration->warnings.push_back(
-        fmt::format("the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from "
-                    "the given one",
-                    law.offset_mm.value, law.offset_mm.sigma, apart_mm));
+  if (!(std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm)) return check;
+  const std::string found = fmt::format(
+      "the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from "
+      "the given one",
+      law.offset_mm.value, law.offset_mm.sigma, apart_mm);
+  if (std::abs(apart_mm) > kGrossOffset * law.reference_depth_mm &&
+      std::abs(apart_mm) > 5 * sigma_mm) {
+    check.refusal = found + ": check offset_mm, and that it and the readings are in mm";
+    return check;
   }
+  calibration->warnings.push_back(found);
+  check.conflicting_mm = law.offset_mm.value;
+  return check;
 }
 
-void CheckDistortion(Calibration* calibration) {
+std::optional<std::string> CheckDistortion(Calibration* calibration) {
   const auto& distortion = calibration->scale.distortion_at_corner;
   if (!distortion || !(std::abs(distortion->value) > std::max(0.005, 4 * distortion->sigma)))
-    return;
-  calibration->warnings.push_back(
-      fmt::format("the pictures are distorted: {:+.1f} +- {:.1f} % at the corner ({}); undistort "
-                  "them first, depth and blur are those of an undistorted camera",
-                  100 * distortion->value, 100 * distortion->sigma,
-                  distortion->value > 0 ? "pincushion" : "barrel"));
+    return std::nullopt;
+  const std::string found = fmt::format(
+      "the pictures are distorted: {:+.1f} +- {:.1f} % at the corner ({}); undistort them first",
+      100 * distortion->value, 100 * distortion->sigma,
+      distortion->value > 0 ? "pincushion" : "barrel");
+  if (std::abs(distortion->value) > kGrossDistortion) return found;
+  calibration->warnings.push_back(found + ", depth and blur are those of an undistorted camera");
+  return std::nullopt;
 }
 
 std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSample>& scales,
@@ -71,24 +86,41 @@ std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSa
   return bend;
 }
 
-void WidenByBend(const FocusSweep& sweep, const Bend& bend, Calibration* calibration) {
-  const double half_mm = 0.5 * std::abs(bend.zero_spread_mm);
-  Result& zero = *calibration->bench_offset_mm;
-  zero.systematic = Eigen::Vector2d(zero.value - half_mm, zero.value + half_mm);
-  WidenFocus("bend of the image scale", half_mm,
-             "measure offset_mm, check the rail's scale, undistort the pictures", sweep.camera.lens,
-             calibration);
-}
-
-void CheckSlip(const FocusSweep& sweep, const Slip& slip, Calibration* calibration) {
+void WarnOfSlip(const Slip& slip, Calibration* calibration) {
   const FrameMeasurement& frame = calibration->frames[slip.frame];
   calibration->warnings.push_back(
       fmt::format("the readings jump by {:+.2f} +- {:.2f} mm against the image scale from {} "
-                  "(reading {:.6g} mm) "
-                  "on: check the clamp and the table of readings there",
+                  "(reading {:.6g} mm) on: check the clamp and the table of readings there",
                   slip.jump_mm.value, slip.jump_mm.sigma, FileName(frame.image), frame.reading_mm));
-  WidenFocus("jump of the readings", std::abs(slip.jump_mm.value),
-             "find what slipped, or take the sweep again", sweep.camera.lens, calibration);
+}
+
+std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,
+                                      const std::vector<double>& offsets_mm) {
+  std::vector<BlurFitSetup> setups(offsets_mm.size(), setup);
+  for (std::size_t i = 0; i < setups.size(); ++i) setups[i].offset_mm.value = offsets_mm[i];
+  return setups;
+}
+
+std::vector<BlurFitSetup> WithoutSlip(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                      const Slip& slip, std::vector<ScaleSample> scales,
+                                      std::size_t reference, const Calibration& calibration) {
+  const double from_mm = calibration.frames[slip.frame].reading_mm;
+  BlurFitSetup later = setup, earlier = setup;
+  for (FitFrame& frame : later.frames) {
+    if (frame.reading_mm >= from_mm) frame.reading_mm -= slip.jump_mm.value;
+  }
+  for (FitFrame& frame : earlier.frames) {
+    if (frame.reading_mm < from_mm) frame.reading_mm += slip.jump_mm.value;
+  }
+  if (sweep.offset_mm) return {later, earlier};
+  for (ScaleSample& sample : scales) {
+    if (sample.reading_mm >= from_mm) sample.reading_mm -= slip.jump_mm.value;
+  }
+  const ScaleLaw law = FitScaleLaw(scales, static_cast<int>(reference), setup.reading_sigma_mm,
+                                   sweep.direction, RegionCornerRadiusPx(sweep));
+  if (!law.done) return {later, earlier};
+  later.offset_mm.value = law.offset_mm.value;
+  return {later};
 }
 
 void CheckMagnification(const FocusSweep& sweep, std::size_t reference, const cv::Mat& grey,

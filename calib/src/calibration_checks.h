@@ -3,8 +3,10 @@
 
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "blur_fit.h"
 #include "reading_gates.h"
 #include "scale_bend.h"
 #include "thicklens/calib/calibrate.h"
@@ -14,21 +16,31 @@ namespace thicklens::calib {
 // What may contradict the results without forbidding them. Each adds its warning, if there is one,
 // to the calibration.
 
-// The bench zero that was given against that of the image scale.
-void CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration);
+// The bench zero that was given against that of the image scale: the latter where they contradict
+// each other. A refusal where they lie so far apart that one of them is plain wrong.
+struct OffsetCheck {
+  std::optional<std::string> refusal;
+  std::optional<double> conflicting_mm;
+};
+OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration);
 
-void CheckDistortion(Calibration* calibration);
+// A refusal where the pictures are distorted beyond what can be allowed for.
+std::optional<std::string> CheckDistortion(Calibration* calibration);
 
 // Readings that go along a curve against the image scale.
 std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSample>& scales,
                               Calibration* calibration);
 
-// Widens the systematic intervals of a bench zero that came from such a scale, and of the focus
-// with it, by half of what the two halves of the sweep differ.
-void WidenByBend(const FocusSweep& sweep, const Bend& bend, Calibration* calibration);
+void WarnOfSlip(const Slip& slip, Calibration* calibration);
 
-// Widens the systematic interval of the focus by the jump.
-void CheckSlip(const FocusSweep& sweep, const Slip& slip, Calibration* calibration);
+// The setups of fits with what else the checks leave possible: the other bench zero; one of the
+// sweep's halves' own zero; the readings before or after a jump moved, with the zero that their
+// scales then give where none was given.
+std::vector<BlurFitSetup> WithOffsets(const BlurFitSetup& setup,
+                                      const std::vector<double>& offsets_mm);
+std::vector<BlurFitSetup> WithoutSlip(const FocusSweep& sweep, const BlurFitSetup& setup,
+                                      const Slip& slip, std::vector<ScaleSample> scales,
+                                      std::size_t reference, const Calibration& calibration);
 
 // d1 from the target's period, which must be stated, against d1 from the focus. `grey`: the linear
 // light of the frame `reference`.

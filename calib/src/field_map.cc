@@ -9,7 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "edge_pixels.h"
-#include "systematic_parts.h"
+#include "systematic_advice.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::calib {

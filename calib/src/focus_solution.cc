@@ -19,6 +19,8 @@ namespace {
 
 // Weight of the robust loss below which a frame is told.
 constexpr double kOutlierWeight = 0.6;
+// chi^2 per degree of freedom above which the law itself is in doubt.
+constexpr double kLargeMisfit = 2;
 constexpr double kSmallestRatio = 0.2, kLargestRatio = 0.8;
 // Beyond these a lens is unusual: the full aperture gives .5 by second moment.
 constexpr double kLowRatio = 0.35, kHighRatio = 0.65;
@@ -42,6 +44,7 @@ class Solution {
     FillFrames();
     FillValues();
     if (!IsPlausible()) return;
+    WarnOfMisfit();
     FitSides(evidence_, fit_, &result_);
     AddSystematicParts(sweep_, evidence_, fit_, choice.interval_px2, &result_);
     FillFloor(choice);
@@ -96,7 +99,7 @@ class Solution {
     blur.meter = evidence_.edges < 0      ? "relative spectrum"
                  : evidence_.spectrum < 0 ? "edges"
                                           : "edges and relative spectrum";
-    blur.better_psf = evidence_.spectrum >= 0 ? evidence_.better_psf : sweep_.camera.psf;
+    blur.better_psf = evidence_.disc_misfit ? evidence_.better_psf : sweep_.camera.psf;
     blur.gaussian_misfit = evidence_.gaussian_misfit;
     blur.disc_misfit = evidence_.disc_misfit;
     result_.examples = evidence_.examples;
@@ -112,6 +115,15 @@ class Solution {
             model::PsfName(blur.better_psf), model::PsfName(sweep_.camera.psf), better, stated));
       }
     }
+  }
+
+  void WarnOfMisfit() {
+    if (!(fit_.chi2_per_dof > kLargeMisfit)) return;
+    result_.warnings.push_back(fmt::format(
+        "the frames lie farther off the blur law than their errors say (chi2/dof {:.3g}), which "
+        "were widened for it: readings worse than stated, an aberrated lens, sharpened or "
+        "compressed pictures, a wrong sensor.transfer or another shape of the blur do that",
+        fit_.chi2_per_dof));
   }
 
   void FillFrames() {

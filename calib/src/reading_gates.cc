@@ -93,7 +93,9 @@ std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameM
   const auto registered = static_cast<std::size_t>(std::count_if(
       used.begin(), used.end(), [&](std::size_t i) { return frames[i].image_scale.has_value(); }));
   const bool was_tried = law.reference_frame >= 0;
-  if (!was_tried || law.done || IsStatedEdge(sweep) || 2 * registered >= used.size()) return "";
+  if (!was_tried || law.done || LooksTheSameAtEveryScale(law) || IsStatedEdge(sweep) ||
+      2 * registered >= used.size())
+    return "";
   return fmt::format(
       "only {} of {} frames could be registered to one another: every frame must show the same "
       "part of the target, or, if it is a lone edge, which shows no image scale, state target: "
@@ -107,8 +109,32 @@ void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, Sc
   };
   samples->erase(std::remove_if(samples->begin(), samples->end(), is_other), samples->end());
   law->contradicts_readings = false;
-  law->message = "a lone edge shows no image scale: ";
-  law->message += sweep.offset_mm ? "offset_mm is taken as given" : "state offset_mm";
+  law->message = "a lone edge shows no image scale";
+  if (sweep.offset_mm) law->message += ": offset_mm is taken as given";
+}
+
+std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
+                       const ScaleLaw& law) {
+  if (!law.done) return "";
+  std::vector<double> depths_mm;
+  for (const FrameMeasurement& frame : frames) {
+    if (frame.image_scale) depths_mm.push_back(law.reference_depth_mm / *frame.image_scale);
+  }
+  if (depths_mm.empty()) return "";
+  const auto [nearest, farthest] = std::minmax_element(depths_mm.begin(), depths_mm.end());
+  const double least_mm = 2 * sweep.camera.lens.front_focal_length_mm;
+  if (!(*farthest < least_mm)) return "";
+  return fmt::format(
+      "the image scale puts the target at {:.3g} to {:.3g} mm, less than two focal lengths ({:.3g} "
+      "mm): are the readings in mm?",
+      *nearest, *farthest, least_mm);
+}
+
+std::string ReasonOfUnknownOffset(const ScaleLaw& law) {
+  return fmt::format("offset_mm is unknown and was not found: {}; {}", law.message,
+                     LooksTheSameAtEveryScale(law)
+                         ? "state offset_mm, or use a texture"
+                         : "to do without the image scale, state offset_mm");
 }
 
 std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
@@ -123,8 +149,7 @@ std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
         used.size(), different.size(), law.message);
   }
   if (law.kind == ScaleKind::kReversed || law.contradicts_readings) return law.message;
-  if (law.kind == ScaleKind::kConstant && !sweep.offset_mm)
-    return "offset_mm is unknown and was not found: " + law.message;
+  if (law.kind == ScaleKind::kConstant && !sweep.offset_mm) return ReasonOfUnknownOffset(law);
   return std::nullopt;
 }
 

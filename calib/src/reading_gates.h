@@ -17,10 +17,18 @@ bool IsLoneEdge(const FocusSweep& sweep, std::size_t used, std::size_t registere
 // Then only the reference is left, and the law says what takes its place.
 void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, ScaleLaw* law);
 
-// What to do where most of the used frames could not be registered and no law was found; else
-// empty.
+// What to do where most of the used frames could not be registered and no law was found, though the
+// target has a scale to measure; else empty.
 std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
                                const std::vector<std::size_t>& used, const ScaleLaw& law);
+
+// A question about the unit of the readings where the law puts every frame nearer than two focal
+// lengths, where the image is larger than the target; else empty.
+std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
+                       const ScaleLaw& law);
+
+// Of a sweep without an offset: why the law gave none either, and what to do.
+std::string ReasonOfUnknownOffset(const ScaleLaw& law);
 
 // Why the image scales of the used frames forbid any result, or nothing: the readings run the other
 // way or are in no order at all, or one picture was repeated for all of them.

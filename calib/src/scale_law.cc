@@ -31,8 +31,9 @@ constexpr double kScaleBias = 3e-5;
 // at the corner: the tiles reach less far.
 constexpr double kScalePerCornerDistortion = 0.4;
 constexpr double kLikelyDistortion = 0.02;  // at the corner, the most that is reckoned with
-constexpr double kKnownDistortion = 0.01;   // sigma at the corner from which it is worth stating
+constexpr double kKnownDistortion = 0.01;   // sigma at the corner from which even none is stated
 constexpr int kBlocks = 8;                  // of the jackknife
+constexpr char kSameAtEveryScale[] = "the target looks the same at every scale";
 
 // 1/scale = (offset + sign reading)/reference_depth.
 struct Law {
@@ -243,7 +244,7 @@ class LawFinder {
       sigma_mm = ScatterOfReadings(points_, law, sign, reading_sigma_mm_);
       const std::optional<Law> solved = SolveLaw(points_, sign, sigma_mm, law, &covariance);
       if (!solved || !(solved->reference_depth_mm > 0)) {
-        result->message = "the fit of the image scale did not converge: state offset_mm";
+        result->message = "the fit of the image scale did not converge";
         return false;
       }
       law = *solved;
@@ -277,15 +278,14 @@ class LawFinder {
     const double own_sign = line_.slope > 0 ? 1 : -1;
     const Law law{own_sign * line_.intercept / line_.slope, 1 / std::abs(line_.slope)};
     const double sigma_mm = ScatterOfReadings(points_, law, own_sign, reading_sigma_mm_);
-    std::size_t following = 0;
-    for (const Point& p : points_) {
-      const double within_mm = std::max(kFollowsWithin * range_mm_,
-                                        kFollowsSigmas * ReadingSigma(p, law, reading_sigma_mm_));
-      following += std::abs(ReadingError(p, law, own_sign)) < within_mm ? 1U : 0U;
-    }
-    if (static_cast<double>(following) < kLeastFollowing * static_cast<double>(points_.size()) ||
-        !(sigma_mm < kFollowsWithin * range_mm_)) {
+    const std::size_t following = CountFollowing(law, own_sign, reading_sigma_mm_);
+    const bool is_close = sigma_mm < kFollowsWithin * range_mm_;
+    if (!AreEnough(following) || !is_close) {
       DoesNotFollow(following, result);
+      if (is_close && AreEnough(CountFollowing(law, own_sign, sigma_mm))) {
+        result->message += fmt::format(
+            "; if the readings are only good to about {:.2g} mm, state reading_sigma_mm", sigma_mm);
+      }
     } else if (line_.slope * model::DirectionSign(direction_) > 0) {
       result->kind = ScaleKind::kInverseDepth;
     } else {
@@ -298,29 +298,41 @@ class LawFinder {
     }
   }
 
+  std::size_t CountFollowing(const Law& law, double sign, double reading_sigma_mm) const {
+    std::size_t following = 0;
+    for (const Point& p : points_) {
+      const double within_mm = std::max(kFollowsWithin * range_mm_,
+                                        kFollowsSigmas * ReadingSigma(p, law, reading_sigma_mm));
+      following += std::abs(ReadingError(p, law, sign)) < within_mm ? 1U : 0U;
+    }
+    return following;
+  }
+
+  bool AreEnough(std::size_t following) const {
+    return static_cast<double>(following) >= kLeastFollowing * static_cast<double>(points_.size());
+  }
+
   void ClassifyFlat(double change, double change_sigma, ScaleLaw* result) const {
-    std::vector<double> inverses, errors, stated;
+    std::vector<double> inverses;
     for (const Point& p : points_) inverses.push_back(p.inverse_scale);
     const double middle = Median(inverses);
     std::size_t apart = 0;
     for (const Point& p : points_) {
-      errors.push_back(std::abs(p.inverse_scale - middle));
-      stated.push_back(p.inverse_scale_sigma);
-      apart += errors.back() > std::max(kConstantChange, kFollowsSigmas * stated.back()) ? 1U : 0U;
+      const double within = std::max(kConstantChange, kFollowsSigmas * p.inverse_scale_sigma);
+      apart += std::abs(p.inverse_scale - middle) > within ? 1U : 0U;
     }
-    const auto count = static_cast<double>(points_.size());
-    if (static_cast<double>(apart) > (1 - kLeastFollowing) * count) {
+    if (!AreEnough(points_.size() - apart)) {
       DoesNotFollow(points_.size() - apart, result);
     } else if (const double most = change + 2 * change_sigma;
                most < kConstantChange && range_mm_ > most * kLongestBenchMm) {
       result->kind = ScaleKind::kConstant;
       result->message =
           "the image scale does not change with the reading (telecentric lens, moving sensor, or "
-          "one picture repeated): the bench zero cannot be found from it, state offset_mm";
+          "one picture repeated): the bench zero cannot be found from it";
     } else {
       result->message = fmt::format(
           "the readings span {:.3g} mm, too little to tell how the image scale goes with them (it "
-          "changes by {:.2g} +- {:.2g} %): extend the sweep, or state offset_mm",
+          "changes by {:.2g} +- {:.2g} %): extend the sweep",
           range_mm_, 100 * change, 100 * change_sigma);
     }
   }
@@ -331,7 +343,7 @@ class LawFinder {
         points_.size() >= kEnoughToContradict && 2 * following < points_.size();
     result->message = fmt::format(
         "the image scale does not follow the readings: {} of {} frames agree with one law (1/z, "
-        "reversed or constant). Check that every frame has its own reading, or state offset_mm",
+        "reversed or constant). Check that every frame has its own reading",
         following, points_.size());
   }
 
@@ -354,6 +366,10 @@ std::optional<model::Estimate> DistortionAtCorner(const std::vector<ScaleSample>
 
 }  // namespace
 
+bool LooksTheSameAtEveryScale(const ScaleLaw& law) {
+  return law.message.rfind(kSameAtEveryScale, 0) == 0;
+}
+
 ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_frame,
                      double reading_sigma_mm, model::BenchDirection direction,
                      double corner_radius_px) {
@@ -361,11 +377,8 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
   result.reference_frame = reference_frame;
   if (std::any_of(samples.begin(), samples.end(),
                   [](const ScaleSample& s) { return s.scale_is_from_reading; })) {
-    result.message =
-        "the target looks the same at every scale (spokes from one point), so that its image "
-        "scale tells nothing";
-    // Without an offset no frame has a depth to take a scale from.
-    if (samples.size() < 2) result.message += ": state offset_mm, or use a texture";
+    result.message = kSameAtEveryScale;
+    result.message += " (spokes from one point), so that its image scale tells nothing";
     return result;
   }
   std::set<double> readings;
@@ -376,11 +389,13 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
                                  readings.size() < samples.size() ? " at different readings" : "");
     return result;
   }
-  const auto distortion = DistortionAtCorner(samples, corner_radius_px);
   LawFinder finder(samples, reading_sigma_mm, direction);
   finder.Classify(&result);
+  const auto distortion = DistortionAtCorner(samples, corner_radius_px);
   // Frames that do not follow the law may not show one target.
-  if (result.kind != ScaleKind::kUnknown && distortion && distortion->sigma < kKnownDistortion)
+  if (result.kind != ScaleKind::kUnknown && distortion &&
+      (distortion->sigma < kKnownDistortion ||
+       std::abs(distortion->value) > kSignificant * distortion->sigma))
     result.distortion_at_corner = distortion;
   if (result.kind != ScaleKind::kInverseDepth || !finder.Solve(distortion, &result)) return result;
   result.done = true;

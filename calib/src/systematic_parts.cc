@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "systematic_advice.h"
+
 namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestFrames = 5;
-constexpr std::size_t kFewestOnASide = 6;
-constexpr double kSidesDisagree = 3;  // of their standard deviations
+constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
+constexpr double kLawFails = 2;        // chi^2 per degree of freedom of the blur law
+constexpr double kSidesDisagree = 3;   // of their standard deviations
 // What the meters themselves are good for, relative to kappa: measured on simulated sweeps.
 constexpr double kMeterRatioError = 0.003;
 
@@ -22,43 +25,6 @@ struct Trial {
 
 std::string SideInWords(const SideFit& side) {
   return side.done ? fmt::format("{} frames", side.frames_used) : side.message;
-}
-
-double Width(const Eigen::Vector2d& interval) { return interval.y() - interval.x(); }
-
-// The largest part first; then what takes the largest share of the error of d1, the statistical
-// part at its 95 %, what the bench zero brings into it apart.
-void SortAndAdvise(Calibration* calibration) {
-  std::vector<SystematicPart>& parts = calibration->systematic_parts;
-  std::stable_sort(parts.begin(), parts.end(),
-                   [](const SystematicPart& a, const SystematicPart& b) {
-                     return Width(a.image_distance_mm) > Width(b.image_distance_mm);
-                   });
-  const double zf_sigma_mm = calibration->focus_depth_mm->sigma;
-  const double zero_sigma_mm = std::min(calibration->bench_offset_mm->sigma, zf_sigma_mm);
-  const double d1_per_zf =
-      zf_sigma_mm > 0 ? calibration->image_distance_mm->sigma / zf_sigma_mm : 0;
-  const double zero_mm = 2 * 1.96 * d1_per_zf * zero_sigma_mm;
-  const double noise_mm =
-      2 * 1.96 * d1_per_zf * std::sqrt(zf_sigma_mm * zf_sigma_mm - zero_sigma_mm * zero_sigma_mm);
-  double all_mm = noise_mm + zero_mm;
-  for (const SystematicPart& part : parts) all_mm += Width(part.image_distance_mm);
-  if (!(all_mm > 0)) return;
-  const double worst_mm = parts.empty() ? 0 : Width(parts.front().image_distance_mm);
-  const auto share = [&](double part_mm) { return 100 * part_mm / all_mm; };
-  if (worst_mm > noise_mm && worst_mm > zero_mm) {
-    calibration->advice = fmt::format("{} is {:.0f} % of the error of d1: {}", parts.front().name,
-                                      share(worst_mm), parts.front().remedy);
-  } else if (zero_mm > noise_mm) {
-    calibration->advice = fmt::format(
-        "the bench zero is {:.0f} % of the error of d1: measure offset_mm, or sweep over "
-        "a longer range so that the image scale shows it better",
-        share(zero_mm));
-  } else {
-    calibration->advice = fmt::format(
-        "noise and readings are {:.0f} % of the error of d1: more frames, or a finer bench scale",
-        share(noise_mm));
-  }
 }
 
 class Parts {
@@ -150,11 +116,11 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // Another set of samples in the spectral meter's place. Frames that were thrown out stay out.
-  std::optional<Trial> WithSpectrum(const std::optional<BlurSamples>& samples) const {
-    if (!samples || evidence_.spectrum < 0) return std::nullopt;
+  // Another set of samples in a meter's place. Frames that were thrown out stay out.
+  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter) const {
+    if (!samples || meter < 0) return std::nullopt;
     BlurFitSetup setup = evidence_.setup;
-    BlurSamples& place = setup.meters[static_cast<std::size_t>(evidence_.spectrum)];
+    BlurSamples& place = setup.meters[static_cast<std::size_t>(meter)];
     std::vector<Eigen::Index> kept;
     for (std::size_t i = 0; i < samples->frames.size(); ++i) {
       if (std::find(place.frames.begin(), place.frames.end(), samples->frames[i]) !=
@@ -163,6 +129,7 @@ class Parts {
     }
     if (kept.size() < kFewestFrames) return std::nullopt;
     BlurSamples chosen;
+    chosen.held_softness_px2 = place.held_softness_px2;
     chosen.variances_px2 = samples->variances_px2(kept);
     chosen.covariance = samples->covariance(kept, kept);
     for (const Eigen::Index i : kept)
@@ -172,7 +139,7 @@ class Parts {
   }
 
   void AddBand() {
-    const std::optional<Trial> trial = WithSpectrum(evidence_.narrow_band);
+    const std::optional<Trial> trial = With(evidence_.narrow_band, evidence_.spectrum);
     if (!trial) return;
     SystematicPart part;
     part.name = "frequency band";
@@ -181,19 +148,45 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // Kappa means another thing with another shape: only the depth moves.
+  // The other shape is right beyond doubt: the frames themselves say so, or the law holds with it
+  // and not with the stated one.
+  bool OtherShapeIsRight(const Trial& other) const {
+    if (!other.fit.done) return false;
+    if (evidence_.gaussian_misfit && evidence_.disc_misfit) {
+      const bool is_gaussian = sweep_.camera.psf == model::Psf::kGaussian;
+      const double stated = is_gaussian ? *evidence_.gaussian_misfit : *evidence_.disc_misfit;
+      const double better = is_gaussian ? *evidence_.disc_misfit : *evidence_.gaussian_misfit;
+      if (stated > kShapesDiffer * better) return true;
+    }
+    return evidence_.better_psf != sweep_.camera.psf && fit_.chi2_per_dof > kLawFails &&
+           fit_.chi2_per_dof > 2 * other.fit.chi2_per_dof;
+  }
+
+  // With a shape that fits, kappa is not expected to move; with another one it is another kappa,
+  // and only the depth can be compared.
   void AddShape() {
-    const std::optional<Trial> trial = WithSpectrum(evidence_.other_psf);
+    const std::optional<Trial> trial =
+        With(evidence_.other_psf, evidence_.spectrum >= 0 ? evidence_.spectrum : evidence_.edges);
     if (!trial) return;
     SystematicPart part;
-    part.name = "shape of the blur";
-    part.remedy = evidence_.better_psf == sweep_.camera.psf
-                      ? std::string("nothing: the shape that the camera file states fits better")
-                      : fmt::format("state psf: {} in the camera file: it fits better",
-                                    model::PsfName(evidence_.better_psf));
+    part.name = kShapePart;
+    const bool is_right = OtherShapeIsRight(*trial);
+    const model::Psf other =
+        sweep_.camera.psf == model::Psf::kGaussian ? model::Psf::kDisc : model::Psf::kGaussian;
+    part.remedy =
+        is_right || evidence_.better_psf != sweep_.camera.psf
+            ? fmt::format("state psf: {} in the camera file: it fits better", model::PsfName(other))
+            : std::string("nothing: the shape that the camera file states fits better");
     Include(*trial, &part);
-    part.blur_ratio.setZero();
+    if (!is_right) part.blur_ratio.setZero();
     result_.systematic_parts.push_back(part);
+    if (!is_right) return;
+    result_.warnings.push_back(fmt::format(
+        "the blur is a {}, not the {} that the camera file states: with it the frames "
+        "follow the blur law (chi2/dof {:.3g} against {:.3g}) and the blur ratio is "
+        "{:.4f}; state psf: {} in the camera file",
+        model::PsfName(other), model::PsfName(sweep_.camera.psf), trial->fit.chi2_per_dof,
+        fit_.chi2_per_dof, trial->fit.values[kBlurRatio], model::PsfName(other)));
   }
 
   // Each meter alone, where there are two.
@@ -273,90 +266,12 @@ class Parts {
   double d1_mm_ = 0;
 };
 
-// The samples on one side of focus, the target's softness held as the whole sweep has it.
-std::optional<BlurFitSetup> SideOf(const BlurEvidence& evidence, const BlurFitResult& fit,
-                                   bool nearer, std::size_t* frames) {
-  BlurFitSetup setup = evidence.setup;
-  setup.offset_mm.sigma = 0;  // moves both sides alike
-  if (!setup.floor_variance_px2)
-    setup.floor_variance_px2 = model::Estimate{fit.values[kFloorVariance], 0};
-  *frames = 0;
-  for (std::size_t m = 0; m < setup.meters.size(); ++m) {
-    BlurSamples& meter = setup.meters[m];
-    std::vector<Eigen::Index> kept;
-    std::vector<std::size_t> kept_frames;
-    for (std::size_t i = 0; i < meter.frames.size(); ++i) {
-      const double depth_mm = setup.offset_mm.value + model::DirectionSign(setup.direction) *
-                                                          setup.frames[meter.frames[i]].reading_mm;
-      if ((depth_mm < fit.values[kFocusDepth]) != nearer) continue;
-      kept.push_back(static_cast<Eigen::Index>(i));
-      kept_frames.push_back(meter.frames[i]);
-    }
-    BlurSamples side;
-    side.frames = kept_frames;
-    side.variances_px2 = meter.variances_px2(kept);
-    side.covariance = meter.covariance(kept, kept);
-    side.held_softness_px2 = fit.softness_px2[m];
-    meter = std::move(side);
-    *frames = std::max(*frames, kept.size());
-  }
-  setup.meters.erase(std::remove_if(setup.meters.begin(), setup.meters.end(),
-                                    [](const BlurSamples& m) { return m.frames.empty(); }),
-                     setup.meters.end());
-  if (*frames < kFewestOnASide) return std::nullopt;
-  return setup;
-}
-
-SideFit FitSide(const BlurEvidence& evidence, const BlurFitResult& fit, bool nearer) {
-  SideFit side;
-  std::size_t frames = 0;
-  const std::optional<BlurFitSetup> setup = SideOf(evidence, fit, nearer, &frames);
-  side.frames_used = static_cast<int>(frames);
-  if (!setup) {
-    side.message = fmt::format("{} frames on this side, {} are needed", frames, kFewestOnASide);
-    return side;
-  }
-  const BlurFitResult alone = FitBlur(*setup, &fit);
-  side.message = alone.message;
-  if (!alone.done) return side;
-  side.done = true;
-  side.focus_depth_mm = {alone.values[kFocusDepth],
-                         std::sqrt(alone.covariance(kFocusDepth, kFocusDepth))};
-  side.blur_ratio = {alone.values[kBlurRatio], std::sqrt(alone.covariance(kBlurRatio, kBlurRatio))};
-  return side;
-}
-
 }  // namespace
-
-void FitSides(const BlurEvidence& evidence, const BlurFitResult& fit, Calibration* calibration) {
-  calibration->nearer = FitSide(evidence, fit, true);
-  calibration->farther = FitSide(evidence, fit, false);
-}
 
 void AddSystematicParts(const FocusSweep& sweep, const BlurEvidence& evidence,
                         const BlurFitResult& fit, const FloorInterval& floor,
                         Calibration* calibration) {
   Parts(sweep, evidence, fit, calibration).Run(floor);
-}
-
-void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
-                const model::ThickLens& lens, Calibration* calibration) {
-  const double zf = calibration->focus_depth_mm->value;
-  const double d1_mm = model::ImageDistanceMm(lens, zf);
-  SystematicPart part;
-  part.name = name;
-  part.remedy = remedy;
-  // d1 falls as zf grows; nearer than the focal point nothing comes into focus.
-  const double nearest_mm = std::max(zf - move_mm, std::min(zf, 1.01 * lens.front_focal_length_mm));
-  part.focus_depth_mm = {nearest_mm - zf, move_mm};
-  part.image_distance_mm = {model::ImageDistanceMm(lens, zf + move_mm) - d1_mm,
-                            model::ImageDistanceMm(lens, nearest_mm) - d1_mm};
-  if (calibration->focus_depth_mm->systematic)
-    *calibration->focus_depth_mm->systematic += part.focus_depth_mm;
-  if (calibration->image_distance_mm->systematic)
-    *calibration->image_distance_mm->systematic += part.image_distance_mm;
-  calibration->systematic_parts.push_back(part);
-  SortAndAdvise(calibration);
 }
 
 }  // namespace thicklens::calib

@@ -22,11 +22,6 @@ void AddSystematicParts(const FocusSweep& sweep, const BlurEvidence& evidence,
                         const BlurFitResult& fit, const FloorInterval& floor,
                         Calibration* calibration);
 
-// Adds a part that moves zf by up to `move_mm` either way, to the table and to the intervals of zf
-// and d1, linearly: these are no errors that average out.
-void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
-                const model::ThickLens& lens, Calibration* calibration);
-
 }  // namespace thicklens::calib
 
 #endif  // THICKLENS_CALIB_SRC_SYSTEMATIC_PARTS_H_

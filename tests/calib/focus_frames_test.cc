@@ -169,19 +169,18 @@ TEST(SolveFocus, LightFramesAreWarnedOfByName) {
   EXPECT_LT(c.frame(8).blur_fit_weight, 0.6);
   EXPECT_EQ(c.frame(8).rejection, "");
   EXPECT_TRUE(c.frame(8).in_blur_fit);
-  ASSERT_EQ(c.calibration.warnings.size(), 1U);
-  EXPECT_THAT(
-      c.calibration.warnings[0],
-      AllOf(StartsWith("1 of 31 frames"), HasSubstr("weigh less: frame-8.png (reading 340 mm")));
+  EXPECT_THAT(c.calibration.warnings,
+              Contains(AllOf(StartsWith("1 of 31 frames"),
+                             HasSubstr("weigh less: frame-8.png (reading 340 mm"))));
+  EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr("farther off the blur law")));
 }
 
 TEST(SolveFocus, ThreeLightFramesAreNamedAndTheOthersCounted) {
   FocusCase c = WithLight({4, 7, 10, 24, 27});
-  ASSERT_EQ(c.calibration.warnings.size(), 1U);
-  EXPECT_THAT(
-      c.calibration.warnings[0],
-      AllOf(StartsWith("5 of 31 frames"), HasSubstr("frame-4.png"), HasSubstr("frame-7.png"),
-            HasSubstr("frame-10.png"), HasSubstr(" and 2 more"), Not(HasSubstr("frame-24.png"))));
+  EXPECT_THAT(c.calibration.warnings,
+              Contains(AllOf(StartsWith("5 of 31 frames"), HasSubstr("frame-4.png"),
+                             HasSubstr("frame-7.png"), HasSubstr("frame-10.png"),
+                             HasSubstr(" and 2 more"), Not(HasSubstr("frame-24.png")))));
 }
 
 // Four of their errors cost no weight.

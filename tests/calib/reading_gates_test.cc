@@ -223,8 +223,44 @@ TEST(ReasonAgainstScales, AConstantScaleNeedsTheBenchZero) {
   const auto reason = bench.Reason();
   ASSERT_TRUE(reason);
   EXPECT_THAT(*reason, AllOf(HasSubstr("offset_mm is unknown"), HasSubstr("does not change")));
+  EXPECT_THAT(*reason, HasSubstr("state offset_mm"));
   bench.sweep.offset_mm = model::Estimate{30, 0.1};
   EXPECT_FALSE(bench.Reason());
+}
+
+// The law of a star, from the readings' scales.
+ScaleLaw StarLaw() {
+  Bench bench;
+  for (ScaleSample& sample : bench.samples) sample.scale_is_from_reading = true;
+  return FitScaleLaw(bench.samples, 12, 0.05, BenchDirection::kAway);
+}
+
+TEST(ReasonOfUnknownOffset, TellsWhatToDo) {
+  Bench bench;
+  bench.law.message = "the image scale does not change";
+  EXPECT_EQ(ReasonOfUnknownOffset(bench.law),
+            "offset_mm is unknown and was not found: the image scale does not change; to do "
+            "without the image scale, state offset_mm");
+  EXPECT_THAT(ReasonOfUnknownOffset(StarLaw()),
+              AllOf(HasSubstr("looks the same at every scale"),
+                    HasSubstr("state offset_mm, or use a texture")));
+}
+
+TEST(UnitAdvice, AsksWhereAllFramesLieNearerThanTwoFocalLengths) {
+  Bench bench;
+  bench.sweep.camera.lens.front_focal_length_mm = 226;  // the frames lie at 350 to 450 mm
+  const auto advice = [&] { return UnitAdvice(bench.sweep, bench.frames, bench.law); };
+  EXPECT_EQ(advice(), "") << "no frame was registered";
+  for (const ScaleSample& sample : bench.samples)
+    bench.frames[sample.frame].image_scale = sample.scale;
+  EXPECT_EQ(advice(),
+            "the image scale puts the target at 350 to 450 mm, less than two focal lengths (452 "
+            "mm): are the readings in mm?");
+  bench.sweep.camera.lens.front_focal_length_mm = 224;
+  EXPECT_EQ(advice(), "") << "some lie farther";
+  bench.sweep.camera.lens.front_focal_length_mm = 226;
+  bench.law.done = false;
+  EXPECT_EQ(advice(), "");
 }
 
 TEST(RegistrationAdvice, SpeaksWhereFewRegisterAndNoLawIsFound) {
@@ -243,7 +279,12 @@ TEST(RegistrationAdvice, SpeaksWhereFewRegisterAndNoLawIsFound) {
   bench.sweep.target = model::SweepTarget::kAuto;
   bench.law.done = true;
   EXPECT_EQ(advice(), "");
-  bench.law.done = false;
+  bench.law = StarLaw();
+  EXPECT_FALSE(bench.law.done);
+  EXPECT_EQ(advice(), "") << "a star registers to nothing";
+  bench.law = {};
+  bench.law.reference_frame = 3;
+  EXPECT_NE(advice(), "");
   bench.frames[10].image_scale = 1;
   EXPECT_EQ(advice(), "");
 }
@@ -292,7 +333,7 @@ TEST(ForgetScales, KeepsTheReferenceAloneAndSaysWhatIsTaken) {
   ASSERT_EQ(bench.samples.size(), 1u);
   EXPECT_EQ(bench.samples[0].frame, 12u);
   EXPECT_FALSE(bench.law.contradicts_readings);
-  EXPECT_THAT(bench.law.message, HasSubstr("state offset_mm"));
+  EXPECT_EQ(bench.law.message, "a lone edge shows no image scale");
   bench.sweep.offset_mm = model::Estimate{30, 0.1};
   ForgetScales(bench.sweep, &bench.samples, &bench.law);
   EXPECT_THAT(bench.law.message, HasSubstr("offset_mm is taken as given"));

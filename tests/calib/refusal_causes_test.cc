@@ -14,6 +14,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -97,6 +98,26 @@ TEST(Exposure, AFewBadFramesAreNotTheCause) {
   const Calibration c = Measured(s);
   EXPECT_NE(c.outcome, Outcome::kRefused) << c.reason;
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("exposed"))));
+}
+
+// Half of the sweep is missing because of the light: no other advice beside it.
+TEST(Exposure, WhatFollowsFromItIsNotAdvisedOn) {
+  SimulatedSweep s = Good();
+  Expose(&s, 6, 0, 6);
+  const Calibration c = Measured(s);
+  ASSERT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, AllOf(StartsWith("34 of 41 frames are over-exposed"),
+                              EndsWith("take the sweep again")));
+}
+
+TEST(Unit, ReadingsInInchesAreAskedAbout) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm /= 25.4;
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at "),
+                              HasSubstr("are the readings in mm?")));
 }
 
 TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {

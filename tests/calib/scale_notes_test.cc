@@ -63,17 +63,20 @@ TEST(LoneEdge, NeedsAGivenOffset) {
   s.sweep.offset_mm.reset();
   const Calibration c = Measured(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, HasSubstr("a lone edge shows no image scale: state offset_mm"));
+  EXPECT_THAT(c.reason,
+              AllOf(HasSubstr("a lone edge shows no image scale;"), HasSubstr("state offset_mm")));
 }
 
-// What nobody said to be a lone edge should have shown a scale.
-TEST(LoneEdge, OfAnUnstatedTargetItIsToldWhatToState) {
+// What nobody said to be a lone edge may be a printed one, as soft as that comes out.
+TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.target = model::SweepTarget::kAuto;
   const Calibration c = Measured(s);
-  EXPECT_EQ(c.outcome, Outcome::kRefused);
-  EXPECT_THAT(c.reason, AllOf(HasSubstr("frames could be registered to one another"),
-                              HasSubstr("state target: knife-edge")));
+  ASSERT_EQ(c.outcome, Outcome::kPartial) << c.reason;
+  EXPECT_LT(c.focus_depth_mm->systematic->x(), s.truth.focus_depth_mm);
+  EXPECT_GT(c.focus_depth_mm->systematic->y(), s.truth.focus_depth_mm);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("the given offset_mm could not be checked")));
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("photograph a knife edge")));
 }
 
 class StraightLaw : public ::testing::TestWithParam<const char*> {};

@@ -48,7 +48,9 @@ TEST(SlippedReadings, AJumpIsNamedAndWidensTheInterval) {
       std::find_if(c.systematic_parts.begin(), c.systematic_parts.end(),
                    [](const SystematicPart& p) { return p.name == "jump of the readings"; });
   ASSERT_NE(part, c.systematic_parts.end());
-  EXPECT_NEAR(part->focus_depth_mm.y(), kJumpMm, 0.4);
+  // With the frames before the jump moved zf moves by part of it: most frames see none.
+  EXPECT_GT(part->focus_depth_mm.y(), 0.2 * kJumpMm);
+  EXPECT_LT(part->focus_depth_mm.y(), 1.2 * kJumpMm);
 }
 
 TEST(SlippedReadings, AGoodSweepHasNoJump) {

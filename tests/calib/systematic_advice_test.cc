@@ -1,4 +1,6 @@
 // Widening an interval afterwards, and the advice.
+#include "systematic_advice.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
