@@ -122,7 +122,7 @@ TEST(Calibrate, ABlankTargetShowsNoTexture) {
 TEST(Calibrate, ADarkSweepIsNamedDark) {
   SimulatedSweep s = Good();
   for (cv::Mat& frame : *s.stored) frame.setTo(1);
-  ExpectRefused(Calibrated(s), "dark: mean");
+  ExpectRefused(Calibrated(s), "under-exposed: raise the exposure");
 }
 
 TEST(Calibrate, AFrameOfAnotherSizeIsAnErrorThatNamesIt) {

@@ -76,7 +76,8 @@ TEST(CoverageSlow, CaseI) { ExpectHonestErrors("i", 128, 14, 0); }
 TEST(CoverageSlow, CaseII) { ExpectHonestErrors("ii", 128, 14, 0); }
 TEST(CoverageSlow, CaseIII) { ExpectHonestErrors("iii", 128, 14, 0); }
 TEST(CoverageSlow, CaseIV) { ExpectHonestErrors("iv", 128, 14, 0); }
-TEST(CoverageSlow, CaseV) { ExpectHonestErrors("v", 192, 40, 0); }
+// Of seven frames of white noise too few may show the same: one sweep in a hundred is refused.
+TEST(CoverageSlow, CaseV) { ExpectHonestErrors("v", 192, 40, 2); }
 
 // Fewer frames of the same sweep say the same with larger errors. The part's frames are in the
 // whole, too, so that the difference is smaller than either error.

@@ -140,7 +140,7 @@ TEST(FocusRegression, SlowAnUnknownOffsetIsFoundFromTheImageScale) {
   CheckUnknownOffset("i", 0.9);
   CheckUnknownOffset("ii", 2.1);
   CheckUnknownOffset("iv", 0.6);
-  CheckUnknownOffset("v", 2.7);
+  CheckUnknownOffset("v", 2.9);
 }
 
 // Error of the source: the sharpest raw frame is not the plane of focus (lamp, magnification and
