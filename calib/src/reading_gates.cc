@@ -93,7 +93,7 @@ std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameM
   const auto registered = static_cast<std::size_t>(std::count_if(
       used.begin(), used.end(), [&](std::size_t i) { return frames[i].image_scale.has_value(); }));
   const bool was_tried = law.reference_frame >= 0;
-  if (!was_tried || law.done || LooksTheSameAtEveryScale(law) || IsStatedEdge(sweep) ||
+  if (!was_tried || law.done || law.shows_no_scale || IsStatedEdge(sweep) ||
       2 * registered >= used.size())
     return "";
   return fmt::format(
@@ -132,9 +132,8 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
 
 std::string ReasonOfUnknownOffset(const ScaleLaw& law) {
   return fmt::format("offset_mm is unknown and was not found: {}; {}", law.message,
-                     LooksTheSameAtEveryScale(law)
-                         ? "state offset_mm, or use a texture"
-                         : "to do without the image scale, state offset_mm");
+                     law.shows_no_scale ? "state offset_mm, or use a texture"
+                                        : "to do without the image scale, state offset_mm");
 }
 
 std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,

@@ -33,7 +33,6 @@ constexpr double kScalePerCornerDistortion = 0.4;
 constexpr double kLikelyDistortion = 0.02;  // at the corner, the most that is reckoned with
 constexpr double kKnownDistortion = 0.01;   // sigma at the corner from which even none is stated
 constexpr int kBlocks = 8;                  // of the jackknife
-constexpr char kSameAtEveryScale[] = "the target looks the same at every scale";
 
 // 1/scale = (offset + sign reading)/reference_depth.
 struct Law {
@@ -366,10 +365,6 @@ std::optional<model::Estimate> DistortionAtCorner(const std::vector<ScaleSample>
 
 }  // namespace
 
-bool LooksTheSameAtEveryScale(const ScaleLaw& law) {
-  return law.message.rfind(kSameAtEveryScale, 0) == 0;
-}
-
 ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_frame,
                      double reading_sigma_mm, model::BenchDirection direction,
                      double corner_radius_px) {
@@ -377,8 +372,10 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
   result.reference_frame = reference_frame;
   if (std::any_of(samples.begin(), samples.end(),
                   [](const ScaleSample& s) { return s.scale_is_from_reading; })) {
-    result.message = kSameAtEveryScale;
-    result.message += " (spokes from one point), so that its image scale tells nothing";
+    result.shows_no_scale = true;
+    result.message =
+        "the target looks the same at every scale (spokes from one point), so that its image scale "
+        "tells nothing";
     return result;
   }
   std::set<double> readings;

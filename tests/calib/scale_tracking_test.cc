@@ -119,7 +119,7 @@ TEST(TrackScale, AStarWithoutAnOffsetLeavesTheReferenceAlone) {
   EXPECT_EQ(samples[0].frame, 3U);
   const ScaleLaw law = Fit(s.sweep, samples);
   EXPECT_THAT(law.message, HasSubstr("looks the same at every scale"));
-  EXPECT_TRUE(LooksTheSameAtEveryScale(law));
+  EXPECT_TRUE(law.shows_no_scale);
 }
 
 // Depths that cannot be: no scale, no sample.

@@ -106,6 +106,7 @@ struct ScaleLaw {
   std::string message = "not run";
   ScaleKind kind = ScaleKind::kUnknown;
   bool contradicts_readings = false;  // frames were registered, and most agree with no law at all
+  bool shows_no_scale = false;  // the target looks the same at every scale (spokes): not looked for
   int reference_frame = -1;
   Result offset_mm;
   double reference_depth_mm = 0;  // z of the reference frame by the fit; scale = z_reference/z

@@ -60,8 +60,6 @@ struct ScaleSample {
 ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_frame,
                      double reading_sigma_mm, model::BenchDirection direction,
                      double corner_radius_px = 0);
-// Whether the law was not even looked for, because the target has no scale to measure (a star).
-bool LooksTheSameAtEveryScale(const ScaleLaw& law);
 
 }  // namespace thicklens::calib
 
