@@ -32,7 +32,8 @@ void NameWeak(const std::vector<BlurParameter>& free, const Eigen::VectorXd& dir
 }
 
 // The longest axis of the correlation matrix: what is known worst once units are taken out.
-std::string WorstKnown(const std::vector<BlurParameter>& free, const Eigen::Matrix4d& covariance) {
+void NameWorst(const std::vector<BlurParameter>& free, BlurFitResult* result) {
+  const Eigen::Matrix4d& covariance = result->covariance;
   const auto correlation = [&](std::size_t a, std::size_t b) {
     return covariance(free[a], free[b]) /
            std::sqrt(covariance(free[a], free[a]) * covariance(free[b], free[b]));
@@ -46,8 +47,9 @@ std::string WorstKnown(const std::vector<BlurParameter>& free, const Eigen::Matr
       }
     }
   }
-  return fmt::format("{} with {} (correlation {:+.2f})", kNames[free[a]], kNames[free[b]],
-                     correlation(a, b));
+  result->weak_correlation = correlation(a, b);
+  result->weak_direction = fmt::format("{} with {} (correlation {:+.2f})", kNames[free[a]],
+                                       kNames[free[b]], result->weak_correlation);
 }
 
 }  // namespace
@@ -86,7 +88,7 @@ std::optional<Eigen::MatrixXd> FillCovariance(const BlurJacobian& jacobian,
           factor * covariance(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
     }
   }
-  result->weak_direction = WorstKnown(jacobian.free, result->covariance);
+  NameWorst(jacobian.free, result);
   return covariance;
 }
 

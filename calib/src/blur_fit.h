@@ -73,6 +73,7 @@ struct BlurFitResult {
   // given.
   Eigen::VectorXd reading_errors_mm, reading_error_sigmas_mm, residuals, weights;
   std::string weak_direction;  // the combination of parameters known worst, with their correlation
+  double weak_correlation = 0;
 };
 
 // sigma^2 at a depth by the law, without the floor, for kappa = 1, px^2.

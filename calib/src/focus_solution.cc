@@ -96,6 +96,7 @@ class Solution {
     blur.done = true;
     blur.chi2_per_dof = fit_.chi2_per_dof;
     blur.weak_direction = fit_.weak_direction;
+    blur.weak_correlation = fit_.weak_correlation;
     blur.meter = evidence_.edges < 0      ? "relative spectrum"
                  : evidence_.spectrum < 0 ? "edges"
                                           : "edges and relative spectrum";

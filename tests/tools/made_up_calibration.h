@@ -90,6 +90,7 @@ inline void AddDetails(calib::Calibration* calibration) {
   c.scale.kind = calib::ScaleKind::kInverseDepth;
   c.scale.distortion_at_corner = model::Estimate{0.0042, 0.0006};
   c.blur.weak_direction = "blur_floor_px against focus_depth_mm";
+  c.blur.weak_correlation = -0.9;
   c.blur.meter = "relative spectrum";
   c.blur.gaussian_misfit = 1.04;
   c.blur.disc_misfit = 2.31;

@@ -169,14 +169,7 @@ std::string OutsideLine(const calib::BlurFit& blur) {
 
 std::string WorstKnownLine(const calib::BlurFit& blur) {
   constexpr double kWorthTelling = 0.5;
-  constexpr char kMark[] = "(correlation ";
-  if (blur.weak_direction.empty()) return "";
-  const std::size_t mark = blur.weak_direction.find(kMark);
-  if (mark != std::string::npos) {
-    const double correlation =
-        std::strtod(blur.weak_direction.c_str() + mark + sizeof(kMark) - 1, nullptr);
-    if (std::abs(correlation) < kWorthTelling) return "";
-  }
+  if (blur.weak_direction.empty() || std::abs(blur.weak_correlation) < kWorthTelling) return "";
   return "known worst: " + blur.weak_direction;
 }
 

@@ -188,6 +188,7 @@ struct BlurFit {
   int frames_used = 0;
   std::vector<std::string> undetermined;  // parameters that the data do not fix
   std::string weak_direction;             // the combination of parameters that is known worst
+  double weak_correlation = 0;            // theirs
   std::string meter;                      // "edges" or "relative spectrum"
   model::Psf better_psf = model::Psf::kGaussian;       // the shape that describes the frames better
   std::optional<double> gaussian_misfit, disc_misfit;  // chi^2 per dof of the meter with each
