@@ -104,22 +104,10 @@ class Solution {
     blur.gaussian_misfit = evidence_.gaussian_misfit;
     blur.disc_misfit = evidence_.disc_misfit;
     result_.examples = evidence_.examples;
-    if (evidence_.disc_misfit && blur.better_psf != sweep_.camera.psf) {
-      const double stated =
-          sweep_.camera.psf == model::Psf::kGaussian ? *blur.gaussian_misfit : *blur.disc_misfit;
-      const double better =
-          blur.better_psf == model::Psf::kGaussian ? *blur.gaussian_misfit : *blur.disc_misfit;
-      if (stated > 1.1 * better) {
-        result_.warnings.push_back(fmt::format(
-            "a {} describes the frames better than the {} that the camera file states "
-            "(chi2/dof {:.2f} against {:.2f})",
-            model::PsfName(blur.better_psf), model::PsfName(sweep_.camera.psf), better, stated));
-      }
-    }
   }
 
   void WarnOfMisfit() {
-    if (!(fit_.chi2_per_dof > kLargeMisfit)) return;
+    if (!(fit_.chi2_per_dof > kLargeMisfit) || !(fit_.error_factor > 1)) return;
     result_.warnings.push_back(fmt::format(
         "the frames lie farther off the blur law than their errors say (chi2/dof {:.3g}), which "
         "were widened for it: readings worse than stated, an aberrated lens, sharpened or "
