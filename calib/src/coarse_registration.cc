@@ -139,7 +139,7 @@ cv::Rect FastPart(const cv::Rect& region) {
 }
 
 std::optional<Start> StartFrom(const cv::Mat& reference, const cv::Mat& frame, double scale,
-                               cv::Point2d centre, int size_px) {
+                               cv::Point2d centre, int size_px, bool is_for_phases) {
   Start start;
   start.map.linear *= scale;
   start.map.centre = Eigen::Vector2d(centre.x, centre.y);
@@ -147,7 +147,7 @@ std::optional<Start> StartFrom(const cv::Mat& reference, const cv::Mat& frame, d
   const cv::Rect2d field = SharedField(start.map, reference.size(), frame.size());
   start.factor = FactorFor(std::max(field.width, field.height), size_px);
   start.region = Inside(field, start.factor);
-  if (size_px == kAgreementSizePx) start.region = FastPart(start.region);
+  if (is_for_phases) start.region = FastPart(start.region);
   if (std::min(start.region.width, start.region.height) < kSmallestFieldPx) return std::nullopt;
   start.small = Shrunk(frame, start.factor);
   start.expected = InFrameGeometry(reference, start.map, start.factor, start.region);
@@ -241,7 +241,8 @@ PictureInformation InformationOf(const cv::Mat& picture) {
 
 std::optional<FrameMap> ShiftCoarsely(const cv::Mat& reference, const cv::Mat& frame, double scale,
                                       cv::Point2d centre) {
-  const std::optional<Start> start = StartFrom(reference, frame, scale, centre, kCoarseSizePx);
+  const std::optional<Start> start =
+      StartFrom(reference, frame, scale, centre, kCoarseSizePx, false);
   if (!start) return std::nullopt;
   const cv::Point2d shift = PeakByPhase(start->expected, start->small(start->region)).shift;
   FrameMap map = start->map;
@@ -251,14 +252,15 @@ std::optional<FrameMap> ShiftCoarsely(const cv::Mat& reference, const cv::Mat& f
 
 double CoarseAgreement(const cv::Mat& reference, const cv::Mat& frame, double scale,
                        cv::Point2d centre) {
-  const std::optional<Start> start = StartFrom(reference, frame, scale, centre, kAgreementSizePx);
+  const std::optional<Start> start =
+      StartFrom(reference, frame, scale, centre, kAgreementSizePx, true);
   return start ? PeakByPhase(start->expected, start->small(start->region)).height : 0;
 }
 
 std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat& frame,
                                          double expected_scale, cv::Point2d centre) {
   const std::optional<Start> start =
-      StartFrom(reference, frame, expected_scale, centre, kCoarseSizePx);
+      StartFrom(reference, frame, expected_scale, centre, kCoarseSizePx, false);
   if (!start || !(InformationOfShrunk(start->expected).scale > kLeastScaleInformation))
     return std::nullopt;
   const cv::Mat& small = start->small;
