@@ -87,7 +87,13 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
   Eigen::Vector2d zero_mm = zero.systematic.value_or(Eigen::Vector2d(zero.value, zero.value));
   for (const BlurFitSetup& setup : setups) {
     const BlurFitResult trial = FitBlur(setup, &fit);
-    if (!trial.done) continue;
+    if (!trial.done) {
+      calibration->warnings.push_back(
+          fmt::format("{}: how far it moves the results could not be fitted, and the intervals do "
+                      "not hold it ({})",
+                      name, trial.message));
+      continue;
+    }
     const double d1_mm = model::ImageDistanceMm(setup.lens, fit.values[kFocusDepth]);
     const auto widen = [](double move, Eigen::Vector2d* interval) {
       *interval = {std::min(interval->x(), move), std::max(interval->y(), move)};
