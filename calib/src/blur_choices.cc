@@ -11,10 +11,6 @@ namespace {
 constexpr double kNarrowPart = 0.5;     // of the usual band
 constexpr double kLeakageMargin = 1.4;  // of the largest sigma expected
 
-model::Psf Other(model::Psf psf) {
-  return psf == model::Psf::kGaussian ? model::Psf::kDisc : model::Psf::kGaussian;
-}
-
 // Disc and Gaussian are compared over the disc's band, the narrower one.
 double CommonPart(model::Psf psf) { return UsualBand(model::Psf::kDisc) / UsualBand(psf); }
 
@@ -90,9 +86,10 @@ class Choices {
       largest = std::max(largest, meter.frames[f].expected_variance_px2);
     WindowLeakage leakage(meter.read_grey(meter.frames[meter.reference].frame), meter.origin_px,
                           region.window, region.modes, region.samples[region.reference].spectrum,
-                          Other(stated_), kLeakageMargin * std::sqrt(largest) + 0.5, meter.threads);
+                          OtherPsf(stated_), kLeakageMargin * std::sqrt(largest) + 0.5,
+                          meter.threads);
     std::swap(region.leakage, leakage);
-    FittedRegion fit = Fit(Other(stated_), CommonPart(Other(stated_)));
+    FittedRegion fit = Fit(OtherPsf(stated_), CommonPart(OtherPsf(stated_)));
     std::swap(region.leakage, leakage);
     return fit;
   }

@@ -13,10 +13,6 @@ constexpr int kMostFeatures = 8;
 // How much of an edge's profile is shown on each side.
 constexpr double kShownSigmas = 4, kShownBeyondPx = 1.5;
 
-model::Psf Other(model::Psf psf) {
-  return psf == model::Psf::kGaussian ? model::Psf::kDisc : model::Psf::kGaussian;
-}
-
 BlurExample TransferExample(model::Psf stated, const FittedRegion& other,
                             const BlurEvidence& evidence, std::size_t i) {
   const MeterRegion& region = evidence.region;
@@ -34,7 +30,7 @@ BlurExample TransferExample(model::Psf stated, const FittedRegion& other,
   };
   const auto ratio_of_other = [&](double nu) {
     const Eigen::VectorXd& v = other.blur.variances_px2;
-    return ratio(Other(stated), v[in_other - other.region.frames.begin()],
+    return ratio(OtherPsf(stated), v[in_other - other.region.frames.begin()],
                  v[static_cast<Eigen::Index>(other.region.reference)], nu);
   };
   const bool is_gaussian = stated == model::Psf::kGaussian;
@@ -95,7 +91,7 @@ std::optional<EdgeComparison> EdgeExample(const cv::Mat& grey, std::size_t frame
     example.frame = static_cast<int>(frame);
     example.is_edge = true;
     const bool is_gaussian = stated == model::Psf::kGaussian;
-    const auto other = FitEdgeSpread(grey, feature, Other(stated), floor_px, true);
+    const auto other = FitEdgeSpread(grey, feature, OtherPsf(stated), floor_px, true);
     const bool has_other = other && !other->fitted.empty();
     const double sigma_px = fit->across_x ? fit->across_x->sigma_px : fit->across_y->sigma_px;
     for (std::size_t i = 0; i < fit->distance_px.size(); ++i) {

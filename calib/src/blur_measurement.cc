@@ -293,6 +293,10 @@ class Measurement {
 
 }  // namespace
 
+model::Psf OtherPsf(model::Psf psf) {
+  return psf == model::Psf::kGaussian ? model::Psf::kDisc : model::Psf::kGaussian;
+}
+
 double UsualBand(model::Psf psf) {
   return psf == model::Psf::kGaussian ? 2 : 1;  // a disc's first zero is at 1.84
 }

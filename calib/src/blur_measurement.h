@@ -78,6 +78,9 @@ struct FittedRegion {
 };
 FittedRegion FitRegion(MeterRegion region, const RelativeBlurOptions& options);
 
+// The shape that is not stated.
+model::Psf OtherPsf(model::Psf psf);
+
 // 2 pi^2 dV nu^2 up to which modes are fitted: below a disc's first zero, and where a Gaussian has
 // not sunk into the noise.
 double UsualBand(model::Psf psf);

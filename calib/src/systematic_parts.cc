@@ -171,8 +171,7 @@ class Parts {
     SystematicPart part;
     part.name = kShapePart;
     const bool is_right = OtherShapeIsRight(*trial);
-    const model::Psf other =
-        sweep_.camera.psf == model::Psf::kGaussian ? model::Psf::kDisc : model::Psf::kGaussian;
+    const model::Psf other = OtherPsf(sweep_.camera.psf);
     part.remedy =
         is_right || evidence_.better_psf != sweep_.camera.psf
             ? fmt::format("state psf: {} in the camera file: it fits better", model::PsfName(other))
