@@ -14,7 +14,9 @@ namespace thicklens::tools {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 using ::thicklens::testing::ErrorOf;
 using ::thicklens::testing::TemporaryFolder;
@@ -56,7 +58,7 @@ TEST_F(SweepInputTest, FloorFromACalibratedCamera) {
   const SweepInput input = ReadSweepInput(arguments_);
   EXPECT_EQ(input.sweep.floor.given_px.value().value, 0.52);
   EXPECT_EQ(input.sweep.floor.given_px.value().sigma, 0.01);
-  EXPECT_THAT(arguments_.Files(), ::testing::Contains(folder_ / "edge.yaml"));
+  EXPECT_THAT(arguments_.Files(), Contains(folder_ / "edge.yaml"));
 }
 
 TEST_F(SweepInputTest, FloorFromAnUnfitCameraIsRefused) {
@@ -70,6 +72,17 @@ TEST_F(SweepInputTest, FloorFromAnUnfitCameraIsRefused) {
   arguments_.floor_from = folder_ / "none.yaml";
   EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
               AllOf(StartsWith("--floor-from: "), HasSubstr("none.yaml")));
+}
+
+TEST_F(SweepInputTest, CompressedFramesAreTold) {
+  EXPECT_THAT(ReadSweepInput(arguments_).notices, Not(Contains(HasSubstr("JPEG"))));
+  folder_.Put("b.JPG");
+  folder_.Put("c.jpeg");
+  folder_.Put("sweep.yaml",
+              "schema: thicklens/sweep/1\ncamera: camera.yaml\nframes: [{image: a.png, reading_mm: "
+              "1}, {image: b.JPG, reading_mm: 2}, {image: c.jpeg, reading_mm: 3}]\n");
+  EXPECT_THAT(ReadSweepInput(arguments_).notices,
+              Contains(StartsWith("2 of 3 frames are JPEG files")));
 }
 
 TEST_F(SweepInputTest, TheCameraInUseIsTheOneCompared) {

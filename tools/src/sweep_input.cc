@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstddef>
 #include <filesystem>
 #include <system_error>
@@ -126,6 +128,26 @@ void TakeArguments(const SweepArguments& arguments, model::SweepFile* file) {
   }
 }
 
+bool IsJpeg(const std::string& path) {
+  std::string ending = fs::path(path).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending == ".jpg" || ending == ".jpeg";
+}
+
+// What compression leaves out looks like blur, and no fit of the frames alone can tell one from the
+// other: on a simulated sweep of 1 px of blur, quality 90 moves kappa by 1 %.
+void NoteCompression(const std::vector<model::SweepFrame>& frames,
+                     std::vector<std::string>* notices) {
+  const auto jpegs = std::count_if(frames.begin(), frames.end(),
+                                   [](const auto& frame) { return IsJpeg(frame.image); });
+  if (jpegs == 0) return;
+  notices->push_back(fmt::format(
+      "{} of {} frames are JPEG files: compression takes fine detail away as blur does, "
+      "and the errors given do not hold what that does to zf and kappa (about 1 % of "
+      "kappa at quality 90 and 1 px of blur); use PNG or TIFF for the last per cent",
+      jpegs, frames.size()));
+}
+
 // A file that merely happens to be called truth.yaml shall not stop a calibration.
 std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
                                            const std::string& sweep_yaml,
@@ -153,6 +175,7 @@ SweepInput ReadSweepInput(const SweepArguments& arguments) {
   SweepInput input;
   input.file = ReadFile(arguments, &input.notices);
   TakeArguments(arguments, &input.file);
+  NoteCompression(input.file.frames, &input.notices);
   input.truth = ReadTruth(arguments, SweepYamlOf(arguments), &input.notices);
   input.sweep = calib::MakeFocusSweep(input.file, model::ReadCamera(input.file.camera_path));
   if (!input.truth) {  // a simulated camera's numbers are exact

@@ -1,6 +1,7 @@
 // The program: finds the command that is asked for, runs it, and tells a failure in one line.
 #include <fmt/format.h>
 #include <glog/logging.h>
+#include <malloc.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -36,6 +37,15 @@ void SetUpMessages() {
   spdlog::set_pattern("thicklens: %l: %v");
 }
 
+// Pictures are allocated and freed again by the thousand; given back to the system each time, their
+// pages would be cleared anew by each use (a tenth of a calibration's time).
+void KeepFreedMemory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 64 << 20);
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
+#endif
+}
+
 int Fail(std::string message, ExitCode code) {
   while (!message.empty() && message.back() == '\n') message.pop_back();
   std::replace(message.begin(), message.end(), '\n', ' ');
@@ -63,6 +73,7 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
 }
 
 int Main(int argc, char** argv) {
+  KeepFreedMemory();
   SetUpMessages();
   tools::CatchSignals();
   CLI::App program(
