@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "thicklens/model/blur_transfer.h"
 
@@ -12,17 +13,17 @@ namespace {
 constexpr int kModeStep = 2;
 constexpr double kPi = 3.14159265358979323846;
 
-// One axis of the separable sum: the pixels that the window covers, and w cos and w sin of each
-// mode there.
+// One axis of the separable sum: the pixels that the window covers, and w cos and w sin of every
+// step-th order there.
 struct Axis {
   int first = 0, count = 0;
   double weight_sum = 0, weight_square_sum = 0;
   Eigen::VectorXf weights;
-  Eigen::MatrixXf waves;  // count x 2 (order + 1): w cos, w sin in turn
+  Eigen::MatrixXf waves;  // count x 2 (orders): w cos, w sin in turn
 };
 
 std::optional<Axis> MakeAxis(int pixels, double origin_px, double shift_px, double scale,
-                             double centre_px, double size_px, int order) {
+                             double centre_px, double size_px, int order, int step_of_orders) {
   const double middle = origin_px + shift_px + scale * centre_px;
   const double half = 0.5 * scale * size_px;
   Axis axis;
@@ -31,7 +32,8 @@ std::optional<Axis> MakeAxis(int pixels, double origin_px, double shift_px, doub
   axis.count = last - axis.first + 1;
   if (axis.first < 0 || last >= pixels || axis.count < 8) return std::nullopt;
   axis.weights.resize(axis.count);
-  axis.waves.resize(axis.count, 2 * (order + 1));
+  const int orders = order / step_of_orders + 1;
+  axis.waves.resize(axis.count, 2 * orders);
   for (int i = 0; i < axis.count; ++i) {
     const double x = (axis.first + i - origin_px - shift_px) / scale;  // target px
     const double c = std::cos(kPi * (x - centre_px) / size_px);
@@ -40,10 +42,10 @@ std::optional<Axis> MakeAxis(int pixels, double origin_px, double shift_px, doub
     axis.weight_sum += w;
     axis.weight_square_sum += w * w;
     // exp(-2 pi i j x/size) by recurrence, in double.
-    const double angle = -2 * kPi * x / size_px;
+    const double angle = -2 * kPi * step_of_orders * x / size_px;
     const std::complex<double> step(std::cos(angle), std::sin(angle));
     std::complex<double> wave(w, 0);
-    for (int j = 0; j <= order; ++j) {
+    for (int j = 0; j < orders; ++j) {
       axis.waves(i, 2 * j) = static_cast<float>(wave.real());
       axis.waves(i, 2 * j + 1) = static_cast<float>(wave.imag());
       wave *= step;
@@ -84,14 +86,17 @@ std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::V
                                              const FramePlace& place, const TargetWindow& window,
                                              const std::vector<Mode>& modes, std::size_t count) {
   int order_x = 0, order_y = 0;
+  int step = 0;  // the orders asked for are all multiples of it
   for (std::size_t k = 0; k < count; ++k) {
     order_x = std::max(order_x, modes[k].jx);
     order_y = std::max(order_y, std::abs(modes[k].jy));
+    step = std::gcd(step, std::gcd(modes[k].jx, modes[k].jy));
   }
+  step = std::max(step, 1);
   const auto x = MakeAxis(grey.cols, origin_px.x(), place.shift_px.x(), place.scale,
-                          window.centre_px.x(), window.size_px.x(), order_x);
+                          window.centre_px.x(), window.size_px.x(), order_x, step);
   const auto y = MakeAxis(grey.rows, origin_px.y(), place.shift_px.y(), place.scale,
-                          window.centre_px.y(), window.size_px.y(), order_y);
+                          window.centre_px.y(), window.size_px.y(), order_y, step);
   if (!x || !y) return std::nullopt;
 
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -107,12 +112,12 @@ std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::V
 
   // The mean goes before the sums, not after: what is left of it would be float rounding.
   const RowMajor centred = pixels.array() - static_cast<float>(spectrum.mean);
-  const Eigen::MatrixXf rows = centred * x->waves;           // y pixels x 2 (order_x + 1)
-  const Eigen::MatrixXf sums = y->waves.transpose() * rows;  // 2 (order_y + 1) x 2 (order_x + 1)
+  const Eigen::MatrixXf rows = centred * x->waves;           // y pixels x 2 orders
+  const Eigen::MatrixXf sums = y->waves.transpose() * rows;  // 2 orders x 2 orders
   const double scale = 1 / (total * spectrum.mean);
   spectrum.values.resize(static_cast<Eigen::Index>(count));
   for (std::size_t k = 0; k < count; ++k) {
-    const int jx = modes[k].jx, jy = std::abs(modes[k].jy);
+    const int jx = modes[k].jx / step, jy = std::abs(modes[k].jy) / step;
     const double sign = modes[k].jy < 0 ? -1 : 1;  // conjugate wave along y
     const double cc = sums(2 * jy, 2 * jx), cs = sums(2 * jy, 2 * jx + 1);
     const double sc = sign * sums(2 * jy + 1, 2 * jx), ss = sign * sums(2 * jy + 1, 2 * jx + 1);
