@@ -59,7 +59,9 @@ bool IsSystemHeader(const std::string& header) {
       "fcntl.h", "fnmatch.h", "glob.h", "libgen.h", "poll.h", "pthread.h", "pwd.h", "sched.h",
       "spawn.h", "strings.h", "termios.h", "unistd.h",
       // Vector instructions of the compiler, for the hot files with run-time dispatch.
-      "immintrin.h"};
+      "immintrin.h",
+      // The settings of the GNU C library's allocator.
+      "malloc.h"};
   return headers.count(header) > 0 || header.rfind("sys/", 0) == 0;
 }
 
