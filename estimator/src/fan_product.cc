@@ -1,0 +1,185 @@
+// Where a fan of rays is the product of two axes, and the filters of these.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "surface_taps.h"
+#include "thicklens/model/parallel.h"
+#include "view_fan.h"
+
+namespace thicklens::estimator {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// The lowest and highest disparity of the 2 x 2 pixels from each pixel to the right and down.
+struct CellRange {
+  std::vector<float> low, high;
+  explicit CellRange(const DisparityMap& map) : low(map.disparity), high(map.disparity) {
+    const auto width = Index(map.width_px);
+    for (std::size_t i = 0; i < low.size(); ++i) {
+      const bool has_right = i % width + 1 < width;
+      const bool has_below = i + width < low.size();
+      for (const std::size_t next : {has_right ? i + 1 : i, has_below ? i + width : i,
+                                     has_right && has_below ? i + width + 1 : i}) {
+        low[i] = std::min(low[i], map.disparity[next]);
+        high[i] = std::max(high[i], map.disparity[next]);
+      }
+    }
+  }
+};
+
+// Compares one view's rays of one row of pixels with the product's.
+class RowCheck {
+ public:
+  RowCheck(const FanAxes& axes, const DisparityMap& map, const CellRange& range,
+           double tolerance_px)
+      : axes_(axes),
+        range_(range),
+        width_px_(map.width_px),
+        height_px_(map.height_px),
+        tolerance_px_(static_cast<float>(tolerance_px)),
+        same_surface_(static_cast<float>(SurfaceTolerance(map))) {}
+
+  bool IsRight(int x, int y, float source_x, float source_y, float disparity, int u, int v) const {
+    const std::size_t here = Index(y) * Index(width_px_) + Index(x);
+    if (axes_.down.usable[here] == 0) return false;
+    const float down = axes_.down.source_px[Index(v)][here];
+    if (!(std::abs(down - source_y) <= tolerance_px_)) return false;
+    const float at_y = static_cast<float>(y) + down;
+    const float row = std::floor(at_y);
+    const int y0 = static_cast<int>(row);
+    const int y1 = at_y > row ? y0 + 1 : y0;
+    if (y0 < 0 || y1 >= height_px_) return false;
+    const std::vector<float>& across = axes_.across.source_px[Index(u)];
+    for (int at = y0; at <= y1; ++at) {
+      const std::size_t there = Index(at) * Index(width_px_) + Index(x);
+      if (axes_.across.usable[there] == 0) return false;
+      const float way = across[there];
+      if (!(std::abs(way - source_x) <= tolerance_px_)) return false;
+      const float at_x = static_cast<float>(x) + way;
+      const float column = std::floor(at_x);
+      const int x0 = static_cast<int>(column);
+      const int x1 = at_x > column ? x0 + 1 : x0;
+      if (x0 < 0 || x1 >= width_px_) return false;
+      if (at > y0) continue;
+      const std::size_t cell = Index(y0) * Index(width_px_) + Index(x0);
+      if (!(disparity - range_.low[cell] <= same_surface_) ||
+          !(range_.high[cell] - disparity <= same_surface_))
+        return false;
+    }
+    return true;
+  }
+
+ private:
+  const FanAxes& axes_;
+  const CellRange& range_;
+  int width_px_, height_px_;
+  float tolerance_px_, same_surface_;
+};
+
+}  // namespace
+
+std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
+                                     const DisparityMap& disparity, double tolerance_px,
+                                     int threads) {
+  const CellRange range(disparity);
+  const RowCheck check(axes, disparity, range, tolerance_px);
+  std::vector<unsigned char> is_product(disparity.disparity.size(), 1);
+  model::ParallelFor(fan.height_px, threads, [&](int y) {
+    const std::size_t row = Index(y) * Index(fan.width_px);
+    for (const FanView& view : fan.views) {
+      const int u = static_cast<int>(std::lround(view.a + (axes.across.count - 1) / 2.0));
+      const int v = static_cast<int>(std::lround(view.b + (axes.down.count - 1) / 2.0));
+      const auto shift_x = static_cast<float>(view.shift.x());
+      const auto shift_y = static_cast<float>(view.shift.y());
+      for (int x = 0; x < fan.width_px; ++x) {
+        const std::size_t i = row + Index(x);
+        const float d = view.disparity[i];  // NaN fails
+        if (is_product[i] != 0 && !check.IsRight(x, y, shift_x * d, shift_y * d, d, u, v)) {
+          is_product[i] = 0;
+        }
+      }
+    }
+  });
+  return is_product;
+}
+
+namespace {
+
+// The linear weights that a pixel's rays put on the pixels along an axis.
+struct Tap {
+  int offset = 0;
+  double fraction = 0;  // goes to offset + 1
+};
+Tap TapAt(int pixel, float source_px, int count) {
+  const double at = std::clamp(pixel + static_cast<double>(source_px), 0.0, count - 1.0);
+  const int below = std::min(static_cast<int>(at), std::max(count - 2, 0));
+  return {below - pixel, at - below};
+}
+
+}  // namespace
+
+template <typename Real>
+kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction, int width_px,
+                                    int height_px, const Eigen::VectorXd& weights, int threads) {
+  using kernels::kFilterBlockPx;
+  kernels::PixelFilter<Real> filter;
+  filter.axis = direction;
+  filter.width_px = width_px;
+  filter.height_px = height_px;
+  const bool across = direction == kernels::Axis::kAcross;
+  const int blocks = filter.blocks_in_row();
+  filter.radius_px.assign(Index(blocks) * Index(height_px), 0);
+  const auto tap_of = [&](int x, int y, int position) {
+    const std::size_t i = Index(y) * Index(width_px) + Index(x);
+    const float way = axis.source_px[Index(position)][i];
+    return across ? TapAt(x, way, width_px) : TapAt(y, way, height_px);
+  };
+  const auto for_row = [&](int y, const auto& use) {
+    for (int x = 0; x < width_px; ++x) {
+      const std::size_t i = Index(y) * Index(width_px) + Index(x);
+      if (axis.usable[i] == 0) continue;
+      const std::size_t block = Index(y) * Index(blocks) + Index(x / kFilterBlockPx);
+      for (int position = 0; position < axis.count; ++position)
+        use(block, x, tap_of(x, y, position), weights[position]);
+    }
+  };
+  model::ParallelFor(height_px, threads, [&](int y) {
+    for_row(y, [&](std::size_t block, int, const Tap& tap, double) {
+      const int reach = std::max(-tap.offset, tap.fraction > 0 ? tap.offset + 1 : tap.offset);
+      filter.radius_px[block] = std::max(filter.radius_px[block], reach);
+    });
+  });
+  filter.start.assign(1, 0);
+  for (const int radius : filter.radius_px) {
+    filter.start.push_back(filter.start.back() + Index(2 * radius + 1) * kFilterBlockPx);
+  }
+  filter.coefficients.assign(filter.start.back(), Real(0));
+  const double total = weights.sum();
+  model::ParallelFor(height_px, threads, [&](int y) {
+    const auto coefficient = [&](std::size_t block, int x, int offset) -> Real& {
+      return filter.coefficients[filter.start[block] +
+                                 Index(offset + filter.radius_px[block]) * kFilterBlockPx +
+                                 Index(x % kFilterBlockPx)];
+    };
+    for_row(y, [&](std::size_t block, int x, const Tap& tap, double weight) {
+      coefficient(block, x, tap.offset) += static_cast<Real>(weight * (1 - tap.fraction));
+      if (tap.fraction > 0)
+        coefficient(block, x, tap.offset + 1) += static_cast<Real>(weight * tap.fraction);
+    });
+    for (int x = 0; x < width_px; ++x) {
+      if (axis.usable[Index(y) * Index(width_px) + Index(x)] != 0) continue;
+      const std::size_t block = Index(y) * Index(blocks) + Index(x / kFilterBlockPx);
+      coefficient(block, x, 0) = static_cast<Real>(total);
+    }
+  });
+  return filter;
+}
+
+template kernels::PixelFilter<float> FilterOf(const FanAxis&, kernels::Axis, int, int,
+                                              const Eigen::VectorXd&, int);
+template kernels::PixelFilter<double> FilterOf(const FanAxis&, kernels::Axis, int, int,
+                                               const Eigen::VectorXd&, int);
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,174 @@
+#include "scene_projection.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "thicklens/error.h"
+#include "view_fan.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// A sum of this many products costs no more than rows for all pixels would.
+constexpr int kMostTerms = 4;
+
+// Weights as a sum of products of a column and a row, by singular values: exact to rounding.
+struct Product {
+  Eigen::VectorXd across, down;
+};
+std::vector<Product> ProductsOf(const Eigen::ArrayXXd& weights) {
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(weights.matrix(),
+                                              Eigen::ComputeThinU | Eigen::ComputeThinV);
+  std::vector<Product> products;
+  for (Eigen::Index i = 0; i < svd.singularValues().size(); ++i) {
+    const double value = svd.singularValues()[i];
+    if (!(value > 1e-12 * svd.singularValues()[0])) break;
+    products.push_back({svd.matrixV().col(i), svd.matrixU().col(i) * value});
+  }
+  return products;
+}
+
+template <typename Real>
+double MebibytesOf(const kernels::PixelFilter<Real>& filter) {
+  return static_cast<double>(filter.coefficients.size() * sizeof(Real)) / (1 << 20);
+}
+
+template <typename Real>
+double MebibytesOf(const kernels::PixelRows<Real>& rows) {
+  return static_cast<double>(rows.index.size() * (sizeof(Real) + sizeof(std::int32_t)) +
+                             rows.start.size() * sizeof(std::int64_t)) /
+         (1 << 20);
+}
+
+std::vector<float> HiddenShare(const ViewFan& fan, std::size_t pixels) {
+  std::vector<double> share(pixels, 0.0);
+  for (const FanView& view : fan.views) {
+    for (const FanView::Hidden& hidden : view.hidden)
+      share[static_cast<std::size_t>(hidden.index)] += view.weight;
+  }
+  return {share.begin(), share.end()};
+}
+
+}  // namespace
+
+template <typename Real>
+void SceneProjection<Real>::Apply(const Real* x, int channels, Real* y) const {
+  const auto stride = static_cast<std::ptrdiff_t>(pixels());
+  const std::size_t size = pixels() * static_cast<std::size_t>(channels);
+  const kernels::PictureIn<Real> in{x, stride, channels};
+  const kernels::PictureOut<Real> out{y, stride, channels};
+  between_.resize(size);
+  if (terms.size() > 1) other_.resize(size);
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    kernels::Apply(terms[t].across, in, {between_.data(), stride, channels}, threads);
+    Real* to = t == 0 ? y : other_.data();
+    kernels::Apply(terms[t].down, {between_.data(), stride, channels}, {to, stride, channels},
+                   threads);
+    for (std::size_t i = 0; t > 0 && i < size; ++i) y[i] += other_[i];
+  }
+  kernels::ApplyRows(rows, in, out, threads);
+}
+
+template <typename Real>
+void SceneProjection<Real>::ApplyTransposed(const Real* y, int channels, Real* x) const {
+  const auto stride = static_cast<std::ptrdiff_t>(pixels());
+  const std::size_t size = pixels() * static_cast<std::size_t>(channels);
+  const kernels::PictureOut<Real> out{x, stride, channels};
+  if (terms.empty()) {
+    std::fill(x, x + size, Real(0));
+  } else {
+    between_.resize(size);
+    other_.assign(y, y + size);  // without the pixels that have rows
+    for (int c = 0; c < channels; ++c) {
+      Real* plane = other_.data() + c * stride;
+      for (const std::int32_t pixel : rows.pixel) plane[pixel] = 0;
+    }
+    std::vector<Real> sum;
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      kernels::ApplyTransposed(terms[t].down, {other_.data(), stride, channels},
+                               {between_.data(), stride, channels}, threads);
+      if (t == 0) {
+        kernels::ApplyTransposed(terms[t].across, {between_.data(), stride, channels}, out,
+                                 threads);
+        continue;
+      }
+      sum.resize(size);
+      kernels::ApplyTransposed(terms[t].across, {between_.data(), stride, channels},
+                               {sum.data(), stride, channels}, threads);
+      for (std::size_t i = 0; i < size; ++i) x[i] += sum[i];
+    }
+  }
+  kernels::AddRows(rows_transposed, {y, stride, channels}, out, threads);
+}
+
+template <typename Real>
+double SceneProjection<Real>::row_share() const {
+  return static_cast<double>(rows.pixel.size()) / static_cast<double>(pixels());
+}
+
+template <typename Real>
+double SceneProjection<Real>::memory_mib() const {
+  double sum = MebibytesOf(rows) + MebibytesOf(rows_transposed);
+  for (const Term& term : terms) sum += MebibytesOf(term.across) + MebibytesOf(term.down);
+  return sum;
+}
+
+template <typename Real>
+SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
+                                          const Eigen::ArrayXXd& weights,
+                                          const ProjectionOptions& options) {
+  const ViewFan fan = RenderFan(disparity, weights, options.threads, options.progress);
+  SceneProjection<Real> projection;
+  projection.width_px = disparity.width_px;
+  projection.height_px = disparity.height_px;
+  projection.threads = options.threads;
+  projection.hidden_share = HiddenShare(fan, projection.pixels());
+
+  std::vector<unsigned char> is_product(projection.pixels(), 0);
+  const std::vector<Product> products = ProductsOf(weights);
+  if (products.size() <= kMostTerms) {
+    const FanAxes axes = AxesOf(fan, disparity, static_cast<int>(weights.cols()),
+                                static_cast<int>(weights.rows()), options.threads);
+    is_product = IsProduct(fan, axes, disparity, options.tolerance_px, options.threads);
+    for (const Product& product : products) {
+      projection.terms.push_back({FilterOf<Real>(axes.across, kernels::Axis::kAcross, fan.width_px,
+                                                 fan.height_px, product.across, options.threads),
+                                  FilterOf<Real>(axes.down, kernels::Axis::kDown, fan.width_px,
+                                                 fan.height_px, product.down, options.threads)});
+    }
+  }
+  projection.rows = RowsOf<Real>(fan, disparity, is_product, options.threads);
+  projection.rows_transposed = kernels::Transposed(projection.rows);
+  return projection;
+}
+
+template class SceneProjection<float>;
+template class SceneProjection<double>;
+template SceneProjection<float> MakeSceneProjection(const DisparityMap&, const Eigen::ArrayXXd&,
+                                                    const ProjectionOptions&);
+template SceneProjection<double> MakeSceneProjection(const DisparityMap&, const Eigen::ArrayXXd&,
+                                                     const ProjectionOptions&);
+
+DisparityMap PhotographDisparity(const DisparityMap& on_grid,
+                                 const Eigen::Vector2d& landing_step_px) {
+  DisparityMap map = on_grid;
+  const Eigen::Vector2d& step = on_grid.step;
+  const int axis = std::abs(step.x()) >= std::abs(step.y()) ? 0 : 1;
+  const double offset = step[axis] == 0 ? 0 : landing_step_px[axis] / step[axis];
+  for (int other = 0; other < 2; ++other) {
+    const double expected = offset * step[other];
+    if (std::abs(expected - landing_step_px[other]) <= 1e-6 * (1 + std::abs(expected))) continue;
+    throw Error(
+        fmt::format("light field: its rays land {:.6g} px beside their samples per view across and "
+                    "{:.6g} down, "
+                    "where steps of {:.6g} and {:.6g} ask for the same ratio",
+                    landing_step_px.x(), landing_step_px.y(), step.x(), step.y()));
+  }
+  for (float& d : map.disparity) d = static_cast<float>(d - offset);
+  return map;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,73 @@
+#ifndef THICKLENS_ESTIMATOR_SRC_SCENE_PROJECTION_H_
+#define THICKLENS_ESTIMATOR_SRC_SCENE_PROJECTION_H_
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/picture_filter.h"
+
+namespace thicklens::estimator {
+
+// H of a scene whose points look the same from everywhere: from the radiance r of the points that
+// the centre view shows to the photograph, each pixel a mean of what the views see through it:
+//   (H r)(x) = sum_k w_k r(x + s_k(x)), s_k the way from the view's sample to its source
+// (ViewDisparity), by the bilinear taps of the source that lie on its surface. Rows sum to 1.
+// A pixel whose fan meets one surface only is computed by filters down and across the picture,
+// which take the fan for a product of its axes (weights that are no product are a sum of such, by
+// singular values); a pixel where that would misplace a ray by more than a tolerance has a row of
+// its own. Derived here.
+// Pictures: `channels` planes of width * height numbers.
+template <typename Real>
+class SceneProjection {
+ public:
+  // One product of weights: (x -> sum_n across_n) then (sum_m down_m).
+  struct Term {
+    kernels::PixelFilter<Real> across, down;
+  };
+
+  int width_px = 0, height_px = 0;
+  int threads = 1;
+  std::vector<Term> terms;  // none: every pixel has a row
+  kernels::PixelRows<Real> rows, rows_transposed;
+  // Share of the aperture that sees each pixel through samples hidden from the centre view, 0 to 1.
+  std::vector<float> hidden_share;
+
+  // Both set their results.
+  void Apply(const Real* x, int channels, Real* y) const;
+  void ApplyTransposed(const Real* y, int channels, Real* x) const;
+
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  }
+  // Of the photograph's pixels, those with a row of their own.
+  double row_share() const;
+  double memory_mib() const;
+
+ private:
+  mutable std::vector<Real> between_, other_;
+};
+
+struct ProjectionOptions {
+  double tolerance_px = 0.2;  // of a ray's place, where the fan is taken for a product
+  int threads = 1;
+  std::function<void()> progress;  // called now and then, from any thread; may throw to stop
+};
+// `disparity` of the rays that meet on the photograph's pixels: px per view step, 0 in the plane of
+// focus, without holes. Weights V x U, sum 1. Throws Error for sizes that do not fit.
+template <typename Real>
+SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
+                                          const Eigen::ArrayXXd& weights,
+                                          const ProjectionOptions& options);
+
+// That disparity from the one of the samples of a grid, for which a ray of the view a lands q a px
+// beside its sample: D - q per axis, D the displacement per view. Derived here: the sample i = p -
+// D a of the point p lands at i + q a. Throws Error if the axes ask for different offsets.
+DisparityMap PhotographDisparity(const DisparityMap& on_grid,
+                                 const Eigen::Vector2d& landing_step_px);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SRC_SCENE_PROJECTION_H_

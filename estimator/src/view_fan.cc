@@ -1,0 +1,121 @@
+#include "view_fan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+double Offset(int position, int count) { return position - (count - 1) / 2.0; }
+
+FanView Compact(ViewDisparity rendered) {
+  FanView view;
+  view.disparity = std::move(rendered.disparity);
+  for (std::size_t i = 0; i < view.disparity.size(); ++i) {
+    if (rendered.seen[i] == Seen::kSeen) continue;
+    view.hidden.push_back({static_cast<std::int32_t>(i), rendered.source_x[i], rendered.source_y[i],
+                           view.disparity[i]});
+    view.disparity[i] = kNone;
+  }
+  return view;
+}
+
+// A view's ways to its sources along one axis, NaN where it is hidden; from the fan if it is one of
+// its views.
+std::vector<float> SourcesOf(const ViewFan& fan, const DisparityMap& disparity, double a, double b,
+                             bool across) {
+  for (const FanView& view : fan.views) {
+    if (view.a != a || view.b != b) continue;
+    std::vector<float> way = view.disparity;
+    const auto shift = static_cast<float>(across ? view.shift.x() : view.shift.y());
+    for (float& d : way) d *= shift;
+    return way;
+  }
+  ViewDisparity view = RenderDisparity(disparity, a, b);
+  std::vector<float> way = std::move(across ? view.source_x : view.source_y);
+  for (std::size_t i = 0; i < way.size(); ++i) {
+    if (view.seen[i] != Seen::kSeen) way[i] = kNone;
+  }
+  return way;
+}
+
+// The same for a position on an axis of the aperture; of an even count of views, the mean of the
+// two beside the axis.
+std::vector<float> SourcesOnAxis(const ViewFan& fan, const DisparityMap& disparity, double offset,
+                                 int other_count, bool across) {
+  const auto of = [&](double other) {
+    return across ? SourcesOf(fan, disparity, offset, other, true)
+                  : SourcesOf(fan, disparity, other, offset, false);
+  };
+  if (other_count % 2 == 1) return of(0);
+  std::vector<float> way = of(-0.5);
+  const std::vector<float> beside = of(0.5);
+  for (std::size_t i = 0; i < way.size(); ++i) way[i] = 0.5F * (way[i] + beside[i]);
+  return way;
+}
+
+}  // namespace
+
+ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
+                  const std::function<void()>& progress) {
+  ViewFan fan;
+  fan.width_px = disparity.width_px;
+  fan.height_px = disparity.height_px;
+  const int u_count = static_cast<int>(weights.cols()), v_count = static_cast<int>(weights.rows());
+  for (int l = 0; l < v_count; ++l) {
+    for (int k = 0; k < u_count; ++k) {
+      if (!(weights(l, k) > 0)) continue;
+      FanView view;
+      view.a = Offset(k, u_count);
+      view.b = Offset(l, v_count);
+      view.weight = weights(l, k);
+      fan.views.push_back(view);
+    }
+  }
+  model::ParallelFor(static_cast<int>(fan.views.size()), threads, [&](int i) {
+    if (progress) progress();
+    FanView& view = fan.views[Index(i)];
+    FanView rendered = Compact(RenderDisparity(disparity, view.a, view.b));
+    rendered.a = view.a;
+    rendered.b = view.b;
+    rendered.weight = view.weight;
+    rendered.shift = {view.a * disparity.step.x(), view.b * disparity.step.y()};
+    view = std::move(rendered);
+  });
+  return fan;
+}
+
+FanAxes AxesOf(const ViewFan& fan, const DisparityMap& disparity, int u_count, int v_count,
+               int threads) {
+  FanAxes axes;
+  axes.across = {u_count, std::vector<std::vector<float>>(Index(u_count)), {}};
+  axes.down = {v_count, std::vector<std::vector<float>>(Index(v_count)), {}};
+  model::ParallelFor(u_count + v_count, threads, [&](int i) {
+    if (i < u_count) {
+      axes.across.source_px[Index(i)] =
+          SourcesOnAxis(fan, disparity, Offset(i, u_count), v_count, true);
+    } else {
+      axes.down.source_px[Index(i - u_count)] =
+          SourcesOnAxis(fan, disparity, Offset(i - u_count, v_count), u_count, false);
+    }
+  });
+  for (FanAxis* axis : {&axes.across, &axes.down}) {
+    axis->usable.assign(disparity.disparity.size(), 1);
+    for (const std::vector<float>& way : axis->source_px) {
+      for (std::size_t i = 0; i < way.size(); ++i) {
+        if (std::isnan(way[i])) axis->usable[i] = 0;
+      }
+    }
+  }
+  return axes;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,68 @@
+#ifndef THICKLENS_ESTIMATOR_SRC_VIEW_FAN_H_
+#define THICKLENS_ESTIMATOR_SRC_VIEW_FAN_H_
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/picture_filter.h"
+
+namespace thicklens::estimator {
+
+// One view's ViewDisparity in a third of the memory: the way to a seen sample's source follows from
+// its disparity.
+struct FanView {
+  struct Hidden {
+    std::int32_t index = 0;  // of the sample
+    float source_x = 0, source_y = 0, disparity = 0;
+  };
+  double a = 0, b = 0;  // steps from the centre
+  double weight = 0;
+  Eigen::Vector2d shift{0, 0};   // px per unit of disparity
+  std::vector<float> disparity;  // NaN: hidden
+  std::vector<Hidden> hidden;    // by index
+};
+
+// All rays of the aperture through the pixels of a photograph.
+struct ViewFan {
+  int width_px = 0, height_px = 0;
+  std::vector<FanView> views;  // those with a weight, row by row
+};
+ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
+                  const std::function<void()>& progress);
+
+// Where the rays of a column or a row of the aperture come from, if the fan is a product: px to the
+// source, along one axis, for each of `count` positions on it. NaN: not on the pixel's surface.
+struct FanAxis {
+  int count = 0;
+  std::vector<std::vector<float>> source_px;  // [position][pixel]
+  std::vector<unsigned char> usable;          // per pixel: at all positions
+};
+struct FanAxes {
+  FanAxis across, down;
+};
+FanAxes AxesOf(const ViewFan& fan, const DisparityMap& disparity, int u_count, int v_count,
+               int threads);
+
+// For each pixel whether the product of the axes puts every ray of the fan where it belongs, to a
+// tolerance, on taps of one surface inside the picture.
+std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
+                                     const DisparityMap& disparity, double tolerance_px,
+                                     int threads);
+
+// The filter of one axis: pixel p gets sum_i weights_i x(p + source_i), linear between pixels.
+// Pixels without an axis get sum_i weights_i x(p).
+template <typename Real>
+kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction, int width_px,
+                                    int height_px, const Eigen::VectorXd& weights, int threads);
+
+// The rows of the pixels that are no product.
+template <typename Real>
+kernels::PixelRows<Real> RowsOf(const ViewFan& fan, const DisparityMap& disparity,
+                                const std::vector<unsigned char>& is_product, int threads);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SRC_VIEW_FAN_H_

@@ -1,0 +1,262 @@
+#include "scene_projection.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "support/error_message.h"
+#include "thicklens/model/light_field_grid.h"
+
+namespace thicklens::estimator {
+namespace {
+
+using testing::ErrorOf;
+using ::testing::HasSubstr;
+
+constexpr double kPi = 3.14159265358979323846;
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+DisparityMap MapOf(int width, int height, const std::function<double(int, int)>& disparity,
+                   const Eigen::Vector2d& step = {1, 1}) {
+  DisparityMap map{width, height, {}, step};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) map.disparity.push_back(static_cast<float>(disparity(x, y)));
+  }
+  return map;
+}
+
+Eigen::ArrayXXd Weights(model::ApertureShape shape, int u_count, int v_count) {
+  return model::ApertureWeights(shape, u_count, v_count);
+}
+
+// A slanted floor with two nearer things on it, which hide some of it.
+DisparityMap Occluded() {
+  return MapOf(90, 70, [](int x, int y) {
+    if (x > 20 && x < 45 && y > 15 && y < 50) return 1.75 + 0.004 * x;
+    if (std::hypot(x - 62, y - 40) < 11) return -1.1;
+    return -0.6 + 0.006 * x - 0.003 * y;
+  });
+}
+
+std::vector<double> RandomPicture(std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> value(0, 1);
+  std::vector<double> picture(count);
+  for (double& v : picture) v = value(random);
+  return picture;
+}
+
+template <typename Real>
+SceneProjection<Real> Make(const DisparityMap& map, const Eigen::ArrayXXd& weights,
+                           double tolerance_px = 0.2, int threads = 2) {
+  ProjectionOptions options;
+  options.tolerance_px = tolerance_px;
+  options.threads = threads;
+  return MakeSceneProjection<Real>(map, weights, options);
+}
+
+// The photograph pixel by pixel and ray by ray, from the rendered views alone.
+std::vector<double> PlainGather(const DisparityMap& map, const Eigen::ArrayXXd& weights,
+                                const std::vector<double>& x) {
+  std::vector<double> y(map.disparity.size(), 0.0);
+  const double tolerance = 0.3 / map.step.cwiseAbs().maxCoeff();
+  for (int l = 0; l < weights.rows(); ++l) {
+    for (int k = 0; k < weights.cols(); ++k) {
+      if (weights(l, k) == 0) continue;
+      const ViewDisparity view =
+          RenderDisparity(map, k - (static_cast<double>(weights.cols()) - 1) / 2,
+                          l - (static_cast<double>(weights.rows()) - 1) / 2);
+      for (std::size_t i = 0; i < y.size(); ++i) {
+        const double px = std::clamp<double>(
+            static_cast<double>(i % Index(map.width_px)) + view.source_x[i], 0, map.width_px - 1);
+        const double py = std::clamp<double>(
+            static_cast<double>(i / Index(map.width_px)) + view.source_y[i], 0, map.height_px - 1);
+        double sum = 0, share = 0, best = 1e300, closest = 0;
+        const int column = static_cast<int>(px), row = static_cast<int>(py);
+        for (int j = row; j <= std::min(row + 1, map.height_px - 1); ++j) {
+          const double wy = 1 - std::abs(py - j);
+          if (!(wy > 0)) continue;
+          for (int n = column; n <= std::min(column + 1, map.width_px - 1); ++n) {
+            const double wx = 1 - std::abs(px - n);
+            if (!(wx > 0)) continue;
+            const std::size_t at = Index(j) * Index(map.width_px) + Index(n);
+            const double apart = std::abs(double{map.disparity[at]} - view.disparity[i]);
+            if (apart < best) {
+              best = apart;
+              closest = x[at];
+            }
+            if (apart > tolerance) continue;
+            sum += wx * wy * x[at];
+            share += wx * wy;
+          }
+        }
+        y[i] += weights(l, k) * (share > 0 ? sum / share : closest);
+      }
+    }
+  }
+  return y;
+}
+
+double LargestDifference(const std::vector<double>& a, const std::vector<double>& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
+  return largest;
+}
+
+// A wave stays a wave: H multiplies it by sum_k w_k times the transfer of linear interpolation at
+// the view's shift.
+TEST(SceneProjection, OfConstantDepthIsAProductInTheFourierDomain) {
+  const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kGaussian, 7, 5);
+  for (const double d : {0.75, -1.375, 0.0}) {
+    const DisparityMap map = MapOf(80, 60, [&](int, int) { return d; });
+    const auto projection = Make<double>(map, weights);
+    for (const auto& [fx, fy] : {std::pair{0.05, 0.11}, std::pair{0.23, -0.31}}) {
+      std::complex<double> transfer = 0;
+      const auto linear = [](double shift, double frequency) {
+        const double below = std::floor(shift), fraction = shift - below;
+        const std::complex<double> turn(0, 2 * kPi * frequency);
+        return (1 - fraction) * std::exp(turn * below) + fraction * std::exp(turn * (below + 1));
+      };
+      for (int l = 0; l < 5; ++l) {
+        for (int k = 0; k < 7; ++k)
+          transfer += weights(l, k) * linear((k - 3) * d, fx) * linear((l - 2) * d, fy);
+      }
+      std::vector<double> x(projection.pixels()), y(projection.pixels());
+      const auto wave = [&, fx = fx, fy = fy](int i, int j) {
+        return std::exp(std::complex<double>(0, 2 * kPi * (fx * i + fy * j)));
+      };
+      for (int j = 0; j < 60; ++j) {
+        for (int i = 0; i < 80; ++i) x[Index(j * 80 + i)] = wave(i, j).real();
+      }
+      projection.Apply(x.data(), 1, y.data());
+      for (int j = 5; j < 55; ++j) {
+        for (int i = 7; i < 73; ++i)
+          ASSERT_NEAR(y[Index(j * 80 + i)], (transfer * wave(i, j)).real(), 1e-12)
+              << d << " at " << i << ", " << j;
+      }
+    }
+  }
+}
+
+// Where rays are placed to a tolerance the sums differ by that times the slope of the picture; a
+// tolerance of next to nothing leaves rows of their own for all but flat surfaces.
+TEST(SceneProjection, EqualsTheRaysOneByOne) {
+  const DisparityMap map = Occluded();
+  const std::vector<double> x = RandomPicture(map.disparity.size(), 3);
+  for (const auto shape : {model::ApertureShape::kUniform, model::ApertureShape::kGaussian,
+                           model::ApertureShape::kDisc}) {
+    for (const auto& [u, v] : {std::pair{5, 5}, std::pair{4, 3}, std::pair{1, 3}}) {
+      const Eigen::ArrayXXd weights = Weights(shape, u, v);
+      const std::vector<double> plain = PlainGather(map, weights, x);
+      const auto strict = Make<double>(map, weights, 1e-9);
+      std::vector<double> y(x.size());
+      strict.Apply(x.data(), 1, y.data());
+      EXPECT_LT(LargestDifference(y, plain), 1e-6) << u << "x" << v;
+      const auto usual = Make<double>(map, weights);
+      EXPECT_LE(usual.row_share(), strict.row_share());
+      usual.Apply(x.data(), 1, y.data());
+      EXPECT_LT(LargestDifference(y, plain), 0.1) << u << "x" << v;
+    }
+  }
+}
+
+TEST(SceneProjection, FlatSurfacesNeedNoRowsButAtBordersAndEdges) {
+  const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kUniform, 5, 5);
+  const DisparityMap map = MapOf(100, 80, [](int x, int) { return x < 50 ? 1.5 : -0.5; });
+  const auto projection = Make<float>(map, weights);
+  for (const std::int32_t pixel : projection.rows.pixel) {
+    const int x = pixel % 100, y = pixel / 100;
+    const bool at_border = x < 4 || x > 95 || y < 4 || y > 75;
+    EXPECT_TRUE(at_border || std::abs(x - 49.5) < 9) << x << ", " << y;
+  }
+  const auto sharp = Make<float>(MapOf(100, 80, [](int, int) { return 0.0; }), weights);
+  EXPECT_TRUE(sharp.rows.pixel.empty());
+}
+
+TEST(SceneProjection, KeepsAUniformPicture) {
+  const auto projection = Make<double>(Occluded(), Weights(model::ApertureShape::kDisc, 7, 7));
+  const std::vector<double> ones(projection.pixels(), 1.0);
+  std::vector<double> y(projection.pixels());
+  projection.Apply(ones.data(), 1, y.data());
+  for (const double value : y) ASSERT_NEAR(value, 1, 1e-12);
+}
+
+template <typename Real>
+double AdjointError(const DisparityMap& map, const Eigen::ArrayXXd& weights) {
+  const auto projection = Make<Real>(map, weights);
+  const std::size_t size = 3 * projection.pixels();
+  const std::vector<double> a = RandomPicture(size, 5), b = RandomPicture(size, 6);
+  const std::vector<Real> x(a.begin(), a.end()), y(b.begin(), b.end());
+  std::vector<Real> forward(size), back(size);
+  projection.Apply(x.data(), 3, forward.data());
+  projection.ApplyTransposed(y.data(), 3, back.data());
+  double left = 0, right = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    left += static_cast<double>(forward[i]) * static_cast<double>(y[i]);
+    right += static_cast<double>(x[i]) * static_cast<double>(back[i]);
+  }
+  return std::abs(left - right) / std::abs(left);
+}
+
+TEST(SceneProjection, PassesTheDotProductTest) {
+  for (const auto shape : {model::ApertureShape::kUniform, model::ApertureShape::kDisc}) {
+    const Eigen::ArrayXXd weights = Weights(shape, 5, 7);
+    EXPECT_LT(AdjointError<double>(Occluded(), weights), 1e-14);
+    EXPECT_LT(AdjointError<float>(Occluded(), weights), 1e-6);
+  }
+  // A sparse set of views is no sum of few products.
+  std::mt19937 random(9);
+  Eigen::ArrayXXd sparse = Eigen::ArrayXXd::Zero(7, 7);
+  for (int n = 0; n < 12; ++n)
+    sparse(static_cast<int>(random() % 7), static_cast<int>(random() % 7)) += 1;
+  sparse /= sparse.sum();
+  EXPECT_LT(AdjointError<double>(Occluded(), sparse), 1e-14);
+}
+
+TEST(SceneProjection, SameBitsOnAnyNumberOfThreads) {
+  const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kGaussian, 5, 5);
+  const auto one = Make<float>(Occluded(), weights, 0.2, 1);
+  const std::vector<double> picture = RandomPicture(one.pixels(), 7);
+  const std::vector<float> x(picture.begin(), picture.end());
+  std::vector<float> expected(x.size()), y(x.size());
+  one.Apply(x.data(), 1, expected.data());
+  std::vector<float> expected_back(x.size());
+  one.ApplyTransposed(x.data(), 1, expected_back.data());
+  for (const int threads : {2, 3, 5}) {
+    const auto several = Make<float>(Occluded(), weights, 0.2, threads);
+    several.Apply(x.data(), 1, y.data());
+    EXPECT_EQ(y, expected);
+    several.ApplyTransposed(x.data(), 1, y.data());
+    EXPECT_EQ(y, expected_back);
+  }
+}
+
+TEST(SceneProjection, TellsWhatTheCentreViewDoesNotSee) {
+  const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kUniform, 5, 1);
+  const DisparityMap map = MapOf(60, 20, [](int x, int) { return x >= 20 && x < 40 ? 2 : 0; });
+  const auto projection = Make<float>(map, weights);
+  // Beside the near strip the background stands still; views move the strip by 2 px a step.
+  EXPECT_EQ(projection.hidden_share[Index(10 * 60 + 10)], 0);
+  EXPECT_EQ(projection.hidden_share[Index(10 * 60 + 30)], 0);
+  // x = 20 is uncovered by the two views in which the strip has gone right.
+  EXPECT_NEAR(projection.hidden_share[Index(10 * 60 + 20)], 0.4, 1e-6);
+}
+
+TEST(PhotographDisparity, IsWithoutTheLandingOfItsSamples) {
+  DisparityMap on_grid = MapOf(3, 1, [](int x, int) { return 0.5 * x; }, {2, -1});
+  const DisparityMap map = PhotographDisparity(on_grid, {0.8, -0.4});
+  for (int i = 0; i < 3; ++i)
+    EXPECT_FLOAT_EQ(map.disparity[Index(i)], 0.5F * static_cast<float>(i) - 0.4F);
+  EXPECT_EQ(PhotographDisparity(on_grid, {0, 0}).disparity, on_grid.disparity);
+  EXPECT_THAT(ErrorOf([&] { PhotographDisparity(on_grid, {0.8, 0.4}); }), HasSubstr("same ratio"));
+}
+
+}  // namespace
+}  // namespace thicklens::estimator
