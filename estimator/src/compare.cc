@@ -81,8 +81,17 @@ void RequireFitting(const model::LightField& reference, const DibrInput& dibr) {
   }
 }
 
+// A photograph that is ready to be warped to any view.
+struct DibrViews {
+  explicit DibrViews(const DibrInput& input)
+      : renderer(input.disparity), warper(input.photograph, input.disparity) {}
+
+  DisparityRenderer renderer;
+  PictureWarper warper;
+};
+
 ViewScores CompareView(const model::LightField& reference, const model::LightField& other, int k,
-                       int l, int border_px, const std::optional<DibrInput>& dibr) {
+                       int l, int border_px, const std::optional<DibrViews>& dibr) {
   const StoredValues truth =
       StoredValuesOf(model::ViewPicture(reference, k, l), reference.transfer);
   ViewScores view;
@@ -91,12 +100,9 @@ ViewScores CompareView(const model::LightField& reference, const model::LightFie
   view.scores = ComparePictures(
       truth, StoredValuesOf(model::ViewPicture(other, k, l), reference.transfer), border_px);
   if (!dibr) return view;
-  const ViewDisparity seen =
-      RenderDisparity(dibr->disparity, reference.u_offset(k), reference.v_offset(l));
-  view.dibr = ComparePictures(
-      truth,
-      StoredValuesOf(WarpPicture(dibr->photograph, dibr->disparity, seen), reference.transfer),
-      border_px);
+  const ViewDisparity seen = dibr->renderer.Render(reference.u_offset(k), reference.v_offset(l));
+  view.dibr = ComparePictures(truth, StoredValuesOf(dibr->warper.Warp(seen), reference.transfer),
+                              border_px);
   return view;
 }
 
@@ -171,13 +177,15 @@ LightFieldScores CompareLightFields(const model::LightField& reference,
   }
   if (common.empty()) throw Error("the two light fields have no view in common");
 
+  std::optional<DibrViews> dibr_views;
+  if (dibr) dibr_views.emplace(*dibr);
   LightFieldScores result;
   result.views.resize(common.size());
   model::ParallelFor(static_cast<int>(common.size()), threads, [&](int i) {
     const auto index = static_cast<std::size_t>(i);
     const auto [k, l] = common[index];
     try {
-      result.views[index] = CompareView(reference, other, k, l, border_px, dibr);
+      result.views[index] = CompareView(reference, other, k, l, border_px, dibr_views);
     } catch (const Error& error) {
       throw Error(fmt::format("view ({}, {}): {}", k, l, error.what()));
     }

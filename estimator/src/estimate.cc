@@ -51,13 +51,15 @@ model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int t
       falloff && input.camera
           ? WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, threads)
           : input.picture;
+  const DisparityRenderer renderer(input.disparity);
+  const PictureWarper warper(radiance, input.disparity);
   const int views = warped.u_count * warped.v_count;
   if (disparity != nullptr) disparity->resize(Index(views));
   model::ParallelFor(views, threads, [&](int view) {
     const int k = view % warped.u_count;
     const int l = view / warped.u_count;
-    ViewDisparity shown = RenderDisparity(input.disparity, warped.u_offset(k), warped.v_offset(l));
-    model::SetView(&warped, k, l, WarpPicture(radiance, input.disparity, shown));
+    ViewDisparity shown = renderer.Render(warped.u_offset(k), warped.v_offset(l));
+    model::SetView(&warped, k, l, warper.Warp(shown));
     if (disparity != nullptr) (*disparity)[Index(view)] = std::move(shown.disparity);
   });
   warped.origin.method = "dibr";

@@ -80,10 +80,11 @@ ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights,
       fan.views.push_back(view);
     }
   }
+  const DisparityRenderer renderer(disparity);
   model::ParallelFor(static_cast<int>(fan.views.size()), threads, [&](int i) {
     if (progress) progress();
     FanView& view = fan.views[Index(i)];
-    FanView rendered = Compact(RenderDisparity(disparity, view.a, view.b));
+    FanView rendered = Compact(renderer.Render(view.a, view.b));
     rendered.a = view.a;
     rendered.b = view.b;
     rendered.weight = view.weight;

@@ -65,12 +65,60 @@ struct ViewDisparity {
 // sample. (0, 0) gives the map itself. Throws Error if the map has holes.
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
+// RenderDisparity for many views of one map: what all of them need is found once. Read by many
+// threads.
+class DisparityRenderer {
+ public:
+  // The map must outlive it. Throws Error if it has holes.
+  explicit DisparityRenderer(const DisparityMap& map);
+  explicit DisparityRenderer(const DisparityMap&& map) = delete;
+
+  ViewDisparity Render(double a, double b) const;
+
+ private:
+  const DisparityMap& map_;
+  std::vector<char> is_surface_;  // of the cell below and to the right of each pixel: no jump
+  std::vector<int> alone_;        // indices of the pixels at a jump, which are squares
+};
+
 // The picture warped to that view by its depth (with the blurred photograph: depth-image-based
 // rendering, DIBR). Bicubic (Catmull-Rom) where all 16 taps agree with the sample's disparity to
 // .3 px per view step, else bilinear from the taps that do, renormalised; hidden samples take their
 // background source's value.
 model::LinearPicture WarpPicture(const model::LinearPicture& picture, const DisparityMap& map,
                                  const ViewDisparity& view);
+
+// WarpPicture for many views of one picture: what all of them need is found once. Read by many
+// threads.
+class PictureWarper {
+ public:
+  // The map must outlive it.
+  PictureWarper(const model::LinearPicture& picture, const DisparityMap& map);
+  PictureWarper(const model::LinearPicture& picture, const DisparityMap&& map) = delete;
+
+  model::LinearPicture Warp(const ViewDisparity& view) const;
+
+ private:
+  struct Range {
+    float lowest, highest;
+  };
+  struct TapRow;
+
+  void CopyPlanes(const model::LinearPicture& picture);
+  void FindRanges();
+  template <int kChannels>
+  void WarpRow(const TapRow& taps, const float* disparity, float* warped) const;
+  void Bilinear(int x0, int y0, float fraction_x, float fraction_y, float disparity,
+                float* value) const;
+  bool Agrees(float tap_disparity, float disparity) const;
+  const float* Tap(int x, int y) const;
+
+  const DisparityMap& map_;
+  const int channels_;
+  const double tolerance_;     // in the unit of the map; infinite where the steps are 0
+  std::vector<float> planes_;  // of the channels, with their borders repeated
+  std::vector<Range> ranges_;  // of the disparities of the 16 taps of each pixel
+};
 
 }  // namespace thicklens::estimator
 

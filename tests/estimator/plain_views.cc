@@ -1,0 +1,254 @@
+#include "estimator/plain_views.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <utility>
+
+namespace thicklens::estimator::testing {
+namespace {
+
+constexpr double kTolerancePx = 1e-5;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Vertex {
+  double x, y, disparity;
+};
+
+std::size_t At(int x, int y, int width) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+         static_cast<std::size_t>(x);
+}
+
+double Edge(const Vertex& p, const Vertex& q, double x, double y) {
+  return (p.x - x) * (q.y - y) - (q.x - x) * (p.y - y);
+}
+
+// Of every sample of a view the nearest surface; -infinity where there is none.
+struct Canvas {
+  int width, height;
+  std::vector<double> disparity;
+
+  Canvas(int width_px, int height_px)
+      : width(width_px), height(height_px), disparity(At(0, height_px, width_px), -kInfinity) {}
+
+  bool IsCovered(int x, int y) const { return disparity[At(x, y, width)] > -kInfinity; }
+  bool IsInside(int x, int y) const { return x >= 0 && y >= 0 && x < width && y < height; }
+
+  void Put(int x, int y, double value) {
+    disparity[At(x, y, width)] = std::max(disparity[At(x, y, width)], value);
+  }
+
+  // Calls `draw(x, y)` for the samples in the rectangle.
+  template <typename Draw>
+  void ForSamples(double left, double right, double top, double bottom, const Draw& draw) const {
+    for (int y = std::max(0, Whole(std::ceil(top - kTolerancePx)));
+         y <= std::min(height - 1, Whole(std::floor(bottom + kTolerancePx))); ++y) {
+      for (int x = std::max(0, Whole(std::ceil(left - kTolerancePx)));
+           x <= std::min(width - 1, Whole(std::floor(right + kTolerancePx))); ++x) {
+        draw(x, y);
+      }
+    }
+  }
+
+  void Triangle(const Vertex& p, const Vertex& q, const Vertex& r) {
+    const double area = Edge(p, q, r.x, r.y);
+    if (!(std::abs(area) > 1e-9)) return;
+    ForSamples(std::min({p.x, q.x, r.x}), std::max({p.x, q.x, r.x}), std::min({p.y, q.y, r.y}),
+               std::max({p.y, q.y, r.y}), [&](int x, int y) {
+                 const double sign = area > 0 ? 1 : -1;
+                 const std::array<double, 3> share = {
+                     sign * Edge(q, r, x, y), sign * Edge(r, p, x, y), sign * Edge(p, q, x, y)};
+                 if (*std::min_element(share.begin(), share.end()) < -kTolerancePx) return;
+                 const double in_p = std::max(share[0], 0.0);
+                 const double in_q = std::max(share[1], 0.0);
+                 const double in_r = std::max(share[2], 0.0);
+                 Put(x, y,
+                     (in_p * p.disparity + in_q * q.disparity + in_r * r.disparity) /
+                         (in_p + in_q + in_r));
+               });
+  }
+
+  void Square(const Vertex& centre) {
+    ForSamples(centre.x - 0.5, centre.x + 0.5, centre.y - 0.5, centre.y + 0.5,
+               [&](int x, int y) { Put(x, y, centre.disparity); });
+  }
+
+  static int Whole(double x) { return static_cast<int>(std::clamp(x, -1e9, 1e9)); }
+};
+
+void Draw(const DisparityMap& map, const Eigen::Vector2d& shift, Canvas* canvas) {
+  const int width = map.width_px;
+  const auto vertex = [&](int x, int y) {
+    const double d = map.disparity[At(x, y, width)];
+    return Vertex{x - shift.x() * d, y - shift.y() * d, d};
+  };
+  std::vector<bool> alone(map.disparity.size(), width == 1 || map.height_px == 1);
+  for (int y = 0; y + 1 < map.height_px; ++y) {
+    for (int x = 0; x + 1 < width; ++x) {
+      const std::array<Vertex, 4> corner = {vertex(x, y), vertex(x + 1, y), vertex(x, y + 1),
+                                            vertex(x + 1, y + 1)};
+      const auto [low, high] = std::minmax(
+          {corner[0].disparity, corner[1].disparity, corner[2].disparity, corner[3].disparity});
+      if ((high - low) * map.step.cwiseAbs().maxCoeff() > 0.2) {
+        for (const auto& [i, j] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
+          alone[At(x + i, y + j, width)] = true;
+        }
+        continue;
+      }
+      canvas->Triangle(corner[0], corner[1], corner[3]);
+      canvas->Triangle(corner[0], corner[3], corner[2]);
+    }
+  }
+  for (int y = 0; y < map.height_px; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (alone[At(x, y, width)]) canvas->Square(vertex(x, y));
+    }
+  }
+}
+
+using Sample = std::pair<int, int>;
+
+// For each sample the covered one that is fewest steps along rows and columns away.
+std::vector<Sample> Closest(const Canvas& canvas) {
+  std::vector<Sample> closest(canvas.disparity.size(), Sample{-1, -1});
+  std::queue<Sample> queue;
+  for (int y = 0; y < canvas.height; ++y) {
+    for (int x = 0; x < canvas.width; ++x) {
+      if (!canvas.IsCovered(x, y)) continue;
+      closest[At(x, y, canvas.width)] = {x, y};
+      queue.push({x, y});
+    }
+  }
+  for (; !queue.empty(); queue.pop()) {
+    const auto [x, y] = queue.front();
+    for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+      if (!canvas.IsInside(x + dx, y + dy)) continue;
+      Sample& there = closest[At(x + dx, y + dy, canvas.width)];
+      if (there.first >= 0) continue;
+      there = closest[At(x, y, canvas.width)];
+      queue.push({x + dx, y + dy});
+    }
+  }
+  return closest;
+}
+
+// What a sample that is not covered takes over.
+Sample Background(const Canvas& canvas, const Eigen::Vector2d& shift,
+                  const std::vector<Sample>& closest, int x, int y) {
+  const Eigen::Vector2d step = shift / shift.cwiseAbs().maxCoeff();
+  Sample found = closest[At(x, y, canvas.width)];
+  double farthest = kInfinity;
+  int fewest = std::numeric_limits<int>::max();
+  for (const int sense : {1, -1}) {
+    for (int n = 1;; ++n) {
+      const int xx = static_cast<int>(std::floor(x + sense * n * step.x() + 0.5));
+      const int yy = static_cast<int>(std::floor(y + sense * n * step.y() + 0.5));
+      if (!canvas.IsInside(xx, yy)) break;
+      if (!canvas.IsCovered(xx, yy)) continue;
+      const auto there =
+          static_cast<double>(static_cast<float>(canvas.disparity[At(xx, yy, canvas.width)]));
+      if (there < farthest || (there == farthest && n < fewest)) {
+        farthest = there;
+        fewest = n;
+        found = {xx, yy};
+      }
+      break;
+    }
+  }
+  return found;
+}
+
+std::array<double, 4> CatmullRom(double f) {
+  return {0.5 * (-f * f * f + 2 * f * f - f), 0.5 * (3 * f * f * f - 5 * f * f + 2),
+          0.5 * (-3 * f * f * f + 4 * f * f + f), 0.5 * (f * f * f - f * f)};
+}
+
+}  // namespace
+
+ViewDisparity PlainView(const DisparityMap& map, double a, double b) {
+  const int width = map.width_px;
+  const Eigen::Vector2d shift(a * map.step.x(), b * map.step.y());
+  const std::vector<float> zero(map.disparity.size(), 0);
+  ViewDisparity view{width, map.height_px, map.disparity, {}, zero, zero};
+  view.seen.assign(map.disparity.size(), Seen::kSeen);
+  if (shift == Eigen::Vector2d::Zero()) return view;
+  Canvas canvas(width, map.height_px);
+  Draw(map, shift, &canvas);
+  const std::vector<Sample> closest = Closest(canvas);
+  for (int y = 0; y < map.height_px; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const std::size_t i = At(x, y, width);
+      Sample shown{x, y};
+      if (!canvas.IsCovered(x, y)) {
+        view.seen[i] = Seen::kHidden;
+        shown = Background(canvas, shift, closest, x, y);
+        if (shown.first < 0) continue;
+      }
+      const double disparity = canvas.disparity[At(shown.first, shown.second, width)];
+      view.disparity[i] = static_cast<float>(disparity);
+      view.source_x[i] = static_cast<float>(shown.first - x + shift.x() * disparity);
+      view.source_y[i] = static_cast<float>(shown.second - y + shift.y() * disparity);
+    }
+  }
+  return view;
+}
+
+model::LinearPicture PlainWarp(const model::LinearPicture& picture, const DisparityMap& map,
+                               const ViewDisparity& view) {
+  model::LinearPicture warped = picture;
+  const int width = picture.width_px;
+  const int height = picture.height_px;
+  const double tolerance = 0.3 / map.step.cwiseAbs().maxCoeff();
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const std::size_t i = At(x, y, width);
+      const double source_x = std::clamp(x + double{view.source_x[i]}, 0.0, width - 1.0);
+      const double source_y = std::clamp(y + double{view.source_y[i]}, 0.0, height - 1.0);
+      const int x0 = static_cast<int>(source_x);
+      const int y0 = static_cast<int>(source_y);
+      const auto at = [&](int n, int count) { return std::clamp(n, 0, count - 1); };
+      const auto difference = [&](int xx, int yy) {
+        return std::abs(double{map.disparity[At(at(xx, width), at(yy, height), width)]} -
+                        view.disparity[i]);
+      };
+      bool bicubic = true;
+      for (int n = 0; n < 16; ++n) {
+        bicubic = bicubic && difference(x0 - 1 + n % 4, y0 - 1 + n / 4) <= tolerance;
+      }
+      const std::array<double, 4> cubic_x = CatmullRom(source_x - x0);
+      const std::array<double, 4> cubic_y = CatmullRom(source_y - y0);
+      const std::array<double, 4> linear_x = {0, 1 - (source_x - x0), source_x - x0, 0};
+      const std::array<double, 4> linear_y = {0, 1 - (source_y - y0), source_y - y0, 0};
+      for (int c = 0; c < picture.channels; ++c) {
+        double sum = 0;
+        double weights = 0;
+        double closest = kInfinity;
+        double value_of_closest = 0;
+        for (int n = 0; n < 16; ++n) {
+          const auto j = static_cast<std::size_t>(n / 4);
+          const auto k = static_cast<std::size_t>(n % 4);
+          const int xx = x0 - 1 + n % 4;
+          const int yy = y0 - 1 + n / 4;
+          const double value = picture.at(at(xx, width), at(yy, height), c);
+          const double weight = bicubic ? cubic_x[k] * cubic_y[j] : linear_x[k] * linear_y[j];
+          if (weight != 0 && difference(xx, yy) < closest) {
+            closest = difference(xx, yy);
+            value_of_closest = value;
+          }
+          if (difference(xx, yy) > tolerance) continue;
+          sum += weight * value;
+          weights += weight;
+        }
+        const auto channels = static_cast<std::size_t>(picture.channels);
+        warped.values[i * channels + static_cast<std::size_t>(c)] =
+            static_cast<float>(weights > 0 ? sum / weights : value_of_closest);
+      }
+    }
+  }
+  return warped;
+}
+
+}  // namespace thicklens::estimator::testing
