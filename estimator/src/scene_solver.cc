@@ -1,0 +1,341 @@
+#include "thicklens/estimator/scene_solver.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <mutex>
+#include <numeric>
+#include <utility>
+
+#include "estimate_input.h"
+#include "ray_landing.h"
+#include "scene_data.h"
+#include "scene_priors.h"
+#include "scene_projection.h"
+#include "scene_strength.h"
+#include "scene_system.h"
+#include "stored_slope.h"
+#include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kBytesPerMib = 1024.0 * 1024.0;
+// What is assumed of the noise where the photograph does not tell it, in stored values.
+constexpr double kUsualNoise = 1.0 / 255;
+// Of a noiseless photograph: no model of its rays is better than the rounding of 8 bits.
+constexpr double kLeastNoise = 0.29 / 255;
+// Of the Gaussian over which the intensity is smoothed that says the slope of the transfer curve.
+constexpr double kSlopeSmoothingPx = 2;
+
+// For the progress only.
+constexpr int kUsualIterations = 60;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double ResidentBytes() {
+  std::ifstream file("/proc/self/statm");
+  double total_pages = 0;
+  double resident_pages = 0;
+  file >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+// Iterations and views, counted together. Of iterations there may be more or fewer than expected.
+class Progress {
+ public:
+  Progress(const std::function<void(int, int)>& report, int iterations, int views)
+      : report_(report), iterations_(iterations), total_(iterations + views) {}
+
+  void Tell() { Report(0); }
+  void CountIteration() { Report(done_ < iterations_ ? 1 : 0); }
+  void EndIterations() { Report(iterations_ - done_); }
+  void CountView() { Report(1); }
+
+ private:
+  void Report(int steps) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    done_ += steps;
+    if (report_) report_(done_, total_);
+  }
+
+  const std::function<void(int, int)>& report_;
+  const int iterations_, total_;
+  std::mutex mutex_;
+  int done_ = 0;  // only one thread iterates
+};
+
+// The most that the process is expected to hold: the light field; H; the vectors of the solver.
+double VectorBytes(const EstimateInput& input, bool double_precision) {
+  constexpr double kPictures = 11;  // data, H^T W I, four of CG, right side, three inside of H, r
+  constexpr double kPlanes = 9;     // weights, slopes, diagonals, prior
+  const double pixels = static_cast<double>(input.disparity.disparity.size());
+  const double real = double_precision ? sizeof(double) : sizeof(float);
+  return real * pixels * (kPictures * input.picture.channels + kPlanes);
+}
+double LightFieldBytes(const EstimateInput& input) {
+  return sizeof(float) * static_cast<double>(input.picture.values.size()) *
+         static_cast<double>(input.weights.size());
+}
+void CheckMemory(const SceneOptions& options, double bytes) {
+  if (!options.memory_limit_mib || bytes <= *options.memory_limit_mib * kBytesPerMib) return;
+  throw Error(fmt::format(
+      "memory limit {:.0f} MiB: the whole picture at once needs {:.0f} MiB; the limit must be at "
+      "least that, or the views fewer, or the picture smaller",
+      *options.memory_limit_mib, std::ceil(bytes / kBytesPerMib)));
+}
+
+// All views of one radiance.
+model::LightField ShowInAllViews(const EstimateInput& input, const model::LinearPicture& radiance,
+                                 int threads, Progress* progress) {
+  model::LightField light_field = model::MakeLightField(
+      radiance.width_px, radiance.height_px, static_cast<int>(input.weights.cols()),
+      static_cast<int>(input.weights.rows()), radiance.channels);
+  light_field.weights = input.weights;
+  light_field.transfer = input.transfer;
+  light_field.grid = input.grid;
+  light_field.camera = input.camera;
+  if (input.grid) light_field.landing_step_px = LandingStepPx(*input.camera, *input.grid);
+  model::ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int view) {
+    const int k = view % light_field.u_count;
+    const int l = view / light_field.u_count;
+    const ViewDisparity shown =
+        RenderDisparity(input.disparity, light_field.u_offset(k), light_field.v_offset(l));
+    model::SetView(&light_field, k, l, WarpPicture(radiance, input.disparity, shown));
+    progress->CountView();
+  });
+  return light_field;
+}
+
+// Everything between the checked input and the views, in one precision.
+template <typename Real>
+class RadianceEstimate {
+ public:
+  RadianceEstimate(const EstimateInput& input, const SceneOptions& options, SceneSummary* summary,
+                   Progress* progress)
+      : input_(input), options_(options), summary_(summary), progress_(progress) {}
+
+  // H, I and the weights.
+  void Prepare(const model::LinearPicture& radiance_of_photograph) {
+    disparity_ = input_.grid ? PhotographDisparity(input_.disparity,
+                                                   LandingStepPx(*input_.camera, *input_.grid))
+                             : input_.disparity;
+    ProjectionOptions projection;
+    projection.threads = summary_->threads;
+    projection.progress = [this] { progress_->Tell(); };
+    projection_ = MakeSceneProjection<Real>(disparity_, input_.weights, projection);
+    const std::vector<float>& hidden = projection_.hidden_share;
+    summary_->row_share = projection_.row_share();
+    summary_->hidden_share =
+        std::accumulate(hidden.begin(), hidden.end(), 0.0) / static_cast<double>(hidden.size());
+
+    data_.width_px = radiance_of_photograph.width_px;
+    data_.height_px = radiance_of_photograph.height_px;
+    data_.channels = radiance_of_photograph.channels;
+    data_.threads = summary_->threads;
+    data_.projection.apply = [this](const Real* x, int channels, Real* y) {
+      projection_.Apply(x, channels, y);
+    };
+    data_.projection.apply_transposed = [this](const Real* y, int channels, Real* x) {
+      projection_.ApplyTransposed(y, channels, x);
+    };
+    data_.photograph = Planar<Real>(radiance_of_photograph);
+    slope_squared_ = SlopeSquared(radiance_of_photograph);
+    data_.weight = DataWeights(slope_squared_, hidden, options_.hidden_weights);
+    data_.squared_row = SquaredRows<Real>(disparity_, input_.weights);
+  }
+
+  double operator_bytes() const { return projection_.memory_mib() * kBytesPerMib; }
+
+  model::LinearPicture Solve() {
+    SceneSystem<Real> system(data_);
+    std::vector<Real> radiance = data_.photograph;
+    RadianceLimits limits;
+    limits.tolerance = options_.tolerance;
+    limits.max_iterations = options_.max_iterations;
+    limits.on_iteration = [this] { progress_->CountIteration(); };
+    summary_->strength = options_.strength;
+    if (options_.strength_rule != StrengthRule::kGiven) {
+      summary_->strength = StrengthForNoise(
+          options_.prior, std::max(summary_->noise_sigma, kLeastNoise), data_, slope_squared_);
+    }
+    if (options_.strength_rule == StrengthRule::kGcv) {
+      const StrengthSearch search = SearchStrength(options_.prior, summary_->strength, data_,
+                                                   slope_squared_, limits, &system, &radiance);
+      summary_->strength = search.strength;
+      summary_->iterations = search.iterations;
+    }
+    const RadianceOutcome outcome = SolveRadiance(options_.prior, summary_->strength, data_,
+                                                  slope_squared_, limits, &system, &radiance);
+    summary_->iterations += outcome.iterations;
+    summary_->reweightings = outcome.reweightings;
+    summary_->converged = outcome.converged;
+    summary_->relative_residual = outcome.relative_residual;
+    residual_ = StoredResidualOf(data_, radiance, input_.transfer);
+    summary_->residual_rms = residual_.rms;
+    return Interleaved(radiance, data_.width_px, data_.height_px, data_.channels);
+  }
+
+  void TakeMaps(SceneMaps* maps) {
+    maps->residual = std::move(residual_.mean);
+    maps->hidden_share = std::move(projection_.hidden_share);
+    maps->blur_sigma_px = BlurSigmaPx(disparity_, input_.weights);
+  }
+
+ private:
+  // s^2. Without slope weights that of the whole picture, so that strengths keep their unit.
+  std::vector<Real> SlopeSquared(const model::LinearPicture& picture) const {
+    const std::vector<double> slopes = StoredSlopes(picture, input_.transfer, kSlopeSmoothingPx);
+    std::vector<Real> squares;
+    squares.reserve(slopes.size());
+    for (const double slope : slopes) squares.push_back(static_cast<Real>(slope * slope));
+    if (options_.slope_weights) return squares;
+    const double mean =
+        std::accumulate(slopes.begin(), slopes.end(), 0.0) / static_cast<double>(slopes.size());
+    squares.assign(slopes.size(), static_cast<Real>(mean * mean));
+    return squares;
+  }
+
+  const EstimateInput& input_;
+  const SceneOptions& options_;
+  SceneSummary* summary_;
+  Progress* progress_;
+  DisparityMap disparity_;
+  SceneProjection<Real> projection_;
+  DataTerm<Real> data_;
+  std::vector<Real> slope_squared_;
+  StoredResidual residual_;
+};
+
+std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, bool noise_known) {
+  std::string message = fmt::format("{} prior of strength {:.3g}, {} iterations",
+                                    PriorName(options.prior), summary.strength, summary.iterations);
+  if (!summary.converged) {
+    message +=
+        fmt::format("; stopped at a relative residual of {:.2g}, above the tolerance of {:.2g}",
+                    summary.relative_residual, options.tolerance);
+  }
+  if (!noise_known && options.strength_rule != StrengthRule::kGiven) {
+    message += "; no part of the photograph tells its noise: 1/255 is assumed";
+  }
+  return message;
+}
+
+void FillOrigin(const SceneOptions& options, const SceneSummary& summary, bool falloff,
+                model::LightFieldOrigin* origin) {
+  origin->method = "scene";
+  origin->device = "cpu";
+  origin->prior = PriorName(options.prior);
+  origin->strength = summary.strength;
+  origin->noise_sigma = summary.noise_sigma;
+  origin->iterations = summary.iterations;
+  origin->relative_residual = summary.relative_residual;
+  origin->effects = {"defocus"};
+  if (falloff) origin->effects.emplace_back("falloff");
+}
+
+template <typename Real>
+model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& options,
+                             SceneSummary* summary, SceneMaps* maps) {
+  const auto start = Clock::now();
+  summary->threads = model::ResolveThreads(options.threads);
+  summary->prior = options.prior;
+  const double fixed_bytes =
+      ResidentBytes() + LightFieldBytes(input) + VectorBytes(input, options.double_precision);
+  CheckMemory(options, fixed_bytes);
+  const auto views = static_cast<int>(input.weights.size());
+  const int iterations = std::min(options.max_iterations, kUsualIterations);
+  Progress progress(options.progress, iterations, views);
+
+  const std::optional<double> noise = StoredNoiseSigma(input.picture, input.transfer);
+  summary->noise_sigma = noise.value_or(kUsualNoise);
+  const bool falloff = options.falloff && input.camera.has_value();
+  RadianceEstimate<Real> estimate(input, options, summary, &progress);
+  estimate.Prepare(falloff ? WithoutFalloff(input.picture, *input.grid, *input.camera,
+                                            input.weights, summary->threads)
+                           : input.picture);
+  const double bytes = fixed_bytes + estimate.operator_bytes();
+  summary->predicted_memory_mib = bytes / kBytesPerMib;
+  CheckMemory(options, bytes);
+  summary->setup_seconds = SecondsSince(start);
+
+  const auto solve_start = Clock::now();
+  model::LinearPicture radiance = estimate.Solve();
+  summary->solve_seconds = SecondsSince(solve_start);
+  progress.EndIterations();
+
+  const auto views_start = Clock::now();
+  model::LightField light_field = ShowInAllViews(input, radiance, summary->threads, &progress);
+  summary->views_seconds = SecondsSince(views_start);
+  summary->message = MessageOf(options, *summary, noise.has_value());
+  FillOrigin(options, *summary, falloff, &light_field.origin);
+  if (maps != nullptr) {
+    estimate.TakeMaps(maps);
+    maps->radiance = std::move(radiance);
+  }
+  return light_field;
+}
+
+}  // namespace
+
+Prior PriorFromName(const std::string& name) {
+  if (name == "ridge") return Prior::kRidge;
+  if (name == "gradient") return Prior::kGradient;
+  if (name == "tv") return Prior::kTotalVariation;
+  throw Error(fmt::format("prior \"{}\" is unknown: it must be ridge, gradient or tv", name));
+}
+
+std::string PriorName(Prior prior) {
+  switch (prior) {
+    case Prior::kRidge:
+      return "ridge";
+    case Prior::kGradient:
+      return "gradient";
+    case Prior::kTotalVariation:
+      break;
+  }
+  return "tv";
+}
+
+bool SceneOptions::IsValid(std::string* why) const {
+  const auto fail = [why](std::string reason) {
+    if (why != nullptr) *why = std::move(reason);
+    return false;
+  };
+  if (strength_rule == StrengthRule::kGiven && (!(strength > 0) || !std::isfinite(strength))) {
+    return fail(fmt::format("strength is {}: it must be finite and > 0", strength));
+  }
+  if (!(tolerance > 0) || !(tolerance < 1)) {
+    return fail(fmt::format("tolerance is {}: it must be > 0 and < 1", tolerance));
+  }
+  if (max_iterations < 1) {
+    return fail(fmt::format("max_iterations is {}: it must be >= 1", max_iterations));
+  }
+  if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
+  if (memory_limit_mib && !(*memory_limit_mib > 0)) {
+    return fail(fmt::format("memory_limit_mib is {}: it must be > 0", *memory_limit_mib));
+  }
+  return true;
+}
+
+model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
+                                SceneSummary* summary, SceneMaps* maps) {
+  std::string why;
+  if (!options.IsValid(&why)) throw Error("scene solver: " + why);
+  CheckInput(input);
+  *summary = SceneSummary();
+  return options.double_precision ? EstimateIn<double>(input, options, summary, maps)
+                                  : EstimateIn<float>(input, options, summary, maps);
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,305 @@
+// The scene solver as a whole: simulated scenes with known views, limits, and what it promises.
+#include "thicklens/estimator/scene_solver.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "support/error_message.h"
+#include "thicklens/error.h"
+#include "thicklens/estimator/compare.h"
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::estimator {
+namespace {
+
+using ::testing::AllOf;
+using testing::ErrorOf;
+using ::testing::HasSubstr;
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// A blurred card before a slanted wall.
+struct Simulated {
+  model::LightField truth;
+  EstimateInput input;
+};
+
+Simulated Simulate(bool falloff) {
+  model::SceneSimulationOptions options;
+  options.camera.name = "made up";
+  options.camera.lens = {12.5, 12.8, 3, 6};
+  options.camera.sensor.width_px = 96;
+  options.camera.sensor.height_px = 80;
+  options.camera.sensor.pixel_pitch_mm = 0.008;
+  options.camera.sensor.principal_point_px = {47.5, 39.5};
+  model::CameraCalibration calibration;
+  calibration.image_distance_mm = {model::ImageDistanceMm(options.camera.lens, 800), 0};
+  calibration.blur_ratio = {0.45, 0};
+  calibration.evidence.method = "assumed";
+  options.camera.calibration = calibration;
+  model::SceneLayer wall;
+  wall.plane.depth_mm = 1100;
+  wall.plane.slope = {0.5, 0};
+  model::SceneLayer card;
+  card.plane.depth_mm = 700;
+  card.outline.shape = model::OutlineOptions::Shape::kDisc;
+  card.outline.centre = {35, 40};
+  card.outline.radius = 18;
+  card.texture.colour = {0.6, 0.4, 0.3};
+  wall.texture.feature_size_px = card.texture.feature_size_px = 4;
+  options.layers = {wall, card};
+  options.falloff = falloff;
+  options.noise_sigma_grey_levels = 1;
+  options.rays_per_pixel = 200;
+  const model::SceneSimulator simulator(options, std::vector<model::LinearPicture>(2));
+  Simulated simulated;
+  simulated.truth = simulator.RenderLightField(5, 5, {});
+  const model::RawDepthMap depth = simulator.RenderDepth();
+  const model::StoredPicture photograph = simulator.Store(simulator.RenderNoiseless({}));
+  EstimateInput& input = simulated.input;
+  input.picture = model::ToLinear(photograph, options.camera.sensor.transfer);
+  input.transfer = options.camera.sensor.transfer;
+  input.weights = simulated.truth.weights;
+  input.grid = simulated.truth.grid;
+  input.camera = options.camera;
+  input.disparity = DisparityOnGrid(*input.grid, depth.values, depth.width_px, depth.height_px);
+  return simulated;
+}
+
+// With fall-off, made once.
+const Simulated& SimulatedScene() {
+  static const Simulated simulated = Simulate(true);
+  return simulated;
+}
+
+double MeanPsnr(const model::LightField& truth, const model::LightField& found) {
+  return CompareLightFields(truth, found, 8, std::nullopt, 1).mean.psnr_db;
+}
+
+EstimateInput MadeUp(float disparity_px, int channels = 3) {
+  std::mt19937 engine(4);
+  std::uniform_real_distribution<float> uniform(0.2F, 0.7F);
+  EstimateInput input;
+  input.picture = {40, 36, channels, {}};
+  input.picture.values.resize(40 * 36 * Index(channels));
+  for (float& value : input.picture.values) value = uniform(engine);
+  input.disparity = {40, 36, std::vector<float>(40 * 36, disparity_px), {1, 1}};
+  input.weights = model::ApertureWeights(model::ApertureShape::kUniform, 3, 3);
+  return input;
+}
+
+TEST(SceneSolver, BeatsWarpingOnASimulatedScene) {
+  const Simulated& simulated = SimulatedScene();
+  const double dibr = MeanPsnr(simulated.truth, WarpedLightField(simulated.input, true, 2));
+  double best = 0;
+  for (const Prior prior : {Prior::kRidge, Prior::kGradient, Prior::kTotalVariation}) {
+    SceneOptions options;
+    options.prior = prior;
+    SceneSummary summary;
+    SceneMaps maps;
+    const model::LightField found = EstimateScene(simulated.input, options, &summary, &maps);
+    const double psnr = MeanPsnr(simulated.truth, found);
+    EXPECT_GT(psnr, dibr + 1) << PriorName(prior);
+    best = std::max(best, psnr);
+    EXPECT_TRUE(summary.converged) << summary.message;
+    EXPECT_LE(summary.relative_residual, options.tolerance);
+    EXPECT_GT(255 * summary.noise_sigma, 1);
+    EXPECT_LT(255 * summary.noise_sigma, 1.3);
+    // H and the noise, but no more.
+    EXPECT_GT(255 * summary.residual_rms, 0.5);
+    EXPECT_LT(255 * summary.residual_rms, 3);
+    EXPECT_GT(summary.strength, 0);
+    EXPECT_EQ(summary.reweightings > 0, prior == Prior::kTotalVariation);
+    EXPECT_EQ(found.origin.method, "scene");
+    EXPECT_EQ(found.origin.prior, PriorName(prior));
+    EXPECT_EQ(found.origin.iterations, summary.iterations);
+    EXPECT_EQ(found.origin.strength, summary.strength);
+    EXPECT_EQ(found.origin.effects, (std::vector<std::string>{"defocus", "falloff"}));
+    std::string why;
+    EXPECT_TRUE(found.IsValid(&why)) << why;
+  }
+  EXPECT_GT(best, dibr + 3);
+}
+
+TEST(SceneSolver, CrossValidationFindsAStrengthAboutAsGood) {
+  const Simulated& simulated = SimulatedScene();
+  for (const Prior prior : {Prior::kRidge, Prior::kTotalVariation}) {
+    SceneOptions options;
+    options.prior = prior;
+    SceneSummary with_auto, with_gcv;
+    const double of_auto =
+        MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &with_auto, nullptr));
+    options.strength_rule = StrengthRule::kGcv;
+    const double of_gcv =
+        MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &with_gcv, nullptr));
+    EXPECT_GT(of_gcv, of_auto - 0.7)
+        << PriorName(prior) << " " << with_gcv.strength << " " << with_auto.strength;
+    EXPECT_NE(with_gcv.strength, with_auto.strength);
+    EXPECT_GT(with_gcv.iterations, 2 * with_auto.iterations);
+  }
+}
+
+TEST(SceneSolver, FloatIsAsGoodAsDouble) {
+  const Simulated& simulated = SimulatedScene();
+  SceneOptions options;
+  SceneSummary summary;
+  const double single =
+      MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &summary, nullptr));
+  options.double_precision = true;
+  EXPECT_NEAR(MeanPsnr(simulated.truth, EstimateScene(simulated.input, options, &summary, nullptr)),
+              single, 0.02);
+}
+
+TEST(SceneSolver, APictureWithoutBlurComesBack) {
+  const EstimateInput input = MadeUp(0);
+  for (const Prior prior : {Prior::kRidge, Prior::kTotalVariation}) {
+    SceneOptions options;
+    options.prior = prior;
+    options.strength_rule = StrengthRule::kGiven;
+    options.strength = 1e-6;
+    SceneSummary summary;
+    const model::LightField found = EstimateScene(input, options, &summary, nullptr);
+    EXPECT_EQ(summary.strength, 1e-6);
+    // What total variation starts with is not taken for its answer, however near.
+    EXPECT_EQ(summary.reweightings > 0, prior == Prior::kTotalVariation);
+    const model::LinearPicture view = model::ViewPicture(found, 2, 0);
+    for (std::size_t i = 0; i < view.values.size(); ++i) {
+      ASSERT_NEAR(view.values[i], input.picture.values[i], 2e-4);
+    }
+  }
+}
+
+TEST(SceneSolver, AConstantPictureHasAConstantLightField) {
+  EstimateInput input = MadeUp(1.3F, 1);
+  for (float& value : input.picture.values) value = 0.4F;
+  SceneSummary summary;
+  const model::LightField found = EstimateScene(input, {}, &summary, nullptr);
+  for (const float value : found.values) ASSERT_NEAR(value, 0.4, 1e-3);
+}
+
+TEST(SceneSolver, AnyNumberOfThreadsGivesTheSameBits) {
+  const Simulated& simulated = SimulatedScene();
+  std::vector<float> first;
+  for (const int threads : {1, 2, 3}) {
+    SceneOptions options;
+    options.threads = threads;
+    SceneSummary summary;
+    const model::LightField found = EstimateScene(simulated.input, options, &summary, nullptr);
+    EXPECT_EQ(summary.threads, threads);
+    if (first.empty()) first = found.values;
+    EXPECT_EQ(found.values, first) << threads;
+  }
+}
+
+TEST(SceneSolver, SaysThatItDidNotConverge) {
+  SceneOptions options;
+  options.max_iterations = 7;
+  options.tolerance = 1e-6;
+  SceneSummary summary;
+  const model::LightField found = EstimateScene(MadeUp(1.3F), options, &summary, nullptr);
+  EXPECT_EQ(summary.iterations, 7);
+  EXPECT_FALSE(summary.converged);
+  EXPECT_GT(summary.relative_residual, 1e-6);
+  EXPECT_THAT(summary.message, AllOf(HasSubstr("7 iterations"), HasSubstr("above the tolerance")));
+  EXPECT_EQ(found.values.size(), 9 * 40 * 36 * 3u);
+}
+
+TEST(SceneSolver, SaysWhenItAssumesTheNoise) {
+  EstimateInput input = MadeUp(0.4F, 1);
+  for (float& value : input.picture.values) value = 0.0005F;
+  SceneSummary summary;
+  EstimateScene(input, {}, &summary, nullptr);
+  EXPECT_THAT(summary.message, HasSubstr("1/255 is assumed"));
+  EXPECT_NEAR(summary.noise_sigma, 1.0 / 255, 1e-12);
+}
+
+TEST(SceneSolver, MapsTellBlurAndWhatIsHidden) {
+  const EstimateInput input = MadeUp(1.5F, 1);
+  SceneSummary summary;
+  SceneMaps maps;
+  const model::LightField found = EstimateScene(input, {}, &summary, &maps);
+  // Three places a step of 1.5 px apart: variance 2/3 of its square.
+  for (const float sigma : maps.blur_sigma_px) EXPECT_NEAR(sigma, 1.5 * std::sqrt(2.0 / 3), 1e-5);
+  ASSERT_EQ(maps.residual.size(), 40 * 36u);
+  ASSERT_EQ(maps.hidden_share.size(), 40 * 36u);
+  EXPECT_EQ(maps.hidden_share[20 * 40 + 20], 0);
+  EXPECT_EQ(maps.radiance.values, model::ViewPicture(found, 1, 1).values);
+  double squares = 0;
+  for (const float value : maps.residual) squares += static_cast<double>(value) * value;
+  EXPECT_NEAR(std::sqrt(squares / (40 * 36)), summary.residual_rms, 1e-6);
+}
+
+TEST(SceneSolver, ProgressNeverGoesBackAndMayStop) {
+  SceneOptions options;
+  int last = 0, all = 0;
+  options.progress = [&](int done, int total) {
+    EXPECT_GE(done, last);
+    EXPECT_LE(done, total);
+    last = done;
+    all = total;
+  };
+  SceneSummary summary;
+  EstimateScene(MadeUp(1.3F), options, &summary, nullptr);
+  EXPECT_EQ(last, all);
+  EXPECT_GT(all, 9);
+  options.progress = [](int, int) { throw Interrupted(); };
+  EXPECT_THROW(EstimateScene(MadeUp(1.3F), options, &summary, nullptr), Interrupted);
+}
+
+TEST(SceneSolver, RefusesWhatItCannotUse) {
+  SceneSummary summary;
+  const auto message = [&](const EstimateInput& input, const SceneOptions& options) {
+    return ErrorOf([&] { EstimateScene(input, options, &summary, nullptr); });
+  };
+  const EstimateInput good = MadeUp(0.5F);
+  EstimateInput input = good;
+  input.picture.values[3 * (5 * 40 + 7)] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(message(input, {}), AllOf(HasSubstr("picture"), HasSubstr("nan at (7, 5)")));
+  input = good;
+  input.weights(1, 2) = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(message(input, {}), HasSubstr("the weight of the view (2, 1) is inf"));
+  input = good;
+  input.weights *= 2;
+  EXPECT_THAT(message(input, {}), HasSubstr("sum to 2"));
+  input = good;
+  input.disparity.disparity[3] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(message(input, {}), HasSubstr("holes"));
+  input = good;
+  input.disparity.width_px = 39;
+  EXPECT_THAT(message(input, {}), AllOf(HasSubstr("39x36"), HasSubstr("40x36")));
+
+  SceneOptions options;
+  options.strength_rule = StrengthRule::kGiven;
+  EXPECT_THAT(message(good, options), HasSubstr("strength is 0"));
+  options = {};
+  options.tolerance = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(message(good, options), HasSubstr("tolerance is nan"));
+  options = {};
+  options.max_iterations = 0;
+  EXPECT_THAT(message(good, options), HasSubstr("max_iterations is 0"));
+  options = {};
+  options.memory_limit_mib = 1;
+  EXPECT_THAT(message(good, options),
+              AllOf(HasSubstr("memory limit 1 MiB"), HasSubstr("must be at least")));
+  options.memory_limit_mib = 1e5;
+  EXPECT_EQ(message(good, options), "(no error)");
+  EXPECT_GT(summary.predicted_memory_mib, 1);
+}
+
+TEST(SceneSolver, NamesOfPriors) {
+  for (const Prior prior : {Prior::kRidge, Prior::kGradient, Prior::kTotalVariation}) {
+    EXPECT_EQ(PriorFromName(PriorName(prior)), prior);
+  }
+  EXPECT_THAT(ErrorOf([] { PriorFromName("smooth"); }), HasSubstr("ridge, gradient or tv"));
+}
+
+}  // namespace
+}  // namespace thicklens::estimator
