@@ -1,0 +1,209 @@
+#include "scene_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "surface_taps.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Rows of the photograph that are summed together.
+constexpr int kBandRows = 8;
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+std::int32_t Floor(float x) {
+  const auto toward_zero = static_cast<std::int32_t>(x);
+  return toward_zero - (static_cast<float>(toward_zero) > x ? 1 : 0);
+}
+
+template <typename Choose>
+std::vector<float> OfCells(const DisparityMap& map, const Choose& choose) {
+  const std::size_t width = Index(map.width_px);
+  std::vector<float> chosen(map.disparity.size());
+  for (std::size_t i = 0; i + width + 1 < chosen.size(); ++i) {
+    const float* d = map.disparity.data() + i;
+    chosen[i] = choose(choose(d[0], d[1]), choose(d[width], d[width + 1]));
+  }
+  return chosen;
+}
+
+}  // namespace
+
+ViewRays::ViewRays(const DisparityMap& map, const std::vector<float>& lowest,
+                   const std::vector<float>& highest, const ViewDisparity& view, double a, double b)
+    : width_px_(map.width_px),
+      shift_x_(static_cast<float>(a * map.step.x())),
+      shift_y_(static_cast<float>(b * map.step.y())) {
+  disparity_.reserve(view.disparity.size() + kMargin);
+  disparity_ = view.disparity;
+  disparity_.resize(view.disparity.size() + kMargin, 0.0F);
+  const double tolerance = SurfaceTolerance(map);
+  const auto room = static_cast<float>(tolerance);
+  std::size_t i = 0;
+  for (int y = 0; y < map.height_px; ++y) {
+    run_start_.push_back(runs_.size());
+    odd_start_.push_back(odd_.size());
+    for (int x = 0; x < map.width_px; ++x, ++i) {
+      const float d = view.disparity[i];
+      const std::int32_t step_x = Floor(shift_x_ * d), step_y = Floor(shift_y_ * d);
+      const int cell_x = x + step_x, cell_y = y + step_y;
+      bool plain = view.seen[i] == Seen::kSeen && cell_x >= 0 && cell_x + 1 < map.width_px &&
+                   cell_y >= 0 && cell_y + 1 < map.height_px;
+      if (plain) {
+        const std::size_t cell = Index(cell_y) * Index(map.width_px) + Index(cell_x);
+        plain = highest[cell] - d <= room && d - lowest[cell] <= room;
+      }
+      if (!plain) {
+        AddOdd(map, tolerance, view, i);
+        continue;
+      }
+      const bool goes_on = runs_.size() > run_start_.back() &&
+                           runs_.back().x + runs_.back().count == x &&
+                           runs_.back().step_x == step_x && runs_.back().step_y == step_y;
+      if (!goes_on) runs_.push_back({x, 0, step_x, step_y});
+      ++runs_.back().count;
+    }
+  }
+  run_start_.push_back(runs_.size());
+  odd_start_.push_back(odd_.size());
+  runs_.shrink_to_fit();
+  odd_.shrink_to_fit();
+}
+
+void ViewRays::AddOdd(const DisparityMap& map, double tolerance, const ViewDisparity& view,
+                      std::size_t i) {
+  const std::size_t x = i % Index(map.width_px), y = i / Index(map.width_px);
+  const SurfaceTaps taps =
+      TapsAt(map, tolerance, static_cast<double>(x) + static_cast<double>(view.source_x[i]),
+             static_cast<double>(y) + static_cast<double>(view.source_y[i]), view.disparity[i]);
+  OddRay ray;
+  ray.x = static_cast<std::int32_t>(x);
+  ray.pixel.fill(static_cast<std::int32_t>(taps.pixel[0]));
+  for (std::size_t t = 0; t < Index(taps.count); ++t) {
+    ray.pixel[t] = static_cast<std::int32_t>(taps.pixel[t]);
+    ray.weight[t] = static_cast<float>(taps.weight[t]);
+  }
+  odd_.push_back(ray);
+  disparity_[i] = 0;
+}
+
+RayRow ViewRays::RowOf(int row) const {
+  return {disparity_.data() + Index(row) * Index(width_px_),
+          shift_x_,
+          shift_y_,
+          runs_.data() + run_start_[Index(row)],
+          runs_.data() + run_start_[Index(row) + 1],
+          width_px_};
+}
+
+void ViewRays::Warp(int row, const float* picture, float* warped) const {
+  WarpRow(RowOf(row), picture + Index(row) * Index(width_px_), warped);
+  for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
+    const OddRay& ray = odd_[n];
+    float sum = 0;
+    for (std::size_t t = 0; t < 4; ++t) sum += ray.weight[t] * picture[ray.pixel[t]];
+    warped[ray.x] = sum;
+  }
+}
+
+void ViewRays::Spread(int row, const float* values, float* picture) const {
+  SpreadRow(RowOf(row), values, picture + Index(row) * Index(width_px_));
+  for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
+    const OddRay& ray = odd_[n];
+    for (std::size_t t = 0; t < 4; ++t) picture[ray.pixel[t]] += ray.weight[t] * values[ray.x];
+  }
+}
+
+double ViewRays::bytes() const {
+  return static_cast<double>(disparity_.capacity() * sizeof(float) +
+                             runs_.capacity() * sizeof(RayRun) + odd_.capacity() * sizeof(OddRay) +
+                             2 * run_start_.capacity() * sizeof(std::size_t));
+}
+
+SceneRays::SceneRays(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
+                     const std::function<void()>& progress)
+    : width_px_(disparity.width_px),
+      height_px_(disparity.height_px),
+      threads_(threads),
+      views_(static_cast<std::size_t>(weights.size())) {
+  const auto u_count = static_cast<int>(weights.cols()), v_count = static_cast<int>(weights.rows());
+  for (int l = 0; l < v_count; ++l) {
+    for (int k = 0; k < u_count; ++k) weights_.push_back(static_cast<float>(weights(l, k)));
+  }
+  const std::vector<float> lowest =
+      OfCells(disparity, [](float a, float b) { return std::min(a, b); });
+  const std::vector<float> highest =
+      OfCells(disparity, [](float a, float b) { return std::max(a, b); });
+  const DisparityRenderer renderer(disparity);
+  model::ParallelFor(u_count * v_count, threads, [&](int view) {
+    if (progress) progress();
+    if (!(weights_[Index(view)] > 0)) return;
+    const double a = view % u_count - (u_count - 1) / 2.0;
+    const double b = view / u_count - (v_count - 1) / 2.0;
+    views_[Index(view)] = ViewRays(disparity, lowest, highest, renderer.Render(a, b), a, b);
+  });
+  const std::size_t bands = Index((height_px_ + kBandRows - 1) / kBandRows);
+  rows_.resize(std::max(bands, views_.size()) * (Index(width_px_) + ViewRays::kMargin));
+}
+
+std::size_t SceneRays::plane_stride() const {
+  constexpr std::size_t kMultiple = ViewRays::kMargin;
+  return (pixels() + kMultiple - 1) / kMultiple * kMultiple + ViewRays::kMargin;
+}
+
+void SceneRays::Apply(const float* planes, std::size_t stride, float* photograph) {
+  const std::size_t width = Index(width_px_);
+  const int bands = (height_px_ + kBandRows - 1) / kBandRows;
+  model::ParallelFor(bands, threads_, [&](int band) {
+    const int first = band * kBandRows, last = std::min(height_px_, first + kBandRows);
+    float* warped = rows_.data() + Index(band) * (width + ViewRays::kMargin);
+    std::fill(photograph + Index(first) * width, photograph + Index(last) * width, 0.0F);
+    for (std::size_t k = 0; k < views_.size(); ++k) {
+      const float weight = weights_[k];
+      if (!(weight > 0)) continue;
+      for (int y = first; y < last; ++y) {
+        views_[k].Warp(y, planes + k * stride, warped);
+        float* sum = photograph + Index(y) * width;
+        for (std::size_t x = 0; x < width; ++x) sum[x] += weight * warped[x];
+      }
+    }
+  });
+}
+
+void SceneRays::ApplyTransposed(const float* photograph, float* planes) {
+  const std::size_t width = Index(width_px_), stride = plane_stride();
+  model::ParallelFor(static_cast<int>(views_.size()), threads_, [&](int view) {
+    const std::size_t k = Index(view);
+    float* plane = planes + k * stride;
+    std::fill(plane, plane + stride, 0.0F);
+    const float weight = weights_[k];
+    if (!(weight > 0)) return;
+    float* values = rows_.data() + k * (width + ViewRays::kMargin);
+    for (int y = 0; y < height_px_; ++y) {
+      const float* row = photograph + Index(y) * width;
+      for (std::size_t x = 0; x < width; ++x) values[x] = weight * row[x];
+      views_[k].Spread(y, values, plane);
+    }
+  });
+}
+
+void SceneRays::Show(std::size_t k, const float* plane, float* shown) const {
+  const std::size_t width = Index(width_px_);
+  std::vector<float> warped(width + ViewRays::kMargin);
+  for (int y = 0; y < height_px_; ++y) {
+    views_[k].Warp(y, plane, warped.data());
+    std::copy(warped.begin(), warped.begin() + static_cast<std::ptrdiff_t>(width),
+              shown + Index(y) * width);
+  }
+}
+
+double SceneRays::bytes() const {
+  double sum = static_cast<double>(rows_.capacity() * sizeof(float));
+  for (const ViewRays& view : views_) sum += view.bytes();
+  return sum;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,78 @@
+#include "estimator/plain_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace thicklens::estimator::testing {
+
+Eigen::MatrixXd ViewMatrix(const DisparityMap& map, double a, double b) {
+  const ViewDisparity view = RenderDisparity(map, a, b);
+  const double tolerance = 0.3 / map.step.cwiseAbs().maxCoeff();
+  const int pixels = map.width_px * map.height_px;
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(pixels, pixels);
+  for (int i = 0; i < pixels; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double x =
+        std::clamp<double>(i % map.width_px + double{view.source_x[at]}, 0, map.width_px - 1);
+    const double y =
+        std::clamp<double>(i / map.width_px + double{view.source_y[at]}, 0, map.height_px - 1);
+    double closest = 1e300;
+    int closest_pixel = 0;
+    for (const int corner : {0, 1, map.width_px, map.width_px + 1}) {
+      const int n = static_cast<int>(y) * map.width_px + static_cast<int>(x) + corner;
+      if (n >= pixels) continue;
+      const double hat = std::max(0.0, 1 - std::abs(x - n % map.width_px)) *
+                         std::max(0.0, 1 - std::abs(y - n / map.width_px));
+      if (!(hat > 0)) continue;
+      const double apart =
+          std::abs(double{map.disparity[static_cast<std::size_t>(n)]} - view.disparity[at]);
+      if (apart < closest) {
+        closest = apart;
+        closest_pixel = n;
+      }
+      if (apart <= tolerance) matrix(i, n) = hat;
+    }
+    const double sum = matrix.row(i).sum();
+    if (sum > 0) {
+      matrix.row(i) /= sum;
+    } else {
+      matrix(i, closest_pixel) = 1;
+    }
+  }
+  return matrix;
+}
+
+Eigen::MatrixXd PhotographMatrix(const DisparityMap& map, const Eigen::ArrayXXd& weights) {
+  const int pixels = map.width_px * map.height_px;
+  Eigen::MatrixXd h = Eigen::MatrixXd::Zero(pixels, pixels * weights.size());
+  for (Eigen::Index l = 0; l < weights.rows(); ++l) {
+    for (Eigen::Index k = 0; k < weights.cols(); ++k) {
+      const double a = static_cast<double>(k) - static_cast<double>(weights.cols() - 1) / 2;
+      const double b = static_cast<double>(l) - static_cast<double>(weights.rows() - 1) / 2;
+      h.middleCols((l * weights.cols() + k) * pixels, pixels) =
+          weights(l, k) * ViewMatrix(map, a, b);
+    }
+  }
+  return h;
+}
+
+Eigen::MatrixXd DifferenceMatrix(int u_count, int v_count) {
+  const int across = (u_count - 1) * v_count, down = u_count * (v_count - 1);
+  Eigen::MatrixXd d = Eigen::MatrixXd::Zero(across + down, u_count * v_count);
+  int row = 0;
+  for (int l = 0; l < v_count; ++l) {
+    for (int k = 0; k + 1 < u_count; ++k, ++row) {
+      d(row, l * u_count + k) = -1;
+      d(row, l * u_count + k + 1) = 1;
+    }
+  }
+  for (int l = 0; l + 1 < v_count; ++l) {
+    for (int k = 0; k < u_count; ++k, ++row) {
+      d(row, l * u_count + k) = -1;
+      d(row, (l + 1) * u_count + k) = 1;
+    }
+  }
+  return d;
+}
+
+}  // namespace thicklens::estimator::testing
