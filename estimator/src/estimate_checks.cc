@@ -1,0 +1,128 @@
+#include "thicklens/estimator/estimate_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "thicklens/error.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr int kPatchPx = 32;
+constexpr double kFarAbove = 4;
+constexpr float kMostHidden = 0.01F;
+
+std::size_t Index(int width_px, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
+         static_cast<std::size_t>(x);
+}
+
+// The upper one where there are two.
+template <typename Number>
+Number Median(std::vector<Number>* values) {
+  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+// Of a large map, every so many rows and columns tell enough.
+int StrideFor(int width_px, int height_px) {
+  constexpr double kEnough = 1 << 20;
+  return std::max(1, static_cast<int>(std::sqrt(width_px * 1.0 * height_px / kEnough)));
+}
+
+struct Patch {
+  ResidualPatch place;
+  int counted = 0;
+};
+
+Patch MeasurePatch(const std::vector<float>& residual, const std::vector<float>& hidden_share,
+                   int width_px, const ResidualPatch& place) {
+  Patch patch{place};
+  double sum = 0;
+  for (int y = place.y; y < place.y + place.height_px; ++y) {
+    for (int x = place.x; x < place.x + place.width_px; ++x) {
+      const std::size_t i = Index(width_px, x, y);
+      if (hidden_share[i] > kMostHidden) continue;
+      sum += static_cast<double>(residual[i]) * static_cast<double>(residual[i]);
+      ++patch.counted;
+    }
+  }
+  if (patch.counted > 0) patch.place.rms = std::sqrt(sum / patch.counted);
+  return patch;
+}
+
+}  // namespace
+
+StepCheck CheckSteps(const DisparityMap& map, const Eigen::Vector2d& landing_step_px) {
+  StepCheck check;
+  std::size_t known = 0, beyond = 0;
+  for (const float disparity : map.disparity) {
+    if (std::isnan(disparity)) continue;
+    ++known;
+    const Eigen::Vector2d step_px = static_cast<double>(disparity) * map.step - landing_step_px;
+    const double largest_px = step_px.cwiseAbs().maxCoeff();
+    check.largest_px = std::max(check.largest_px, largest_px);
+    if (largest_px > kLargestStepPx) ++beyond;
+  }
+  if (known > 0) check.share = static_cast<double>(beyond) / static_cast<double>(known);
+  return check;
+}
+
+std::optional<double> DepthNoisePx(const DisparityMap& map) {
+  // Of normal noise: standard deviation of a second difference, and of that the median |.|.
+  const double kMedianOfUnitNoise = 0.6745 * std::sqrt(6.0);
+  const int stride = StrideFor(map.width_px, map.height_px);
+  std::vector<float> second;
+  const auto add = [&](float before, float at, float after) {
+    const float difference = std::abs(before - 2 * at + after);
+    if (!std::isnan(difference)) second.push_back(difference);
+  };
+  const auto value = [&](int x, int y) { return map.disparity[Index(map.width_px, x, y)]; };
+  for (int y = 0; y < map.height_px; y += stride) {
+    for (int x = 0; x < map.width_px; x += stride) {
+      if (x > 0 && x + 1 < map.width_px) add(value(x - 1, y), value(x, y), value(x + 1, y));
+      if (y > 0 && y + 1 < map.height_px) add(value(x, y - 1), value(x, y), value(x, y + 1));
+    }
+  }
+  if (second.empty()) return std::nullopt;
+  return static_cast<double>(Median(&second)) / kMedianOfUnitNoise * map.step.cwiseAbs().maxCoeff();
+}
+
+std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
+                                           const std::vector<float>& hidden_share, int width_px,
+                                           int height_px, double noise_sigma) {
+  const std::size_t pixels =
+      static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  if (residual.size() != pixels || hidden_share.size() != pixels) {
+    throw Error(fmt::format(
+        "residual and hidden_share have {} and {} values: they must have {}, one a pixel",
+        residual.size(), hidden_share.size(), pixels));
+  }
+  std::vector<ResidualPatch> patches;
+  std::vector<double> all;
+  for (int y = 0; y < height_px; y += kPatchPx) {
+    for (int x = 0; x < width_px; x += kPatchPx) {
+      const Patch patch = MeasurePatch(
+          residual, hidden_share, width_px,
+          {x, y, std::min(kPatchPx, width_px - x), std::min(kPatchPx, height_px - y), 0});
+      if (4 * patch.counted < patch.place.width_px * patch.place.height_px) continue;
+      all.push_back(patch.place.rms);
+      patches.push_back(patch.place);
+    }
+  }
+  if (all.empty()) return {};
+  const double usual = kFarAbove * std::max(noise_sigma, Median(&all));
+  patches.erase(
+      std::remove_if(patches.begin(), patches.end(),
+                     [usual](const ResidualPatch& patch) { return !(patch.rms > usual); }),
+      patches.end());
+  std::stable_sort(patches.begin(), patches.end(),
+                   [](const ResidualPatch& a, const ResidualPatch& b) { return a.rms > b.rms; });
+  return patches;
+}
+
+}  // namespace thicklens::estimator
