@@ -18,6 +18,7 @@ constexpr char kSchema[] = "thicklens/light-field/1";
 constexpr char kDisparityIs[] = "px per view step, near positive";
 constexpr int kMaxImageSizePx = 100000;
 constexpr int kMaxViews = 1000;  // along u, and along v
+constexpr int kMaxIterations = 1000000000;
 constexpr double kWeightSumTolerance = 1e-6;
 
 Eigen::Vector2d ReadPoint(const YamlNode& node) {
@@ -116,11 +117,14 @@ std::optional<double> NonNegativeOrNothing(const YamlNode& node, const char* key
 }
 
 LightFieldOrigin ReadOrigin(const YamlNode& node) {
-  node.RequireKeys({"method", "block_solver", "stencil", "splat", "device", "block_px", "gamma",
-                    "ridge", "seconds", "relative_residual", "rcond_min", "effects", "version",
-                    "date"});
+  node.RequireKeys({"method", "prior", "strength", "noise_sigma", "block_solver", "stencil",
+                    "splat", "device", "block_px", "gamma", "ridge", "seconds", "iterations",
+                    "relative_residual", "rcond_min", "effects", "version", "date"});
   LightFieldOrigin origin;
   origin.method = TextOrNothing(node, "method");
+  origin.prior = TextOrNothing(node, "prior");
+  origin.strength = NonNegativeOrNothing(node, "strength");
+  origin.noise_sigma = NonNegativeOrNothing(node, "noise_sigma");
   origin.block_solver = TextOrNothing(node, "block_solver");
   origin.stencil = TextOrNothing(node, "stencil");
   origin.splat = TextOrNothing(node, "splat");
@@ -130,6 +134,8 @@ LightFieldOrigin ReadOrigin(const YamlNode& node) {
   origin.gamma = NonNegativeOrNothing(node, "gamma");
   origin.ridge = NonNegativeOrNothing(node, "ridge");
   origin.seconds = NonNegativeOrNothing(node, "seconds");
+  if (const auto iterations = node.Find("iterations"))
+    origin.iterations = iterations->Integer(0, kMaxIterations);
   origin.relative_residual = NonNegativeOrNothing(node, "relative_residual");
   origin.rcond_min = NonNegativeOrNothing(node, "rcond_min");
   if (const auto effects = node.Find("effects")) {
@@ -231,6 +237,9 @@ class Writer {
     const LightFieldOrigin& origin = light_field_.origin;
     out_ << YAML::Key << "origin" << YAML::Value << YAML::BeginMap;
     TextIfAny("method", origin.method);
+    TextIfAny("prior", origin.prior);
+    NumberIfAny("strength", origin.strength);
+    NumberIfAny("noise_sigma", origin.noise_sigma);
     TextIfAny("block_solver", origin.block_solver);
     TextIfAny("stencil", origin.stencil);
     TextIfAny("splat", origin.splat);
@@ -239,6 +248,7 @@ class Writer {
     NumberIfAny("gamma", origin.gamma);
     NumberIfAny("ridge", origin.ridge);
     NumberIfAny("seconds", origin.seconds);
+    if (origin.iterations) Text("iterations", std::to_string(*origin.iterations));
     NumberIfAny("relative_residual", origin.relative_residual);
     NumberIfAny("rcond_min", origin.rcond_min);
     if (!origin.effects.empty()) List("effects", origin.effects);

@@ -151,6 +151,8 @@ TEST(LightFieldFile, TheOriginIsChecked) {
   EXPECT_THAT(ErrorWithMore("origin: {gamma: -1}\n"), HasSubstr("origin.gamma: must be >= 0"));
   EXPECT_THAT(ErrorWithMore("origin: {block_px: 0}\n"), HasSubstr("origin.block_px"));
   EXPECT_THAT(ErrorWithMore("origin: {seconds: inf}\n"), HasSubstr("origin.seconds"));
+  EXPECT_THAT(ErrorWithMore("origin: {strength: -1}\n"), HasSubstr("origin.strength"));
+  EXPECT_THAT(ErrorWithMore("origin: {iterations: 1.5}\n"), HasSubstr("origin.iterations"));
   EXPECT_THAT(ErrorWithMore("origin: {effects: defocus}\n"), HasSubstr("a list"));
 }
 
@@ -185,7 +187,9 @@ LightFieldDescription Everything() {
                         1.1,          1e-2 / 6,
                         12.0 / 7,     1e-13,
                         1.0 / 3e5,    {"defocus", "falloff"},
-                        "0.2.0",      "2024-01-02T03:04:05Z"};
+                        "0.2.0",      "2024-01-02T03:04:05Z",
+                        "tv",         1.7e-3 / 7,
+                        1.0 / 255,    57};
   description.view_format = "tiff";
   description.camera_file = "a camera: #1.yaml";
   return description;
@@ -227,6 +231,10 @@ TEST(LightFieldFile, RoundTripKeepsEveryBit) {
   EXPECT_EQ(b.origin.splat, "bilinear");
   EXPECT_EQ(b.origin.device, "opencl:0:0");
   EXPECT_EQ(b.origin.block_px, a.origin.block_px);
+  EXPECT_EQ(b.origin.prior, "tv");
+  EXPECT_TRUE(SameBits(b.origin.strength.value(), *a.origin.strength));
+  EXPECT_TRUE(SameBits(b.origin.noise_sigma.value(), *a.origin.noise_sigma));
+  EXPECT_EQ(b.origin.iterations, a.origin.iterations);
   EXPECT_EQ(b.origin.gamma, a.origin.gamma);
   EXPECT_EQ(b.origin.ridge, a.origin.ridge);
   EXPECT_EQ(b.origin.seconds, a.origin.seconds);

@@ -84,6 +84,32 @@ TEST_F(Records, EstimateIsRead) {
   EXPECT_THAT(record.effects, Optional(ElementsAre("defocus", "falloff")));
 }
 
+TEST_F(Records, EstimateOfTheSceneIsRead) {
+  const EstimateRecord record = ParseEstimateRecord(R"({
+    "status": "ok", "solver": "scene", "block_solver": null, "prior": "tv", "strength": 0.0017,
+    "strength_rule": "auto", "noise_sigma": 0.004, "residual_rms": 0.005, "row_share": 0.25,
+    "hidden_share": 0.125, "iterations": 57, "converged": false, "rcond_min": null,
+    "views": [7, 5], "size": [64, 48], "seconds": {"files": 1.5}})",
+                                                    "e.json");
+  EXPECT_EQ(record.solver, "scene");
+  EXPECT_EQ(record.block_solver, "");
+  EXPECT_EQ(record.prior, "tv");
+  EXPECT_EQ(record.strength_rule, "auto");
+  EXPECT_THAT(record.strength, Optional(0.0017));
+  EXPECT_THAT(record.noise_sigma, Optional(0.004));
+  EXPECT_THAT(record.residual_rms, Optional(0.005));
+  EXPECT_THAT(record.row_share, Optional(0.25));
+  EXPECT_THAT(record.hidden_share, Optional(0.125));
+  EXPECT_THAT(record.iterations, Optional(57));
+  EXPECT_THAT(record.converged, Optional(false));
+  EXPECT_THAT(record.files_seconds, Optional(1.5));
+  EXPECT_FALSE(record.rcond_min.has_value());
+  EXPECT_FALSE(record.solve_seconds.has_value());
+  EXPECT_THAT(EstimateError(R"({"solver": "scene", "views": [1, 2], "size": [3, 4],
+                                "converged": 1})"),
+              AllOf(HasSubstr("r.json"), HasSubstr("converged"), HasSubstr("true or false")));
+}
+
 TEST_F(Records, ComparisonIsRead) {
   const ComparisonRecord record = ReadComparisonRecord(folder_.Put("c.json", kComparison));
   EXPECT_EQ(record.mean.psnr_db, 31.25);

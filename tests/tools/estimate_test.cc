@@ -1,4 +1,5 @@
-// thicklens estimate as a person meets it, alone and in the protocol with a known light field.
+// thicklens estimate as a person meets it, by blocks, alone and in the protocol with a known light
+// field. The solver of the whole scene: estimate_scene_test.cc.
 #include "thicklens/estimator/estimate.h"
 
 #include <gmock/gmock.h>
@@ -90,7 +91,7 @@ class EstimateTest : public ::testing::Test {
 
   ProgramResult Run(Arguments arguments) const {
     arguments.insert(arguments.begin(), "estimate");
-    arguments.insert(arguments.end(), {"-o", Output()});
+    arguments.insert(arguments.end(), {"--solver", "blocks", "-o", Output()});
     return ChildProgram(arguments, scratch_.path(), 0).Wait();
   }
   model::LightField Estimated(Arguments arguments) const {
@@ -148,6 +149,11 @@ TEST_F(EstimateTest, WritesALightFieldThatSaysHowItWasMade) {
   EXPECT_EQ(summary["device"], "cpu");
   EXPECT_EQ(summary["block_px"], 16);
   EXPECT_EQ(summary["effects"], nlohmann::json({"defocus"}));
+  EXPECT_EQ(summary["prior"], "ridge");
+  EXPECT_EQ(summary["strength"], summary["ridge"]);
+  for (const char* of_scene :
+       {"noise_sigma", "iterations", "converged", "row_share", "hidden_share", "residual_rms"})
+    EXPECT_TRUE(summary.at(of_scene).is_null()) << of_scene;
   EXPECT_GT(summary["peak_rss_mib"].get<double>(), 10);
   EXPECT_GT(summary["seconds"]["total"].get<double>(), 0);
   EXPECT_LT(summary["relative_residual"].get<double>(), 1e-12);
@@ -256,7 +262,7 @@ TEST_F(EstimateTest, HolesAreFilledAndCounted) {
   });
   const ProgramResult result = Run(With(AsDisparity(Picture(), depth), {"--json", json}));
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("15 px, filled"));
+  EXPECT_THAT(result.out, HasSubstr("15 px, filled from the farthest neighbour (1.5 %)"));
   EXPECT_EQ(nlohmann::json::parse(ContentOf(json))["holes_filled"], 15);
 }
 
@@ -292,10 +298,14 @@ TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
   EXPECT_THAT(Refusal(With(relative, {"--grid", "9"}), 2), HasSubstr("--aperture-of"));
   EXPECT_THAT(Refusal(With(relative, {"--aperture-of", "x", "--aperture-shape", "disc"}), 2),
               HasSubstr("exclude"));
-  EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--camera", Camera(),
-                       "--transfer", "linear"},
-                      2),
-              HasSubstr("--transfer"));
+  for (const Arguments& of_scene : std::vector<Arguments>{{"--prior", "tv"},
+                                                          {"--strength", "auto"},
+                                                          {"--tolerance", "1e-3"},
+                                                          {"--max-iterations", "9"},
+                                                          {"--double"}}) {
+    EXPECT_THAT(Refusal(With(relative, of_scene), 2),
+                HasSubstr(of_scene.front() + " is of --solver scene, the solver is blocks"));
+  }
   EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "100x3"}, 2),
               HasSubstr("from 1 to 99"));
 }
@@ -382,7 +392,8 @@ TEST_F(EstimateTest, AnInterruptLeavesNothing) {
   }
   Arguments arguments = With({"estimate"}, AsDisparity(folder_.Put("large.png", EncodePng(picture)),
                                                        folder_.Put("large.pfm", EncodePfm(map))));
-  arguments = With(arguments, {"-o", Output(), "--views", "7x7", "--verbose"});
+  arguments =
+      With(arguments, {"--solver", "blocks", "-o", Output(), "--views", "7x7", "--verbose"});
   arguments.erase(std::find(arguments.begin(), arguments.end(), "3x3") - 1,
                   std::find(arguments.begin(), arguments.end(), "3x3") + 1);
   ChildProgram program(arguments, scratch_.path(), 0);

@@ -111,6 +111,14 @@ EstimateRecord Estimate() {
   return record;
 }
 
+estimator::SceneMaps Maps() {
+  estimator::SceneMaps maps;
+  maps.residual.assign(kS * kT, 0.0F);
+  maps.hidden_share.assign(kS * kT, 0.0F);
+  maps.blur_sigma_px.assign(kS * kT, 0.0F);
+  return maps;
+}
+
 // The page without its pictures: their base64 holds any short text.
 std::string WithoutPictures(const std::string& html) {
   std::string text;
@@ -491,6 +499,11 @@ TEST_F(LightFieldPageTest, RefocusesToDisparitiesWithoutACamera) {
   for (const char* label : {"+1.50 px<", "+0.75 px<", "+0.00 px<", "−0.75 px<", "−1.50 px<"})
     EXPECT_THAT(html, HasSubstr(label));
   EXPECT_LT(html.find("+1.50 px<"), html.find("−1.50 px<"));  // the near first
+  PageDepth small = *input_.depth;
+  for (float& value : small.values) value /= 100;
+  std::swap(small, *input_.depth);
+  EXPECT_THAT(Html(), AllOf(HasSubstr("+0.015 px<"), HasSubstr("−0.007 px<")));
+  std::swap(small, *input_.depth);
   const cv::Mat mean = PictureOf(ParseXml(Page().html), "Refocused to +0.00 px");
   double light = 0;
   for (int l = 0; l < 3; ++l)
@@ -514,6 +527,109 @@ TEST_F(LightFieldPageTest, DepthsAreColouredAndHolesCounted) {
   EXPECT_THAT(Html(), AllOf(HasSubstr("Refocused to 400 mm"), Not(HasSubstr("Hatched"))));
   input_.depth->values.assign(kS * kT, kNan);
   EXPECT_THAT(Html(), AllOf(HasSubstr("100.0 %"), Not(HasSubstr("Refocused"))));
+}
+
+// The residual in greys, mid grey where it is 0; 99 of 100 pixels within 10 grey levels.
+TEST_F(LightFieldPageTest, TheResidualIsSigned) {
+  estimator::SceneMaps maps = Maps();
+  input_.maps = &maps;
+  for (std::size_t i = 0; i < maps.residual.size(); ++i) {
+    maps.residual[i] = static_cast<float>((i % 17 == 0 ? 6.0 : 0.0) / 255);
+  }
+  maps.residual[0] = 1;
+  maps.residual[1] = -1;
+  maps.residual[2] = -5.0F / 255;
+  const cv::Mat map = PictureOf(ParseXml(Page().html), "Residual of the photograph");
+  ASSERT_EQ(map.size(), cv::Size(kS, kT));
+  const auto* row = map.ptr<unsigned char>(0);
+  const int step = map.channels();
+  EXPECT_EQ(row[0], 255);
+  EXPECT_EQ(row[step], 0);
+  EXPECT_NEAR(row[2 * step], 128 - 127 / 2, 1);
+  EXPECT_EQ(row[3 * step], 128);
+  EXPECT_NEAR(row[17 * step], 128 + 127 * 0.6, 1);
+  EXPECT_THAT(Html(), AllOf(HasSubstr("The colours from -10 to 10 grey levels"),
+                            Not(HasSubstr("Its rms is"))));
+  input_.estimate = Estimate();
+  input_.estimate->residual_rms = 1.5 / 255;
+  input_.estimate->noise_sigma = 1.25 / 255;
+  EXPECT_THAT(Html(),
+              AllOf(HasSubstr("Its rms is 1.50 grey levels"), HasSubstr("noise 1.25 per channel")));
+}
+
+TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
+  estimator::SceneMaps maps = Maps();
+  input_.maps = &maps;
+  // Rows: 12 of 24 seen, 6 blurred, 3 partly seen, 3 filled in (of these one blurred as well).
+  for (std::size_t i = 0; i < maps.hidden_share.size(); ++i) {
+    const std::size_t y = i / kS;
+    maps.blur_sigma_px[i] = y < 6 || y == 23 ? 3.5F : 2.5F;
+    maps.hidden_share[i] = y >= 21 ? 0.75F : y >= 18 ? 0.25F : 0.005F;
+  }
+  const std::string html = Html();
+  EXPECT_THAT(html, AllOf(HasSubstr("the centre view shows (50.0 %)"),
+                          HasSubstr("some rays come past an edge or the border (12.5 %)"),
+                          HasSubstr("for fine detail (25.0 %)"),
+                          HasSubstr("most rays come past an edge or the border (12.5 %)")));
+  const cv::Mat map = PictureOf(ParseXml(Page().html), "Confidence of the estimate");
+  ASSERT_EQ(map.size(), cv::Size(kS, kT));
+  const auto at = [&](int y, int c) {
+    return static_cast<int>(map.ptr<unsigned char>(y)[3 * 5 + c]);
+  };
+  EXPECT_GT(at(3, 2), at(3, 0) + 60);    // blue
+  EXPECT_EQ(at(12, 0), at(12, 2));       // grey
+  EXPECT_GT(at(19, 1), at(19, 2) + 40);  // yellow
+  EXPECT_GT(at(19, 0), at(19, 2) + 60);
+  EXPECT_GT(at(22, 0), at(22, 1) + 60);  // red
+  EXPECT_GT(at(23, 0), at(23, 1) + 60);
+}
+
+TEST_F(LightFieldPageTest, TheMosaicHasEachViewInItsPlace) {
+  input_.mosaic = true;
+  const XmlDocument document = ParseXml(Page().html);
+  const cv::Mat mosaic = PictureOf(document, "Mosaic of the views");
+  constexpr int kGap = 2;
+  ASSERT_EQ(mosaic.size(), cv::Size(3 * kS + 2 * kGap, 3 * kT + 2 * kGap));
+  const model::TransferCurve srgb = model::TransferCurve::Srgb();
+  const std::size_t sample = light_field_.ViewStart(1, 2, 1) + 7 * kS + 9;
+  EXPECT_EQ(mosaic.ptr<unsigned char>(kT + kGap + 7)[3 * (2 * (kS + kGap) + 9) + 1],
+            std::lround(255 * srgb.Encode(light_field_.values[sample])));
+  EXPECT_EQ(mosaic.ptr<unsigned char>(kT)[3 * 9 + 1], 0);  // between the views
+  EXPECT_THAT(Html(), Not(HasSubstr("alt=\"View u")));
+  light_field_.present.assign(9, true);
+  light_field_.present[0] = false;
+  EXPECT_EQ(PictureOf(ParseXml(Page().html), "Mosaic of the views").size(), mosaic.size());
+}
+
+TEST_F(LightFieldPageTest, WarningsStandInTheSummary) {
+  input_.warnings = {"first <b>", "second"};
+  const std::string html = Html();
+  EXPECT_THAT(html, HasSubstr("<ul class=\"warnings\">\n<li>first &lt;b&gt;</li>\n<li>second"));
+  EXPECT_LT(html.find("<li>first"), html.find("</section>"));
+}
+
+TEST_F(LightFieldPageTest, AnEstimateOfTheSceneInWords) {
+  light_field_.origin.method = "scene";
+  light_field_.origin.prior = "tv";
+  light_field_.origin.strength = 0.00125;
+  light_field_.origin.noise_sigma = 0.5 / 255;
+  light_field_.origin.iterations = 57;
+  EXPECT_THAT(Html(), AllOf(HasSubstr("by the solver scene (prior tv)."),
+                            HasSubstr("<td>total variation</td>"), HasSubstr("<td>0.00125</td>"),
+                            HasSubstr("<td>0.50 grey levels</td>"), HasSubstr("<td>57</td>")));
+  input_.estimate = Estimate();
+  input_.estimate->block_solver = "";
+  input_.estimate->block_px.reset();
+  input_.estimate->prior = "gradient";
+  input_.estimate->strength = 0.5;
+  input_.estimate->strength_rule = "gcv";
+  input_.estimate->iterations = 9;
+  input_.estimate->converged = false;
+  input_.estimate->hidden_share = 0.125;
+  input_.estimate->files_seconds = 2.5;
+  EXPECT_THAT(Html(), AllOf(HasSubstr("<td>gradient</td>"), HasSubstr("<td>0.5 (gcv)</td>"),
+                            HasSubstr("<td>9, not converged</td>"), HasSubstr("<td>12.5 %</td>"),
+                            HasSubstr("views 0.50, files 2.50</td>")));
 }
 
 TEST_F(LightFieldPageTest, TheSweepNamesItsEndsAndFocus) {

@@ -10,7 +10,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "build_info.h"
@@ -22,6 +21,7 @@
 #include "option_values.h"
 #include "printable_text.h"
 #include "progress_line.h"
+#include "report_folder.h"
 #include "sweep_input.h"
 #include "sweep_understanding.h"
 #include "thicklens/error.h"
@@ -49,28 +49,6 @@ struct CalibrateOptions {
   std::string figures_path() const {
     return report_folder.empty() ? "" : (fs::path(report_folder) / "figures").string();
   }
-};
-
-// A folder that is made if it is missing, and goes again if nothing came into it.
-class ReportFolder {
- public:
-  explicit ReportFolder(const std::string& path) : path_(path) {
-    std::error_code failure;
-    if (path.empty() || fs::exists(path, failure)) return;
-    made_ = fs::create_directory(path, failure);
-    if (failure)
-      throw Error(fmt::format("{}: the folder cannot be made: {}", path, failure.message()));
-  }
-  ~ReportFolder() {
-    std::error_code not_empty;
-    if (made_) fs::remove(path_, not_empty);
-  }
-  ReportFolder(const ReportFolder&) = delete;
-  ReportFolder& operator=(const ReportFolder&) = delete;
-
- private:
-  fs::path path_;
-  bool made_ = false;
 };
 
 // The sign by which a folder of figures is known as ours.

@@ -49,6 +49,13 @@ class Fields {
     return AsCount(object_->at(key), Name(key), 0, kMaxCount);
   }
 
+  std::optional<bool> YesOrNo(const char* key) const {
+    if (!Has(key)) return std::nullopt;
+    const json& value = object_->at(key);
+    if (!value.is_boolean()) Complain(Name(key), "true or false", value);
+    return value.get<bool>();
+  }
+
   std::string Text(const char* key) const {
     if (!Has(key)) return "";
     const json& value = object_->at(key);
@@ -120,8 +127,8 @@ class Fields {
   std::string where_, prefix_;
 };
 
-json ReadJson(const std::string& path, const std::string& kind) {
-  json parsed = json::parse(model::ReadWholeFile(path), nullptr, false);
+json ParseJson(const std::string& text, const std::string& path, const std::string& kind) {
+  json parsed = json::parse(text, nullptr, false);
   if (parsed.is_discarded()) throw Error(fmt::format("{}: no JSON; {} is expected", path, kind));
   if (!parsed.is_object()) {
     throw Error(
@@ -160,10 +167,14 @@ ViewRecord View(const Fields& fields) {
 }  // namespace
 
 EstimateRecord ReadEstimateRecord(const std::string& path) {
+  return ParseEstimateRecord(model::ReadWholeFile(path), path);
+}
+
+EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& name) {
   const std::string kind = "what `thicklens estimate --json` writes";
-  const json parsed = ReadJson(path, kind);
-  RequireResults(parsed, "solver", path, kind);
-  const Fields fields(parsed, path, "");
+  const json parsed = ParseJson(text, name, kind);
+  RequireResults(parsed, "solver", name, kind);
+  const Fields fields(parsed, name, "");
   EstimateRecord record;
   record.solver = fields.Text("solver");
   std::tie(record.u_count, record.v_count) = fields.TwoCounts("views");
@@ -172,6 +183,15 @@ EstimateRecord ReadEstimateRecord(const std::string& path) {
   record.stencil = fields.Text("stencil");
   record.splat = fields.Text("splat");
   record.device = fields.Text("device");
+  record.prior = fields.Text("prior");
+  record.strength_rule = fields.Text("strength_rule");
+  record.strength = fields.Number("strength");
+  record.noise_sigma = fields.Number("noise_sigma");
+  record.residual_rms = fields.Number("residual_rms");
+  record.row_share = fields.Number("row_share");
+  record.hidden_share = fields.Number("hidden_share");
+  record.iterations = fields.Count("iterations");
+  record.converged = fields.YesOrNo("converged");
   record.gamma = fields.Number("gamma");
   record.ridge = fields.Number("ridge");
   record.threads = fields.Count("threads");
@@ -183,6 +203,7 @@ EstimateRecord ReadEstimateRecord(const std::string& path) {
     record.setup_seconds = seconds.Number("setup");
     record.solve_seconds = seconds.Number("solve");
     record.views_seconds = seconds.Number("views");
+    record.files_seconds = seconds.Number("files");
     record.total_seconds = seconds.Number("total");
   }
   record.peak_rss_mib = fields.Number("peak_rss_mib");
@@ -194,7 +215,7 @@ EstimateRecord ReadEstimateRecord(const std::string& path) {
 
 ComparisonRecord ReadComparisonRecord(const std::string& path) {
   const std::string kind = "what `thicklens compare TRUE_LF LF --json` writes of two light fields";
-  const json parsed = ReadJson(path, kind);
+  const json parsed = ParseJson(model::ReadWholeFile(path), path, kind);
   RequireResults(parsed, "mean", path, kind);
   const Fields fields(parsed, path, "");
   ComparisonRecord record;

@@ -11,15 +11,22 @@ namespace thicklens::tools {
 struct EstimateRecord {
   std::string solver;
   int u_count = 0, v_count = 0, s_count = 0, t_count = 0;
-  std::string block_solver, stencil, splat, device;  // empty: absent
+  std::string block_solver, stencil, splat, device;           // empty: absent
+  std::string prior, strength_rule;                           // empty: absent
+  std::optional<double> strength, noise_sigma, residual_rms;  // noise and residual in stored values
+  std::optional<double> row_share, hidden_share;
+  std::optional<int> iterations;
+  std::optional<bool> converged;
   std::optional<double> gamma, ridge;
   std::optional<int> threads, block_px, blocks, holes_filled;
-  std::optional<double> setup_seconds, solve_seconds, views_seconds, total_seconds;
+  std::optional<double> setup_seconds, solve_seconds, views_seconds, files_seconds, total_seconds;
   std::optional<double> peak_rss_mib, relative_residual, rcond_min;
   std::optional<std::vector<std::string>> effects;
 };
 // Throws Error that begins with the path: no JSON, of another command, refused, wrong types.
 EstimateRecord ReadEstimateRecord(const std::string& path);
+// The same of a text; `name` is its file's in messages.
+EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& name);
 
 // Metrics of a view, or their mean over views. JSON has no infinity: the PSNR of equal pictures is
 // null there and +inf here.

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "calibration_summary.h"
+#include "estimate_figures.h"
+#include "page_figures.h"
 #include "page_pictures.h"
 #include "page_style.h"
 #include "svg_plot.h"
@@ -27,28 +29,6 @@ constexpr int kMostViews = 5;  // per axis, as thumbnails
 constexpr int kRefocusDepths = 5;
 // Of the depths, how many of the nearest and of the farthest are outliers.
 constexpr double kOutliers = 0.01;
-
-// What the page's column holds beside each other.
-constexpr int kColumnPx = 890;
-
-int PlacePx(int columns) { return kColumnPx / columns; }
-
-// One picture with its label beneath.
-std::string Cell(const std::string& picture, const std::string& label) {
-  return fmt::format("<div>{}{}</div>\n", picture,
-                     label.empty() ? "" : fmt::format("<span>{}</span>", EscapeXml(label)));
-}
-
-std::string Grid(int columns, const std::string& cells, const std::string& css_class = "") {
-  return fmt::format("<div class=\"{}\" style=\"--columns: {}\">\n{}</div>\n",
-                     css_class.empty() ? "pictures" : "pictures " + css_class, columns, cells);
-}
-
-std::string Figure(const std::string& content, const std::string& title,
-                   const std::string& caption) {
-  return fmt::format("<figure>\n{}<figcaption><b>{}.</b> {}</figcaption>\n</figure>\n", content,
-                     EscapeXml(title), EscapeXml(caption));
-}
 
 // Up to `at_most` of `count` indices, evenly chosen, with both ends.
 std::vector<int> EvenlyChosen(int count, int at_most) {
@@ -85,49 +65,23 @@ std::pair<double, double> UsualRange(const std::vector<float>& known) {
   return {at(kOutliers), at(1 - kOutliers)};
 }
 
-// The colours of a map with numbers below.
-std::string ColourScale(const ColourRange& range, const std::string& unit) {
-  constexpr int kWidthPx = 440, kBarPx = 12, kMarginPx = 24;
-  const double bar_px = kWidthPx - 2.0 * kMarginPx;
-  std::string svg = fmt::format(
-      "<svg class=\"scale\" viewBox=\"0 0 {0} 44\" width=\"{0}\" height=\"44\" role=\"img\" "
-      "aria-labelledby=\"depth-scale-title\">\n<title id=\"depth-scale-title\">The colours from "
-      "{1:.4g} to {2:.4g} {3}</title>\n<defs><linearGradient id=\"depth-colours\">",
-      kWidthPx, range.lo, range.hi, EscapeXml(unit));
-  constexpr int kStops = 16;
-  for (int i = 0; i <= kStops; ++i) {
-    const double share = static_cast<double>(i) / kStops;
-    svg += fmt::format("<stop offset=\"{:.4f}\" stop-color=\"{}\"/>", share,
-                       MapColourCss(range.Position(range.lo + share * (range.hi - range.lo))));
-  }
-  svg += fmt::format(
-      "</linearGradient></defs>\n<rect x=\"{}\" y=\"0\" width=\"{}\" height=\"{}\" "
-      "fill=\"url(#depth-colours)\"/>\n",
-      kMarginPx, bar_px, kBarPx);
-  const std::vector<double> ticks = NiceTicks(range.lo, range.hi, 6);
-  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : 0;
-  for (double tick : ticks) {
-    const double x = kMarginPx + (tick - range.lo) / (range.hi - range.lo) * bar_px;
-    svg += fmt::format(
-        "<path d=\"M{0:.1f} {1}v4\"/><text text-anchor=\"middle\" x=\"{0:.1f}\" y=\"27\">{2}"
-        "</text>\n",
-        x, kBarPx, TickLabel(tick, step > 0 ? step : std::abs(tick)));
-  }
-  return svg + fmt::format("<text text-anchor=\"middle\" x=\"{}\" y=\"42\">{}</text>\n</svg>\n",
-                           kWidthPx / 2, EscapeXml(unit));
-}
-
-std::string DepthCell(const PageDepth& depth, std::string* caption) {
+std::string DepthCell(const PageDepth& depth, bool zero_in_focus, std::string* caption) {
   const std::vector<float> known = SortedKnown(depth);
   ColourRange range;
   range.bright_is_low = depth.in_mm;
   std::string scale;
   if (!known.empty()) {
     std::tie(range.lo, range.hi) = UsualRange(known);
-    if (range.hi > range.lo) scale = ColourScale(range, DepthUnit(depth));
+    if (range.hi > range.lo) {
+      scale = ColourScale("depth", range.lo, range.hi, DepthUnit(depth),
+                          [&range](double value) { return MapColourCss(range.Position(value)); });
+    }
     *caption += TrueMinus(fmt::format(" Its depth goes from {:.4g} to {:.4g} {}; bright is near.",
                                       known.front(), known.back(), DepthUnit(depth)));
-    if (!depth.in_mm) *caption += " Zero disparity is the plane of focus.";
+    if (!depth.in_mm) {
+      *caption += zero_in_focus ? " Zero disparity is the plane of focus."
+                                : " Zero disparity is the ST plane.";
+    }
   }
   const std::size_t holes = depth.values.size() - known.size();
   if (holes > 0) {
@@ -251,8 +205,19 @@ std::string LargeViews(const LightFieldPageInput& input) {
 // thumbnail where the page shows it.
 int EpipolarRepeat(const model::LightField& light_field) {
   constexpr double kHeightPx = 130;
-  const double zoom = std::clamp(static_cast<double>(kColumnPx) / light_field.s_count, 1.0, 4.0);
+  const double zoom =
+      std::clamp(static_cast<double>(kPageColumnPx) / light_field.s_count, 1.0, 4.0);
   return std::max(1, static_cast<int>(std::lround(kHeightPx / zoom / light_field.u_count)));
+}
+
+// Three rows that divide the height in four, as far as there are so many.
+std::vector<int> EpipolarRows(const model::LightField& light_field) {
+  std::vector<int> rows;
+  for (int i = 1; i <= 3; ++i) {
+    const int t = light_field.t_count * i / 4;
+    if (rows.empty() || t != rows.back()) rows.push_back(t);
+  }
+  return rows;
 }
 
 struct RefocusPlane {
@@ -266,6 +231,7 @@ std::vector<RefocusPlane> RefocusPlanes(const LightFieldPageInput& input) {
   if (!input.depth) return planes;
   const std::vector<float> known = SortedKnown(*input.depth);
   if (known.empty()) return planes;
+  constexpr double kSmallPx = 0.2;  // of such a range, the labels need one digit more
   const auto [lo, hi] = UsualRange(known);
   const int count = hi > lo ? kRefocusDepths : 1;
   for (int i = 0; i < count; ++i) {
@@ -277,7 +243,8 @@ std::vector<RefocusPlane> RefocusPlanes(const LightFieldPageInput& input) {
     } else {
       const double disparity_px = hi + share * (lo - hi);
       planes.push_back(
-          {{disparity_px, disparity_px}, TrueMinus(fmt::format("{:+.2f} px", disparity_px))});
+          {{disparity_px, disparity_px * input.depth->v_per_u},
+           TrueMinus(fmt::format("{:+.{}f} px", disparity_px, hi - lo < kSmallPx ? 3 : 2))});
     }
   }
   return planes;
@@ -330,38 +297,45 @@ std::string PictureAndDepthFigure(const LightFieldPageInput& input) {
   }
   if (input.depth) {
     title += input.photo ? " and its depth" : "The depth of the photograph";
-    cells += DepthCell(*input.depth, &caption);
+    cells += DepthCell(*input.depth, input.light_field->landing_step_px.isZero(), &caption);
   }
   if (cells.empty()) return "";
   return Figure(Grid(input.photo && input.depth ? 2 : 1, cells, "pair"), title, caption);
 }
 
 std::string ViewFigures(const LightFieldPageInput& input) {
-  return ViewThumbnails(input) + LargeViews(input);
+  return (input.mosaic ? MosaicFigure(input) : ViewThumbnails(input)) + LargeViews(input);
 }
 
 std::string EpipolarFigure(const LightFieldPageInput& input) {
   const model::LightField& light_field = *input.light_field;
   if (light_field.u_count < 2) return "";
-  const int t = light_field.t_count / 2;
   const int l = light_field.v_count / 2;
   const int repeat_px = EpipolarRepeat(light_field);
-  const auto cell = [&](const model::LightField& shown, const std::string& what) {
+  const auto cell = [&](const model::LightField& shown, int t, const std::string& what) {
     const cv::Mat picture =
         ShownPicture(estimator::EpipolarRow(shown, t, l, repeat_px), kEpipolarPx);
     return Cell(EmbeddedPicture(picture, "Epipolar picture, " + what, Packing::kExact, PlacePx(1)),
-                input.truth == nullptr ? "" : what);
+                what);
   };
-  std::string cells = cell(light_field, "estimate");
-  if (input.truth != nullptr) cells += cell(*input.truth, "truth");
+  const int middle = light_field.t_count / 2;
+  std::string cells, rows;
+  if (input.truth != nullptr) {
+    cells = cell(light_field, middle, "estimate") + cell(*input.truth, middle, "truth");
+    rows = fmt::format("Row {}", middle);
+  } else {
+    const std::vector<int> chosen = EpipolarRows(light_field);
+    for (int t : chosen) cells += cell(light_field, t, fmt::format("row {}", t));
+    rows = fmt::format("{} {}", chosen.size() == 1 ? "Row" : "Rows", fmt::join(chosen, ", "));
+  }
   return Figure(
-      Grid(1, cells), input.truth == nullptr ? "Epipolar picture" : "Epipolar pictures",
+      Grid(1, cells), "Epipolar pictures",
       fmt::format(
-          "Row {} of the {} views with v = {}, one above the other, the leftmost view at the top. "
+          "{} of the {} views with v = {}, one above the other, the leftmost view at the top. "
           "Every point of the scene draws a line: upright in the plane of focus, "
           "leaning to the left on its way down if it is nearer, to the right if it is farther. "
           "Look for lines that stay sharp and unbroken from the first view to the last{}.",
-          t, light_field.u_count, l, input.truth == nullptr ? "" : "; the true ones below do"));
+          rows, light_field.u_count, l, input.truth == nullptr ? "" : "; the true ones below do"));
 }
 
 std::string RefocusFigure(const LightFieldPageInput& input) {

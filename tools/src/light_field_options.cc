@@ -23,6 +23,7 @@ double ApertureStepMm(const model::LightFieldGrid& grid) {
 }
 
 estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map, PreparedDepth* prepared) {
+  for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
   return estimator::FillHoles(map, &prepared->holes);
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "light_field_io.h"
 #include "thicklens/estimator/view_geometry.h"
@@ -63,6 +64,7 @@ void AddDeviceOption(CLI::App* command, std::string* text);
 struct PreparedDepth {
   estimator::DisparityMap disparity;            // filled
   std::size_t holes = 0;                        // how many were
+  std::vector<bool> was_hole;                   // per pixel
   std::optional<model::DepthStatistics> depth;  // in mm, where there is a camera
 };
 // Without a camera the map must be a disparity (UsageError else). With one, `grid` is its light

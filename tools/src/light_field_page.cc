@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "calibration_summary.h"
+#include "estimate_figures.h"
 #include "light_field_figures.h"
+#include "light_field_origin.h"
 #include "page_pictures.h"
 #include "page_style.h"
 #include "svg_plot.h"
@@ -34,50 +36,11 @@ std::string Optional(const std::optional<double>& value, int decimals) {
   return value ? fmt::format("{:.{}f}", *value, decimals) : kNone;
 }
 
-std::string Times(int a, int b) { return fmt::format("{}\u00A0×\u00A0{}", a, b); }
-
-// "1 view", "49 views".
-std::string Counted(int count, const std::string& what) {
-  return fmt::format("{}\u00A0{}{}", count, what, count == 1 ? "" : "s");
-}
-
 int PresentViews(const model::LightField& light_field) {
   return light_field.present.empty()
              ? light_field.u_count * light_field.v_count
              : static_cast<int>(
                    std::count(light_field.present.begin(), light_field.present.end(), true));
-}
-
-// Every solver of this program writes its name there; "simulated" and "imported" are no estimates.
-bool IsEstimated(const LightFieldPageInput& input) {
-  const std::string& method = input.light_field->origin.method;
-  return input.estimate || method == "blocks";
-}
-
-// What made the light field: the record of the run if there is one, else the light field's file.
-EstimateRecord Origin(const LightFieldPageInput& input) {
-  if (input.estimate) return *input.estimate;
-  const model::LightField& light_field = *input.light_field;
-  const model::LightFieldOrigin& origin = light_field.origin;
-  EstimateRecord record;
-  record.solver = origin.method;
-  record.u_count = light_field.u_count;
-  record.v_count = light_field.v_count;
-  record.s_count = light_field.s_count;
-  record.t_count = light_field.t_count;
-  record.block_solver = origin.block_solver;
-  record.stencil = origin.stencil;
-  record.splat = origin.splat;
-  record.device = origin.device;
-  record.gamma = origin.gamma;
-  record.ridge = origin.ridge;
-  record.block_px = origin.block_px;
-  record.total_seconds = origin.seconds;
-  record.relative_residual = origin.relative_residual;
-  record.rcond_min = origin.rcond_min;
-  if (!origin.method.empty() && (IsEstimated(input) || !origin.effects.empty()))
-    record.effects = origin.effects;
-  return record;
 }
 
 std::string WithSigma(const model::Estimate& estimate) {
@@ -112,28 +75,6 @@ std::string CameraInWords(const model::LightField& light_field) {
         fmt::format("in focus at {}\u00A0mm", WithSigma(*calibration.evidence.focus_depth_mm)));
   return fmt::format("Camera {}: {}{}.", PrintableUtf8(camera.name), fmt::join(found, ", "),
                      found.empty() ? "nothing calibrated" : EvidenceInWords(calibration.evidence));
-}
-
-std::string RunInWords(const LightFieldPageInput& input) {
-  const EstimateRecord record = Origin(input);
-  const model::LightField& light_field = *input.light_field;
-  std::string text =
-      fmt::format("{} views of {} px in {}", Times(light_field.u_count, light_field.v_count),
-                  Times(light_field.s_count, light_field.t_count),
-                  light_field.channels == 3 ? "colour" : "grey");
-  if (!IsEstimated(input))
-    return text +
-           (record.solver.empty() ? "." : fmt::format(", {}.", PrintableUtf8(record.solver)));
-  text += fmt::format(", estimated from one photograph and its depth map by the solver {}",
-                      PrintableUtf8(record.solver));
-  if (record.block_px)
-    text +=
-        fmt::format(" ({} of {}\u00A0px)",
-                    record.blocks ? Counted(*record.blocks, "block") : "blocks", *record.block_px);
-  if (record.total_seconds) text += fmt::format(" in {:.1f}\u00A0s", *record.total_seconds);
-  if (record.peak_rss_mib)
-    text += fmt::format(" with at most {:.0f}\u00A0MiB of memory", *record.peak_rss_mib);
-  return text + ".";
 }
 
 // "lower than the estimate by 1.20 dB"
@@ -186,6 +127,14 @@ std::string Outcome(const LightFieldPageInput& input) {
                                         : ", as good as warping by depth (DIBR)");
 }
 
+std::string Warnings(const LightFieldPageInput& input) {
+  if (input.warnings.empty()) return "";
+  std::string items;
+  for (const std::string& warning : input.warnings)
+    items += fmt::format("<li>{}</li>\n", EscapeXml(warning));
+  return "<ul class=\"warnings\">\n" + items + "</ul>\n";
+}
+
 std::string Summary(const LightFieldPageInput& input) {
   const bool judged = input.comparison && input.comparison->dibr_mean;
   std::string html = fmt::format("<div class=\"verdict {}\">\n<p class=\"outcome\">{}</p>\n",
@@ -196,6 +145,7 @@ std::string Summary(const LightFieldPageInput& input) {
   html += Paragraph(RunInWords(input));
   html += Paragraph(CameraInWords(*input.light_field));
   html += Paragraph(QualityInWords(input));
+  html += Warnings(input);
   return html + "</div>\n";
 }
 
@@ -302,66 +252,13 @@ std::string Numbers(const LightFieldPageInput& input) {
   return ScoresTable(*input.comparison) + HeatTable(input.comparison->views);
 }
 
-std::string OriginRow(const std::string& label, const std::string& value) {
-  if (value.empty()) return "";
-  return fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", EscapeXml(label),
-                     EscapeXml(value));
-}
-
-std::string Seconds(const EstimateRecord& record) {
-  if (!record.total_seconds) return "";
-  std::string text = fmt::format("{:.2f} s", *record.total_seconds);
-  if (record.setup_seconds && record.solve_seconds && record.views_seconds)
-    text += fmt::format(": set-up {:.2f}, solve {:.2f}, views {:.2f}", *record.setup_seconds,
-                        *record.solve_seconds, *record.views_seconds);
-  return text;
-}
-
-std::string HowItWasMade(const LightFieldPageInput& input) {
-  const EstimateRecord record = Origin(input);
-  const auto number = [](const std::optional<double>& value, const char* format) {
-    return value ? fmt::format(fmt::runtime(format), *value) : std::string();
-  };
-  const auto count = [](const std::optional<int>& value, const std::string& unit) {
-    return value ? fmt::format("{}{}", *value, unit) : std::string();
-  };
-  std::string rows;
-  rows += OriginRow(IsEstimated(input) ? "solver" : "made by", record.solver);
-  rows += OriginRow("solver of a block", record.block_solver);
-  rows += OriginRow("stencil of the smoothness", record.stencil);
-  rows += OriginRow("rays reach the pixels by", record.splat);
-  rows += OriginRow("smoothness gamma", number(record.gamma, "{:.6g}"));
-  rows += OriginRow("ridge mu", number(record.ridge, "{:.4g}"));
-  rows += OriginRow("edge of a block", count(record.block_px, " px"));
-  rows += OriginRow("blocks", count(record.blocks, ""));
-  rows += OriginRow("largest relative residual", number(record.relative_residual, "{:.2e}"));
-  rows += OriginRow("smallest rcond", number(record.rcond_min, "{:.2e}"));
-  if (record.effects)
-    rows += OriginRow(
-        "effects of image formation",
-        record.effects->empty() ? "none" : fmt::format("{}", fmt::join(*record.effects, ", ")));
-  rows += OriginRow("holes of the depth map filled", count(record.holes_filled, " px"));
-  rows += OriginRow("device", record.device);
-  rows += OriginRow("threads", count(record.threads, ""));
-  rows += OriginRow("time", Seconds(record));
-  rows += OriginRow("peak memory", number(record.peak_rss_mib, "{:.0f} MiB"));
-  const model::LightFieldOrigin& origin = input.light_field->origin;
-  rows += OriginRow("made with thicklens", origin.version);
-  rows += OriginRow("on", origin.date);
-  const std::string table =
-      rows.empty() ? ""
-                   : "<div class=\"wide\"><table>\n<tbody>\n" + rows + "</tbody></table></div>\n";
-  return table + fmt::format("<p class=\"soft\">This page: thicklens {}, {}.</p>\n",
-                             EscapeXml(input.version), EscapeXml(input.date));
-}
-
 }  // namespace
 
 LightFieldPage MakeLightFieldPage(const LightFieldPageInput& input) {
   const std::string title =
       IsEstimated(input) ? "A light field from one photograph" : "A light field";
   LightFieldPage page;
-  page.html = PageHead(title, SvgPlotStyle() + LightFieldFigureStyle());
+  page.html = PageHead(title, SvgPlotStyle() + LightFieldFigureStyle() + EstimateFigureStyle());
   page.html +=
       fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", title,
                   EscapeXml(fmt::format(
@@ -382,6 +279,8 @@ LightFieldPage MakeLightFieldPage(const LightFieldPageInput& input) {
       input.calibration.empty() ? ""
                                 : "<div class=\"inlined\">\n" + input.calibration + "</div>\n");
   add("picture", "What the estimate starts from", PictureAndDepthFigure(input));
+  add("residual", "What the estimate leaves", ResidualFigure(input));
+  add("confidence", "What is known and what is made up", ConfidenceFigure(input));
   add("views", "The views", ViewFigures(input));
   add("epipolar", "The scene points as lines", EpipolarFigure(input));
   add("refocus", "Refocused", RefocusFigure(input));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimate_records.h"
+#include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 
@@ -30,6 +31,7 @@ struct PageDepth {
   int width_px = 0, height_px = 0;
   std::vector<float> values;
   bool in_mm = false;  // z from the aperture; else disparity in px per view step
+  double v_per_u = 1;  // of a disparity along v; the values are along u
 };
 
 // What a page tells. Of what is absent (null, empty) it says nothing.
@@ -40,7 +42,10 @@ struct LightFieldPageInput {
   std::optional<model::LinearPicture> photo;
   std::optional<PageDepth> depth;
   std::optional<SweepStrip> sweep;
-  std::string calibration;  // from InlinedCalibrationReport
+  std::string calibration;                     // from InlinedCalibrationReport
+  const estimator::SceneMaps* maps = nullptr;  // of the photograph, as the estimate knows it
+  std::vector<std::string> warnings;           // of the estimate, one line each
+  bool mosaic = false;  // all views in one picture, not some beside each other
   std::optional<EstimateRecord> estimate;
   std::optional<ComparisonRecord> comparison;
   std::string version;  // of thicklens

@@ -36,6 +36,15 @@ std::uint8_t Level(double value) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
 }
 
+// The sample that stands for pixel (x, y) of a map shown at that size.
+float SampleFor(const std::vector<float>& values, int width_px, int height_px, cv::Size size, int x,
+                int y) {
+  const int from_x = static_cast<int>((x + 0.5) * width_px / size.width);
+  const int from_y = static_cast<int>((y + 0.5) * height_px / size.height);
+  return values[static_cast<std::size_t>(from_y) * static_cast<std::size_t>(width_px) +
+                static_cast<std::size_t>(from_x)];
+}
+
 cv::Mat EncodedSrgb(const cv::Mat& light) {
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
   cv::Mat shown(light.size(), CV_8UC(light.channels()));
@@ -160,16 +169,25 @@ cv::Mat ColourMapped(const std::vector<float>& values, int width_px, int height_
   const cv::Size size = Fitted({width_px, height_px}, longest_edge_px);
   cv::Mat shown(size, CV_8UC3);
   for (int y = 0; y < size.height; ++y) {
-    const int from_y = static_cast<int>((y + 0.5) * height_px / size.height);
     for (int x = 0; x < size.width; ++x) {
-      const int from_x = static_cast<int>((x + 0.5) * width_px / size.width);
-      const float value =
-          values[static_cast<std::size_t>(from_y) * static_cast<std::size_t>(width_px) +
-                 static_cast<std::size_t>(from_x)];
+      const float value = SampleFor(values, width_px, height_px, size, x, y);
       const auto colour = std::isnan(value) ? HatchColour(x, y) : MapColour(range.Position(value));
       for (int c = 0; c < 3; ++c) {
         shown.ptr<std::uint8_t>(y)[3 * x + c] = colour[static_cast<std::size_t>(c)];
       }
+    }
+  }
+  return shown;
+}
+
+cv::Mat GreyMapped(const std::vector<float>& values, int width_px, int height_px, double range,
+                   int longest_edge_px) {
+  const cv::Size size = Fitted({width_px, height_px}, longest_edge_px);
+  cv::Mat shown(size, CV_8UC1);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const double value = SampleFor(values, width_px, height_px, size, x, y);
+      shown.ptr<std::uint8_t>(y)[x] = Level(kMidGrey + (255 - kMidGrey) * value / range);
     }
   }
   return shown;

@@ -41,6 +41,11 @@ struct ColourRange {
 cv::Mat ColourMapped(const std::vector<float>& values, int width_px, int height_px,
                      const ColourRange& range, int longest_edge_px);
 
+// A signed map in greys: mid grey is 0, white `range` and more, black -range and less. Larger ones
+// are shrunk by leaving samples out, so that noise stays as large as it is.
+cv::Mat GreyMapped(const std::vector<float>& values, int width_px, int height_px, double range,
+                   int longest_edge_px);
+
 enum class Packing {
   kExact,  // PNG
   kSmall,  // JPEG of quality 90, where the picture is large enough for it to pay

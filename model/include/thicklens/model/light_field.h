@@ -16,13 +16,16 @@ namespace thicklens::model {
 
 // Where a light field came from. Fields that do not apply are empty.
 struct LightFieldOrigin {
-  std::string method;  // "blocks", "simulated", "imported", "dibr"
+  std::string method;  // "scene", "blocks", "simulated", "imported", "dibr"
   std::string block_solver, stencil, splat, device;
   std::optional<int> block_px;
   std::optional<double> gamma, ridge;
   std::optional<double> seconds, relative_residual, rcond_min;
   std::vector<std::string> effects;  // of image formation that were on: "defocus", "falloff"
   std::string version, date;
+  std::string prior;  // of the scene's radiance: "ridge", "gradient", "tv"
+  std::optional<double> strength, noise_sigma;  // of that prior; of the photograph's stored values
+  std::optional<int> iterations;
 };
 
 // U x V views of S x T samples in linear light.

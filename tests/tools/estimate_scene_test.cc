@@ -1,0 +1,413 @@
+// thicklens estimate with its default solver, as a person meets it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "child_process.h"
+#include "depth_io.h"
+#include "image_io.h"
+#include "light_field_io.h"
+#include "support/temporary_folder.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/light_field.h"
+#include "xml_elements.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using thicklens::testing::ContentOf;
+using thicklens::testing::TemporaryFolder;
+using Arguments = std::vector<std::string>;
+
+constexpr int kW = 96, kH = 64;
+
+// Soft stripes, 1 grey level of noise.
+model::StoredPicture Stripes(int channels) {
+  model::StoredPicture picture{kW, kH, channels, 8, {}};
+  std::mt19937 engine(7);
+  std::normal_distribution<double> noise(0, 1);
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      for (int c = 0; c < channels; ++c) {
+        const double value = 120 + 40 * std::sin(0.35 * x + 0.5 * c) + 30 * std::sin(0.3 * y);
+        picture.values.push_back(
+            static_cast<std::uint16_t>(std::lround(std::clamp(value + noise(engine), 0.0, 255.0))));
+      }
+    }
+  }
+  return picture;
+}
+
+std::string CameraYaml(const model::TransferCurve& transfer) {
+  model::Camera camera;
+  camera.name = "bench";
+  camera.lens = {12.5, 12.8, 3, 4.46};
+  camera.sensor = {kW, kH, 0.006, {(kW - 1) / 2.0, (kH - 1) / 2.0}, transfer};
+  camera.calibration = model::CameraCalibration{};
+  camera.calibration->image_distance_mm =
+      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
+  camera.calibration->evidence.method = "assumed";
+  return model::CameraToYaml(camera);
+}
+
+class EstimateSceneTest : public ::testing::Test {
+ protected:
+  std::string Picture(int channels = 3) const {
+    return folder_.Put("picture.png", EncodePng(Stripes(channels)));
+  }
+  std::string Depth(const std::function<double(int x, int y)>& value) const {
+    model::RawDepthMap map{kW, kH, {}, false};
+    for (int y = 0; y < kH; ++y) {
+      for (int x = 0; x < kW; ++x) map.values.push_back(static_cast<float>(value(x, y)));
+    }
+    return folder_.Put("depth.pfm", EncodePfm(map));
+  }
+  std::string Slant() const {
+    return Depth([](int x, int) { return 0.01 * x - 0.5; });
+  }
+  std::string Output() const { return folder_ / "lf"; }
+  std::string Report() const { return folder_ / "page"; }
+
+  Arguments Usual() const {
+    return {Picture(), Slant(), "--depth-kind", "disparity", "--views", "3x3"};
+  }
+  static Arguments With(Arguments arguments, const Arguments& more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  ProgramResult Run(Arguments arguments) const {
+    arguments.insert(arguments.begin(), "estimate");
+    arguments.insert(arguments.end(), {"-o", Output()});
+    return ChildProgram(arguments, scratch_.path(), 0).Wait();
+  }
+  // What --json writes of a run that must succeed.
+  json Summary(const Arguments& arguments, ProgramResult* result = nullptr) const {
+    const std::string path = folder_ / "summary.json";
+    const ProgramResult ended = Run(With(arguments, {"--json", path}));
+    EXPECT_EQ(ended.exit_code, 0) << ended.err;
+    if (result != nullptr) *result = ended;
+    return json::parse(ContentOf(path));
+  }
+  std::string Refusal(const Arguments& arguments, int exit_code) const {
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_FALSE(fs::exists(Output()));
+    EXPECT_FALSE(fs::exists(Report()));
+    return result.err;
+  }
+
+  TemporaryFolder folder_;
+  TemporaryFolder scratch_;
+};
+
+TEST_F(EstimateSceneTest, IsTheDefaultAndSaysWhatItDid) {
+  ProgramResult result;
+  const json summary = Summary(With(Usual(), {"--threads", "2"}), &result);
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("3 x 3 views of 96 x 64 px"), HasSubstr("scene: tv prior"),
+                    HasSubstr("grey levels"), HasSubstr("iterations")));
+  EXPECT_EQ(summary["solver"], "scene");
+  EXPECT_TRUE(summary.at("block_solver").is_null());
+  EXPECT_TRUE(summary.at("rcond_min").is_null());
+  EXPECT_EQ(summary["prior"], "tv");
+  EXPECT_EQ(summary["strength_rule"], "auto");
+  EXPECT_EQ(summary["device"], "cpu");
+  EXPECT_EQ(summary["threads"], 2);
+  EXPECT_EQ(summary["views"], json({3, 3}));
+  EXPECT_EQ(summary["size"], json({kW, kH}));
+  EXPECT_EQ(summary["channels"], 3);
+  EXPECT_EQ(summary["transfer"], "srgb");
+  EXPECT_EQ(summary["effects"], json({"defocus"}));
+  EXPECT_EQ(summary["holes_filled"], 0);
+  EXPECT_EQ(summary["converged"], true);
+  EXPECT_GT(summary["strength"].get<double>(), 0);
+  EXPECT_NEAR(summary["noise_sigma"].get<double>() * 255, 1, 0.4);
+  EXPECT_GT(summary["iterations"].get<int>(), 0);
+  EXPECT_LE(summary["relative_residual"].get<double>(), 1e-4);
+  EXPECT_GT(summary["residual_rms"].get<double>(), 0);
+  for (const char* share : {"row_share", "hidden_share", "clipped_fraction"}) {
+    EXPECT_GE(summary.at(share).get<double>(), 0) << share;
+    EXPECT_LE(summary.at(share).get<double>(), 1) << share;
+  }
+  const json& seconds = summary["seconds"];
+  double parts = 0;
+  for (const char* part : {"setup", "solve", "views", "files"})
+    parts += seconds.at(part).get<double>();
+  EXPECT_LE(parts, seconds["total"].get<double>() * 1.001);
+  EXPECT_GT(summary["peak_rss_mib"].get<double>(), 10);
+  EXPECT_GT(summary["predicted_memory_mib"].get<double>(), 1);
+  EXPECT_NEAR(summary["disparity"]["min_px"].get<double>(), -0.5, 1e-6);
+  EXPECT_NEAR(summary["disparity"]["max_px"].get<double>(), 0.45, 1e-6);
+  EXPECT_FALSE(summary.contains("depth"));
+  EXPECT_THAT(summary["warnings"], IsEmpty());
+
+  const model::LightFieldOrigin origin = ReadLightField(Output(), {}).origin;
+  EXPECT_EQ(origin.method, "scene");
+  EXPECT_EQ(origin.prior, "tv");
+  EXPECT_EQ(origin.device, "cpu");
+  EXPECT_DOUBLE_EQ(origin.strength.value(), summary["strength"].get<double>());
+  EXPECT_DOUBLE_EQ(origin.noise_sigma.value(), summary["noise_sigma"].get<double>());
+  EXPECT_EQ(origin.iterations.value(), summary["iterations"].get<int>());
+  EXPECT_GT(origin.seconds.value(), 0);
+  EXPECT_FALSE(origin.rcond_min.has_value());
+}
+
+TEST_F(EstimateSceneTest, TakesItsSettings) {
+  json summary = Summary(With(Usual(), {"--prior", "ridge", "--strength", "0.02", "--double"}));
+  EXPECT_EQ(summary["prior"], "ridge");
+  EXPECT_EQ(summary["strength_rule"], "given");
+  EXPECT_DOUBLE_EQ(summary["strength"].get<double>(), 0.02);
+  summary = Summary(With(Usual(), {"--prior", "gradient", "--strength", "gcv"}));
+  EXPECT_EQ(summary["prior"], "gradient");
+  EXPECT_EQ(summary["strength_rule"], "gcv");
+  const json loose = Summary(With(Usual(), {"--prior", "gradient", "--tolerance", "0.1"}));
+  EXPECT_LT(loose["iterations"].get<int>(),
+            Summary(With(Usual(), {"--prior", "gradient"}))["iterations"].get<int>());
+}
+
+TEST_F(EstimateSceneTest, OptionsOfBlocksAreAUsageError) {
+  for (const Arguments& of_blocks : std::vector<Arguments>{{"--block-solver", "eigen"},
+                                                           {"--block-px", "16"},
+                                                           {"--gamma", "1"},
+                                                           {"--ridge", "0.1"},
+                                                           {"--stencil", "warp"},
+                                                           {"--splat", "bilinear"}}) {
+    EXPECT_THAT(Refusal(With(Usual(), of_blocks), 2),
+                HasSubstr(of_blocks.front() + " is of --solver blocks, the solver is scene"));
+  }
+  EXPECT_THAT(Refusal(With(Usual(), {"--device", "opencl:0"}), 2),
+              AllOf(HasSubstr("opencl:0"), HasSubstr("--solver blocks")));
+}
+
+TEST_F(EstimateSceneTest, SettingsThatCannotBe) {
+  for (const char* strength : {"0", "-1", "nan", "inf", "much", "1x", ""}) {
+    EXPECT_THAT(Refusal(With(Usual(), {"--strength", strength}), 2), HasSubstr("--strength"))
+        << strength;
+  }
+  EXPECT_THAT(Refusal(With(Usual(), {"--prior", "sparse"}), 2), HasSubstr("sparse"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "0"}), 2), HasSubstr("--tolerance"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "1"}), 1), HasSubstr("tolerance is 1"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--max-iterations", "0"}), 2), HasSubstr("--max-iterations"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--memory-limit", "5"}), 1),
+              AllOf(HasSubstr("memory limit 5 MiB"), HasSubstr("at least")));
+  EXPECT_THAT(Refusal(With(Usual(), {"--report", Output()}), 2), HasSubstr("outside"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--report", Output() + "/page"}), 2), HasSubstr("outside"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--report", folder_ / "none/page"}), 1), HasSubstr("none"));
+}
+
+// Never linear by accident, and never silently.
+TEST_F(EstimateSceneTest, TheTransferCurve) {
+  const std::string assumed = "stored values are taken as sRGB (--transfer)";
+  ProgramResult result;
+  json summary = Summary(Usual(), &result);
+  EXPECT_THAT(result.err, HasSubstr(assumed));
+  EXPECT_EQ(summary["transfer_from"], "assumed");
+
+  summary = Summary(With(Usual(), {"--transfer", "linear"}), &result);
+  EXPECT_THAT(result.err, Not(HasSubstr("stored values")));
+  EXPECT_EQ(summary["transfer"], "linear");
+  EXPECT_EQ(summary["transfer_from"], "option");
+  EXPECT_EQ(ReadLightField(Output(), {}).transfer, model::TransferCurve::Linear());
+
+  const std::string camera =
+      folder_.Put("camera.yaml", CameraYaml(model::TransferCurve::Gamma(2.2)));
+  const Arguments with_camera = With(Usual(), {"--camera", camera});
+  summary = Summary(with_camera, &result);
+  EXPECT_THAT(result.err, Not(HasSubstr("stored values")));
+  EXPECT_EQ(summary["transfer"], "gamma-2.2");
+  EXPECT_EQ(summary["transfer_from"], "camera");
+  summary = Summary(With(with_camera, {"--transfer", "srgb"}));
+  EXPECT_EQ(summary["transfer"], "srgb");
+  EXPECT_EQ(summary["transfer_from"], "option");
+  const model::LightField found = ReadLightField(Output(), {});
+  EXPECT_EQ(found.transfer, model::TransferCurve::Srgb());
+  EXPECT_EQ(found.camera->sensor.transfer, model::TransferCurve::Srgb());
+}
+
+TEST_F(EstimateSceneTest, WarnsOfStepsThatAreTooLarge) {
+  // One column of 96 at 3.2 px, the rest below 3 px.
+  const std::string depth = Depth([](int x, int) { return x == 20 ? 3.2 : 2.9; });
+  ProgramResult result;
+  const json summary =
+      Summary({Picture(), depth, "--depth-kind", "disparity", "--views", "3x3"}, &result);
+  ASSERT_EQ(summary["warnings"].size(), 1u) << summary["warnings"];
+  EXPECT_THAT(
+      summary["warnings"][0].get<std::string>(),
+      AllOf(HasSubstr("1.0 % of the pixels"), HasSubstr("3 px"), HasSubstr("up to 3.2 px")));
+  EXPECT_THAT(result.err, HasSubstr("up to 3.2 px"));
+  EXPECT_NEAR(summary["disparity"]["coarse_share"].get<double>(), 1.0 / kW, 1e-9);
+}
+
+TEST_F(EstimateSceneTest, WarnsOfNoiseInTheDepth) {
+  const auto with_noise = [&](double sigma_px) {
+    std::mt19937 engine(11);
+    std::normal_distribution<double> noise(0, sigma_px);
+    return Depth([&](int x, int) { return 0.01 * x - 0.5 + noise(engine); });
+  };
+  const auto summary_of = [&](double sigma_px) {
+    return Summary(
+        {Picture(), with_noise(sigma_px), "--depth-kind", "disparity", "--views", "3x3"});
+  };
+  const json noisy = summary_of(0.1);
+  EXPECT_NEAR(noisy["disparity"]["noise_px"].get<double>(), 0.1, 0.01);
+  EXPECT_THAT(noisy["warnings"].dump(), AllOf(HasSubstr("noise of about 0.1"), HasSubstr("0.05")));
+  EXPECT_THAT(summary_of(0.02)["warnings"].dump(), Not(HasSubstr("noise")));
+}
+
+TEST_F(EstimateSceneTest, SaysWhenItHasNotConverged) {
+  ProgramResult result;
+  const json summary =
+      Summary(With(Usual(), {"--max-iterations", "2", "--tolerance", "1e-9"}), &result);
+  EXPECT_EQ(summary["converged"], false);
+  EXPECT_THAT(summary["warnings"].dump(),
+              AllOf(HasSubstr("not converged"), HasSubstr("--max-iterations")));
+  EXPECT_THAT(result.out, HasSubstr("not converged"));
+}
+
+TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
+  // Sharp bars, all of them in focus; the map says that one patch is far out of focus.
+  model::StoredPicture picture{256, 192, 1, 8, {}};
+  model::RawDepthMap map{256, 192, {}, false};
+  std::mt19937 engine(5);
+  std::normal_distribution<double> noise(0, 1);
+  for (int y = 0; y < 192; ++y) {
+    for (int x = 0; x < 256; ++x) {
+      const double value = (x / 7 % 2 == 0 ? 60 : 190) + noise(engine);
+      picture.values.push_back(static_cast<std::uint16_t>(std::lround(value)));
+      map.values.push_back(x >= 120 && x < 200 && y >= 56 && y < 136 ? -0.7F : 0.0F);
+    }
+  }
+  const Arguments arguments = {folder_.Put("bars.png", EncodePng(picture)),
+                               folder_.Put("bars.pfm", EncodePfm(map)),
+                               "--depth-kind",
+                               "disparity",
+                               "--views",
+                               "5x5"};
+  const json summary = Summary(arguments);
+  ASSERT_FALSE(summary["residual_patches"].empty());
+  for (const json& patch : summary["residual_patches"]) {
+    EXPECT_GE(patch["x_px"], 96);
+    EXPECT_LT(patch["x_px"], 200);
+    EXPECT_GE(patch["y_px"], 32);
+    EXPECT_LT(patch["y_px"], 136);
+  }
+  EXPECT_THAT(summary["warnings"].dump(),
+              AllOf(HasSubstr("not explained"), HasSubstr("grey levels")));
+  // With the right depth there is nothing to name.
+  map.values.assign(map.values.size(), 0.0F);
+  folder_.Put("bars.pfm", EncodePfm(map));
+  EXPECT_THAT(Summary(arguments)["residual_patches"], IsEmpty());
+}
+
+TEST_F(EstimateSceneTest, HolesAreToldWithTheirShare) {
+  const std::string depth = Depth([](int x, int y) {
+    return x < 10 && y < 32 ? std::numeric_limits<double>::quiet_NaN() : 0.4;
+  });
+  ProgramResult result;
+  const json summary =
+      Summary({Picture(), depth, "--depth-kind", "disparity", "--views", "3x3"}, &result);
+  EXPECT_EQ(summary["holes_filled"], 320);
+  EXPECT_THAT(result.out, HasSubstr("320 px, filled from the farthest neighbour (5.2 %)"));
+}
+
+TEST_F(EstimateSceneTest, TheReportShowsEachFigureOnce) {
+  const std::string depth = Depth([](int x, int y) {
+    if (x > 70 && y > 50) return std::numeric_limits<double>::quiet_NaN();
+    return x < 40 ? 1.5 : -0.01 * x;
+  });
+  const json summary = Summary(
+      {Picture(), depth, "--depth-kind", "disparity", "--views", "5x5", "--report", Report()});
+  EXPECT_THAT(folder_.Entries(), ::testing::Contains("page"));
+  const std::string html = ContentOf(Report() + "/index.html");
+  const XmlDocument document = ParseXml(html);
+  ASSERT_EQ(document.error, "");
+  std::vector<std::string> pictures;
+  for (const XmlElement& image : document.Named("img")) {
+    EXPECT_THAT(image.Attribute("src"), ::testing::StartsWith("data:image/"));
+    pictures.push_back(image.Attribute("alt"));
+  }
+  EXPECT_THAT(
+      pictures,
+      ElementsAre("The photograph through the whole aperture", "Depth map in colours",
+                  "Residual of the photograph", "Confidence of the estimate", "Mosaic of the views",
+                  "view, u 0, v 2", "view, u 2, v 2", "view, u 4, v 2", "Epipolar picture, row 16",
+                  "Epipolar picture, row 32", "Epipolar picture, row 48", "Refocused to +1.50 px",
+                  "Refocused to +0.89 px", "Refocused to +0.28 px", "Refocused to −0.33 px",
+                  "Refocused to −0.94 px"));
+  for (const char* outside : {"http", "href=", "<script", "@import"})
+    EXPECT_THAT(html, Not(HasSubstr(outside)));
+  EXPECT_THAT(html, AllOf(HasSubstr("<td>total variation</td>"),
+                          HasSubstr("Hatched in grey: 325 px"), HasSubstr("grey levels</td>")));
+  EXPECT_EQ(summary["holes_filled"], 325);
+}
+
+TEST_F(EstimateSceneTest, TheReportOfBlocksHasNoMaps) {
+  Summary(With(Usual(), {"--solver", "blocks", "--report", Report(), "--device", "cpu"}));
+  const std::string html = ContentOf(Report() + "/index.html");
+  EXPECT_THAT(html, AllOf(HasSubstr("Mosaic of the views"), HasSubstr("ridge mu"),
+                          Not(HasSubstr("Residual of the photograph"))));
+}
+
+TEST_F(EstimateSceneTest, OtherFilesBesideTheReportStay) {
+  folder_.Put("page/mine.txt", "mine");
+  folder_.Put("page/index.html", "older");
+  Summary(With(Usual(), {"--report", Report()}));
+  EXPECT_EQ(ContentOf(Report() + "/mine.txt"), "mine");
+  EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("<!DOCTYPE html>"));
+}
+
+TEST_F(EstimateSceneTest, AnInterruptLeavesNothing) {
+  // Large enough to be under way when the signal comes.
+  constexpr int kSize = 700;
+  model::StoredPicture picture{kSize, kSize, 1, 8, {}};
+  model::RawDepthMap map{kSize, kSize, {}, false};
+  for (int i = 0; i < kSize * kSize; ++i) {
+    picture.values.push_back(static_cast<std::uint16_t>(i % 1009 * 7919 % 256));
+    map.values.push_back(static_cast<float>(i % kSize) * 0.003F);
+  }
+  ChildProgram program(
+      {"estimate", folder_.Put("large.png", EncodePng(picture)),
+       folder_.Put("large.pfm", EncodePfm(map)), "--depth-kind", "disparity", "--tolerance",
+       "1e-12", "--max-iterations", "100000", "-o", Output(), "--report", Report(), "--verbose"},
+      scratch_.path(), 0);
+  // Said right before the solver is started.
+  while (program.Running() && ContentOf(scratch_ / "stderr").find("device") == std::string::npos) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  program.Interrupt();
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("interrupted; nothing was written"));
+  EXPECT_THAT(folder_.Entries(), ElementsAre("large.pfm", "large.png"));
+}
+
+TEST_F(EstimateSceneTest, ThreadsDoNotChangeTheViews) {
+  const auto views_with = [&](const char* threads) {
+    Summary(With(Usual(), {"--threads", threads, "--format", "tiff"}));
+    return ReadLightField(Output(), {}).values;
+  };
+  EXPECT_EQ(views_with("1"), views_with("3"));
+}
+
+}  // namespace
+}  // namespace thicklens::tools

@@ -1,0 +1,23 @@
+#ifndef THICKLENS_TOOLS_ESTIMATE_FIGURES_H_
+#define THICKLENS_TOOLS_ESTIMATE_FIGURES_H_
+
+#include <string>
+
+#include "light_field_page.h"
+
+namespace thicklens::tools {
+
+// The parts of the page that show what an estimate knows of itself, each without its heading and
+// empty where the input has no maps.
+std::string ResidualFigure(const LightFieldPageInput& input);
+std::string ConfidenceFigure(const LightFieldPageInput& input);
+
+// All views in one picture.
+std::string MosaicFigure(const LightFieldPageInput& input);
+
+// The style rules of these.
+std::string EstimateFigureStyle();
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_ESTIMATE_FIGURES_H_

@@ -1,0 +1,176 @@
+#include "estimate_input.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "commands.h"
+#include "depth_io.h"
+#include "image_io.h"
+#include "light_field_io.h"
+#include "option_values.h"
+#include "thicklens/error.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/light_field.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr int kDefaultViews = 7;
+
+model::StoredPicture ReadPhoto(const std::string& path) {
+  const model::StoredPicture picture = ToStoredPicture(ReadPictureFile(path));
+  if (picture.channels == 4) spdlog::warn("{}: its alpha channel is left out", path);
+  return WithoutAlpha(picture);
+}
+
+// The share of each view in the photograph, and how many views there are.
+Eigen::ArrayXXd ViewWeights(const EstimateOptions& options,
+                            const std::optional<model::Camera>& camera) {
+  if (!options.aperture_of.empty()) {
+    LightFieldReading reading;
+    reading.grid = options.grid;
+    reading.sparse = options.sparse;
+    std::tie(reading.u_count, reading.v_count) = ViewCounts(options.views);
+    const model::LightField light_field = ReadLightField(options.aperture_of, reading);
+    Eigen::ArrayXXd weights = light_field.weights;
+    for (int l = 0; l < light_field.v_count; ++l) {
+      for (int k = 0; k < light_field.u_count; ++k) {
+        if (!light_field.IsPresent(k, l)) weights(l, k) = 0;
+      }
+    }
+    return weights / weights.sum();
+  }
+  auto [u_count, v_count] = ViewCounts(options.views);
+  if (u_count == 0) u_count = v_count = kDefaultViews;
+  const model::ApertureShape usual =
+      camera ? model::ApertureShapeOf(camera->psf) : model::ApertureShape::kUniform;
+  return model::ApertureWeights(ApertureShapeOr(options.aperture_shape, usual), u_count, v_count);
+}
+
+// The camera behind a picture, which may be a part of its sensor, and of that the crop.
+std::optional<model::Camera> CameraFor(const EstimateOptions& options, int width_px, int height_px,
+                                       const std::optional<model::PixelRect>& crop) {
+  if (options.camera_path.empty()) return std::nullopt;
+  model::Camera camera = model::ReadCamera(options.camera_path);
+  if (!options.transfer.empty())
+    camera.sensor.transfer = model::TransferCurve::FromName(options.transfer);
+  TellAssumedFields(camera);
+  if (!options.sensor_origin.empty()) {
+    const auto origin = SplitPixels("--sensor-origin", options.sensor_origin, ',', "X,Y");
+    if (origin.size() != 2) {
+      throw UsageError(
+          fmt::format("--sensor-origin: X,Y is expected, found '{}'", options.sensor_origin));
+    }
+    camera = model::CropCamera(camera, {origin[0], origin[1], width_px, height_px});
+  } else if (camera.sensor.width_px != width_px || camera.sensor.height_px != height_px) {
+    throw Error(fmt::format(
+        "{}: the picture is {}x{} px, the sensor of {} has {}x{} px: they must be equal, or "
+        "--sensor-origin say which part of the sensor it is",
+        options.picture_path, width_px, height_px, options.camera_path, camera.sensor.width_px,
+        camera.sensor.height_px));
+  }
+  return crop ? model::CropCamera(camera, *crop) : camera;
+}
+
+// UV on the aperture, where each view has one transmission; ST in the plane of focus unless a
+// depth is given.
+model::LightFieldGrid GridFor(const EstimateOptions& options, const model::Camera& camera,
+                              const Eigen::ArrayXXd& weights) {
+  const model::ApertureSamples samples =
+      model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
+  model::LightFieldPlanes planes =
+      model::DefaultGrid(camera, samples.u_count, samples.v_count).planes;
+  if (options.st_depth_mm) planes.plane_spacing_mm = *options.st_depth_mm;
+  return model::GridOnPlanes(camera, planes, samples);
+}
+
+// Picture and depth are cut alike. Where only one of them has the crop's size, it was cut before.
+void CutToCrop(const EstimateOptions& options, const std::optional<model::PixelRect>& crop,
+               model::StoredPicture* picture, model::RawDepthMap* map) {
+  if (!crop) return;
+  const auto was_cut = [&](int width_px, int height_px, const std::string& path) {
+    const bool cut = width_px == crop->width && height_px == crop->height &&
+                     (picture->width_px != map->width_px || picture->height_px != map->height_px);
+    if (cut) spdlog::warn("{}: has the size of --crop and is taken as it is", path);
+    return cut;
+  };
+  const bool cut_picture = !was_cut(picture->width_px, picture->height_px, options.picture_path);
+  const bool cut_map = !was_cut(map->width_px, map->height_px, options.depth_path);
+  if (cut_picture) *picture = model::CropPicture(*picture, *crop);
+  if (cut_map) *map = model::CropDepth(*map, *crop);
+}
+
+// A depth far from what the camera is focused at is possible, but more often its unit is wrong.
+void TellUnlikelyDepth(const EstimateOptions& options, const model::Camera& camera,
+                       const model::DepthStatistics& depth) {
+  constexpr double kUsual = 4;
+  const double focus_depth_mm = camera.focus_depth_mm();
+  if (depth.median_mm <= kUsual * focus_depth_mm && depth.median_mm >= focus_depth_mm / kUsual) {
+    return;
+  }
+  spdlog::warn(
+      "{}: the median depth is {:.6g} mm, the camera is focused at {:.6g} mm; is --depth-unit "
+      "right?",
+      options.depth_path, depth.median_mm, focus_depth_mm);
+}
+
+// How light became stored values; taken for granted where nobody says it, and told then.
+model::TransferCurve TransferFor(const EstimateOptions& options,
+                                 const std::optional<model::Camera>& camera) {
+  if (camera) return camera->sensor.transfer;
+  if (!options.transfer.empty()) return model::TransferCurve::FromName(options.transfer);
+  spdlog::info("{}: stored values are taken as sRGB (--transfer)", options.picture_path);
+  return model::TransferCurve::Srgb();
+}
+
+void CheckViewCounts(const Eigen::ArrayXXd& weights) {
+  if (weights.size() < 2) {
+    throw Error(
+        "--views: 1x1 is no light field: one view is the picture itself; it must be at least two "
+        "views, e.g. 3x3");
+  }
+  for (const auto& [count, axis] :
+       {std::pair{weights.cols(), "u (across)"}, std::pair{weights.rows(), "v (down)"}}) {
+    if (count == 1) spdlog::warn("--views: one view along {}: no blur is modelled that way", axis);
+  }
+}
+
+}  // namespace
+
+PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
+  const auto crop = CropRect(options.crop);
+  model::StoredPicture stored = ReadPhoto(options.picture_path);
+  model::RawDepthMap map = ReadDepthMap(options.depth_path);
+  const int full_width_px = std::max(stored.width_px, map.width_px);
+  const int full_height_px = std::max(stored.height_px, map.height_px);
+  CutToCrop(options, crop, &stored, &map);
+  if (map.width_px != stored.width_px || map.height_px != stored.height_px) {
+    throw Error(fmt::format("{}: it is {}x{} px, the picture {} {}x{} px: the sizes must be equal",
+                            options.depth_path, map.width_px, map.height_px, options.picture_path,
+                            stored.width_px, stored.height_px));
+  }
+  PreparedEstimate prepared;
+  estimator::EstimateInput& input = prepared.input;
+  input.camera = CameraFor(options, full_width_px, full_height_px, crop);
+  input.transfer = TransferFor(options, input.camera);
+  input.picture = model::ToLinear(stored, input.transfer);
+  input.weights = ViewWeights(options, input.camera);
+  CheckViewCounts(input.weights);
+  if (input.camera) input.grid = GridFor(options, *input.camera, input.weights);
+  prepared.depth = PrepareDepth(map, options.depth_path, options.depth, input.picture.width_px,
+                                input.picture.height_px, input.camera ? &*input.camera : nullptr,
+                                input.grid ? &*input.grid : nullptr);
+  input.disparity = std::move(prepared.depth.disparity);
+  if (prepared.depth.depth && options.depth.kind != "disparity") {
+    TellUnlikelyDepth(options, *input.camera, *prepared.depth.depth);
+  }
+  return prepared;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,21 @@
+#ifndef THICKLENS_TOOLS_ESTIMATE_INPUT_H_
+#define THICKLENS_TOOLS_ESTIMATE_INPUT_H_
+
+#include "estimate_options.h"
+#include "light_field_options.h"
+#include "thicklens/estimator/estimate.h"
+
+namespace thicklens::tools {
+
+struct PreparedEstimate {
+  estimator::EstimateInput input;
+  PreparedDepth depth;  // without its disparity, which is the input's
+};
+
+// Reads picture, depth and camera and tells what is taken for granted of them. Throws Error and
+// UsageError.
+PreparedEstimate PrepareEstimate(const EstimateOptions& options);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_ESTIMATE_INPUT_H_

@@ -1,0 +1,308 @@
+#include "estimate_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "option_values.h"
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kReportName[] = "index.html";
+constexpr int kMaxIterations = 1000000;
+
+std::optional<double> PositiveNumber(const std::string& text) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [read, failure] = std::from_chars(text.data(), end, value);
+  if (failure != std::errc() || read != end || !(value > 0) || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+CLI::Validator IsStrength() {
+  return {[](std::string& given) {
+            if (given == "auto" || given == "gcv" || PositiveNumber(given)) return std::string();
+            return fmt::format("auto, gcv or a number above 0 is expected, found '{}'", given);
+          },
+          ""};
+}
+
+void AddInputOptions(CLI::App* command, EstimateOptions* options) {
+  command->add_option("picture", options->picture_path, "The photograph")
+      ->required()
+      ->type_name("IMAGE");
+  command->add_option("depth", options->depth_path, "Its depth map, pixel by pixel")
+      ->required()
+      ->type_name("DEPTH");
+  command
+      ->add_option("--camera", options->camera_path,
+                   "The calibrated camera; not needed for a disparity map")
+      ->type_name("CAMERA.yaml");
+  command
+      ->add_option("--sensor-origin", options->sensor_origin,
+                   "Where on the camera's sensor a picture of a part of it begins, px")
+      ->type_name("X,Y");
+  command->add_option("-o,--output", options->output_folder, "Folder for the light field")
+      ->required()
+      ->type_name("LF");
+  command
+      ->add_option("--report", options->report_folder,
+                   "Folder for index.html, a page that shows the estimate and what it knows of "
+                   "itself")
+      ->type_name("DIR");
+  AddDepthOptions(command, &options->depth);
+  AddCropOption(command, &options->crop);
+  command
+      ->add_option("--transfer", options->transfer,
+                   "How light became stored values: linear, srgb or gamma-2.2; default: what the "
+                   "camera's file says, without a camera srgb")
+      ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
+      ->type_name("NAME");
+}
+
+void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
+  AddViewsOption(command, &options->views, "Views across and down; default 7x7");
+  AddApertureShapeOption(command, &options->aperture_shape);
+  command
+      ->add_option("--aperture-of", options->aperture_of,
+                   "Take the views, and which of them the photograph saw, from this light field")
+      ->type_name("LF");
+  command->add_option("--grid", options->grid, "Of --aperture-of: row length of the HCI numbering")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N");
+  command->add_flag("--sparse", options->sparse, "Of --aperture-of: any set of views may be there");
+  command
+      ->add_option("--st-depth-mm", options->st_depth_mm,
+                   "Depth of the ST plane (UV is the aperture); default: the plane of focus")
+      ->check(Between(0, 1e9, "millimetres"))
+      ->type_name("MM");
+  command->add_option("--without", options->without, "Effects to leave out: falloff")
+      ->check(CLI::IsMember({"falloff"}))
+      ->delimiter(',')
+      ->type_name("EFFECT");
+  command
+      ->add_option("--format", options->format,
+                   "Of the views: png (16 bit, stored values) or tiff (float, linear light)")
+      ->check(CLI::IsMember({"png", "tiff"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+}
+
+void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
+  command
+      ->add_option("--solver", options->solver,
+                   "scene: the whole picture at once; blocks: the source's, block by block")
+      ->check(CLI::IsMember({"scene", "blocks"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command->add_option("--memory-limit", options->memory_limit_mib, "For the whole program")
+      ->check(Between(0, 1e9, "MiB"))
+      ->type_name("MIB");
+  AddDeviceOption(command, &options->device);
+}
+
+void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
+  command
+      ->add_option("--prior", options->prior,
+                   "Of scene: what is taken for granted of the radiance: ridge, gradient or tv "
+                   "(total variation, default)")
+      ->check(CLI::IsMember({"ridge", "gradient", "tv"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--strength", options->strength,
+                   "Of scene, of the prior: auto (from the picture's noise, default), gcv "
+                   "(cross-validation) or a number")
+      ->check(IsStrength())
+      ->type_name("RULE");
+  command
+      ->add_option("--tolerance", options->tolerance,
+                   fmt::format("Of scene: relative residual at which it stops; default {:g}",
+                               estimator::SceneOptions().tolerance))
+      ->check(Between(0, 1, "a relative residual"))
+      ->type_name("X");
+  command
+      ->add_option(
+          "--max-iterations", options->max_iterations,
+          fmt::format("Of scene, in all; default {}", estimator::SceneOptions().max_iterations))
+      ->check(CLI::Range(1, kMaxIterations))
+      ->type_name("N");
+  command->add_flag("--double", options->double_precision,
+                    "Of scene: numbers of 64 bit instead of 32");
+}
+
+void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
+  const estimator::BlockOptions usual;
+  command
+      ->add_option("--block-solver", options->block_solver,
+                   fmt::format("Of blocks: umfpack, cholmod or eigen; default {}",
+                               estimator::BlockSolverName(usual.solver)))
+      ->check(CLI::IsMember({"umfpack", "cholmod", "eigen"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--block-px", options->block_px,
+                   "Their edge; default 16, or the largest that --memory-limit allows")
+      ->check(CLI::Range(1, 100000))
+      ->type_name("PX");
+  command
+      ->add_option("--gamma", options->gamma,
+                   fmt::format("Of blocks: weight of the smoothness along scene points; default "
+                               "{:g}",
+                               usual.gamma))
+      ->check(Finite())
+      ->type_name("X");
+  command
+      ->add_option("--ridge", options->ridge,
+                   "Of blocks: weight mu of the distance to the warped picture; default 0.01/(U V)")
+      ->check(Finite())
+      ->type_name("X");
+  command
+      ->add_option("--stencil", options->stencil,
+                   "Of blocks, of the smoothness: warp (default), or the source's six differences")
+      ->check(CLI::IsMember({"warp", "source"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--splat", options->splat,
+                   "Of blocks: a ray reaches the two nearest pixels (bilinear, default), or the "
+                   "nearest")
+      ->check(CLI::IsMember({"nearest", "bilinear"}))
+      ->type_name("NAME");
+}
+
+// The first option of another solver than the one that is asked for; empty: none.
+std::string OptionOfBlocks(const EstimateOptions& options) {
+  if (options.block_solver) return "--block-solver";
+  if (options.block_px) return "--block-px";
+  if (options.gamma) return "--gamma";
+  if (options.ridge) return "--ridge";
+  if (options.stencil) return "--stencil";
+  return options.splat ? "--splat" : "";
+}
+
+std::string OptionOfScene(const EstimateOptions& options) {
+  if (options.prior) return "--prior";
+  if (options.strength) return "--strength";
+  if (options.tolerance) return "--tolerance";
+  if (options.max_iterations) return "--max-iterations";
+  return options.double_precision ? "--double" : "";
+}
+
+void CheckSolverUsage(const EstimateOptions& options) {
+  const std::string other = options.by_blocks() ? OptionOfScene(options) : OptionOfBlocks(options);
+  if (!other.empty()) {
+    throw UsageError(fmt::format("{} is of --solver {}, the solver is {}", other,
+                                 options.by_blocks() ? "scene" : "blocks", options.solver));
+  }
+  if (!options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
+    throw UsageError(fmt::format(
+        "--device {} is for --solver blocks; the solver scene computes on the processor (auto or "
+        "cpu)",
+        options.device));
+  }
+}
+
+// The light field's folder is replaced as a whole; a page in it would go with the older one.
+void RequireReportBesideLightField(const EstimateOptions& options) {
+  if (options.report_folder.empty()) return;
+  const auto resolved = [](const std::string& path) {
+    std::error_code failure;
+    fs::path found = fs::weakly_canonical(fs::absolute(path), failure);
+    if (failure) found = fs::absolute(path).lexically_normal();
+    return found.has_filename() ? found : found.parent_path();
+  };
+  const fs::path report = resolved(options.report_folder);
+  const fs::path output = resolved(options.output_folder);
+  const auto differing = std::mismatch(report.begin(), report.end(), output.begin(), output.end());
+  if (differing.second == output.end()) {
+    throw UsageError(
+        fmt::format("--report {}: lies in the light field's folder {}; choose a name outside of it",
+                    options.report_folder, options.output_folder));
+  }
+}
+
+}  // namespace
+
+bool EstimateOptions::falloff() const {
+  return std::find(without.begin(), without.end(), "falloff") == without.end();
+}
+
+std::string EstimateOptions::report_path() const {
+  return report_folder.empty() ? "" : (fs::path(report_folder) / kReportName).string();
+}
+
+void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
+  AddInputOptions(command, options);
+  AddLightFieldOptions(command, options);
+  AddSolverOptions(command, options);
+  AddSceneOptions(command, options);
+  AddBlockOptions(command, options);
+  AddCommonOptions(command, &options->common);
+}
+
+void CheckEstimateUsage(const EstimateOptions& options) {
+  ViewCounts(options.views);
+  CropRect(options.crop);
+  const auto needs = [](bool given, bool met, const std::string& what) {
+    if (given && !met) throw UsageError(what);
+  };
+  const bool camera = !options.camera_path.empty();
+  const bool aperture_of = !options.aperture_of.empty();
+  needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
+  needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
+  needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
+  needs(!options.aperture_shape.empty(), !aperture_of,
+        "--aperture-shape and --aperture-of exclude each other");
+  CheckSolverUsage(options);
+  RequireReportBesideLightField(options);
+}
+
+estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress progress) {
+  estimator::SceneOptions solver;
+  if (options.prior) solver.prior = estimator::PriorFromName(*options.prior);
+  const std::string strength = options.strength.value_or("auto");
+  if (strength == "gcv") {
+    solver.strength_rule = estimator::StrengthRule::kGcv;
+  } else if (strength != "auto") {
+    solver.strength_rule = estimator::StrengthRule::kGiven;
+    solver.strength = PositiveNumber(strength).value_or(0);
+  }
+  if (options.tolerance) solver.tolerance = *options.tolerance;
+  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
+  solver.double_precision = options.double_precision;
+  solver.falloff = options.falloff();
+  solver.threads = options.common.threads;
+  solver.memory_limit_mib = options.memory_limit_mib;
+  solver.progress = std::move(progress);
+  std::string why;
+  if (!solver.IsValid(&why)) throw Error(why);
+  return solver;
+}
+
+estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress progress) {
+  estimator::BlockOptions solver;
+  if (options.block_solver) solver.solver = estimator::BlockSolverFromName(*options.block_solver);
+  if (options.stencil) solver.stencil = estimator::StencilFromName(*options.stencil);
+  if (options.splat == "nearest") solver.splat = kernels::Splat::kNearest;
+  if (options.gamma) solver.gamma = *options.gamma;
+  solver.ridge = options.ridge;
+  solver.block_px = options.block_px;
+  solver.memory_limit_mib = options.memory_limit_mib;
+  solver.falloff = options.falloff();
+  solver.threads = options.common.threads;
+  solver.progress = std::move(progress);
+  std::string why;
+  if (!solver.IsValid(&why)) throw Error(why);
+  return solver;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,63 @@
+#ifndef THICKLENS_TOOLS_ESTIMATE_OPTIONS_H_
+#define THICKLENS_TOOLS_ESTIMATE_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "light_field_options.h"
+#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/scene_solver.h"
+
+namespace thicklens::tools {
+
+// The command line of `thicklens estimate`. What is empty or absent was not given.
+struct EstimateOptions {
+  CommonOptions common;
+  std::string picture_path, depth_path, camera_path, output_folder, report_folder;
+  DepthOptions depth;
+  ViewsOption views;
+  CropOption crop;
+  std::string aperture_shape;
+  std::string aperture_of;  // a light field whose views are those of the aperture
+  int grid = 0;
+  bool sparse = false;
+  std::string sensor_origin;
+  std::optional<double> st_depth_mm;
+  std::string transfer;
+  std::string solver = "scene";
+  std::optional<double> memory_limit_mib;
+  std::vector<std::string> without;
+  std::string device = "auto";
+  std::string format = "png";
+  // Of the solver `scene` alone.
+  std::optional<std::string> prior, strength;
+  std::optional<double> tolerance;
+  std::optional<int> max_iterations;
+  bool double_precision = false;
+  // Of the solver `blocks` alone.
+  std::optional<std::string> block_solver, stencil, splat;
+  std::optional<double> gamma, ridge;
+  std::optional<int> block_px;
+
+  bool by_blocks() const { return solver == "blocks"; }
+  bool falloff() const;
+  std::string report_path() const;  // of the page in its folder; empty: none
+};
+
+void AddEstimateOptions(CLI::App* command, EstimateOptions* options);
+
+// Throws UsageError for what cannot be meant: nothing that is given is left out without a word.
+void CheckEstimateUsage(const EstimateOptions& options);
+
+// What is given, and the solver's defaults else. Throws Error where that is not valid.
+using Progress = std::function<void(int done, int total)>;
+estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress progress);
+estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress progress);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_ESTIMATE_OPTIONS_H_

@@ -1,0 +1,269 @@
+#include "estimate_summary.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+namespace thicklens::tools {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kGreyLevels = 255;
+
+double PeakResidentMib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;  // Linux counts KiB
+}
+
+std::string TransferFrom(const EstimateOptions& options) {
+  if (!options.transfer.empty()) return "option";
+  return options.camera_path.empty() ? "assumed" : "camera";
+}
+
+// Least and largest disparity, px per view step along u, or along v where there is one view in u.
+std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map) {
+  const auto [least, most] = std::minmax_element(map.disparity.begin(), map.disparity.end());
+  const double step = map.step.x() != 0 ? map.step.x() : map.step.y();
+  return std::minmax({static_cast<double>(*least) * step, static_cast<double>(*most) * step});
+}
+
+json PatchesJson(const std::vector<estimator::ResidualPatch>& patches) {
+  json list = json::array();
+  for (const estimator::ResidualPatch& patch : patches) {
+    list.push_back({{"x_px", patch.x},
+                    {"y_px", patch.y},
+                    {"width_px", patch.width_px},
+                    {"height_px", patch.height_px},
+                    {"residual_rms", patch.rms}});
+  }
+  return list;
+}
+
+std::string NameOf(estimator::StrengthRule rule) {
+  switch (rule) {
+    case estimator::StrengthRule::kAuto:
+      return "auto";
+    case estimator::StrengthRule::kGcv:
+      return "gcv";
+    case estimator::StrengthRule::kGiven:
+      break;
+  }
+  return "given";
+}
+
+void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, json* out) {
+  const estimator::SceneSummary& scene = *outcome.scene;
+  out->update({{"block_solver", nullptr},
+               {"prior", estimator::PriorName(scene.prior)},
+               {"strength", scene.strength},
+               {"strength_rule", NameOf(SceneOptionsOf(options, {}).strength_rule)},
+               {"noise_sigma", scene.noise_sigma},
+               {"device", "cpu"},
+               {"threads", scene.threads},
+               {"predicted_memory_mib", scene.predicted_memory_mib},
+               {"iterations", scene.iterations},
+               {"reweightings", scene.reweightings},
+               {"converged", scene.converged},
+               {"relative_residual", scene.relative_residual},
+               {"rcond_min", nullptr},
+               {"row_share", scene.row_share},
+               {"hidden_share", scene.hidden_share},
+               {"residual_rms", scene.residual_rms},
+               {"residual_patches", PatchesJson(outcome.patches)}});
+}
+
+void AddBlocks(const EstimateOutcome& outcome, json* out) {
+  const estimator::EstimateSummary& blocks = *outcome.blocks;
+  const model::LightFieldOrigin& origin = outcome.light_field.origin;
+  out->update({{"block_solver", origin.block_solver},
+               {"stencil", origin.stencil},
+               {"splat", origin.splat},
+               {"prior", "ridge"},
+               {"strength", blocks.ridge},
+               {"noise_sigma", nullptr},
+               {"gamma", blocks.gamma},
+               {"ridge", blocks.ridge},
+               {"device", blocks.device},
+               {"threads", blocks.threads},
+               {"block_px", blocks.block_px},
+               {"blocks", blocks.blocks.size()},
+               {"predicted_memory_mib", blocks.predicted_memory_mib},
+               {"iterations", nullptr},  // a direct solver has none
+               {"converged", nullptr},
+               {"relative_residual", blocks.relative_residual},
+               {"rcond_min", blocks.rcond_min},
+               {"row_share", nullptr},
+               {"hidden_share", nullptr},
+               {"residual_rms", nullptr}});
+}
+
+double HoleShare(const PreparedEstimate& prepared) {
+  return static_cast<double>(prepared.depth.holes) /
+         static_cast<double>(prepared.input.disparity.disparity.size());
+}
+
+std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
+  if (outcome.blocks) {
+    return fmt::format(
+        "solver       {} blocks of {} px, {} ({} stencil), gamma {:g}, ridge {:.3g}\n",
+        summary["blocks"].get<int>(), summary["block_px"].get<int>(),
+        summary["block_solver"].get<std::string>(), summary["stencil"].get<std::string>(),
+        summary["gamma"].get<double>(), summary["ridge"].get<double>());
+  }
+  const estimator::SceneSummary& scene = *outcome.scene;
+  return fmt::format("solver       scene: {}\n", scene.message) +
+         fmt::format("picture      noise {:.2f} grey levels, explained to {:.2f} (rms)\n",
+                     kGreyLevels * scene.noise_sigma, kGreyLevels * scene.residual_rms) +
+         fmt::format("occlusions   {:.1f} % of the rays are not seen from the centre\n",
+                     100 * scene.hidden_share);
+}
+
+std::string AccuracyText(const EstimateOutcome& outcome) {
+  if (outcome.blocks) {
+    return fmt::format("accuracy     relative residual {:.1e}, smallest rcond {:.1e}\n",
+                       outcome.blocks->relative_residual, outcome.blocks->rcond_min);
+  }
+  const estimator::SceneSummary& scene = *outcome.scene;
+  return fmt::format("accuracy     relative residual {:.1e} after {} iterations{}\n",
+                     scene.relative_residual, scene.iterations,
+                     scene.converged ? "" : ", not converged");
+}
+
+std::string DepthText(const PreparedEstimate& prepared) {
+  std::string text;
+  if (prepared.depth.depth) {
+    const model::DepthStatistics& depth = *prepared.depth.depth;
+    text += fmt::format("depth        {:.6g} .. {:.6g} mm, median {:.6g} mm\n", depth.min_mm,
+                        depth.max_mm, depth.median_mm);
+  }
+  const auto [least_px, most_px] = DisparityRangePx(prepared.input.disparity);
+  text += fmt::format("disparity    {:.3f} .. {:.3f} px per view step\n", least_px, most_px);
+  if (prepared.depth.holes > 0) {
+    text += fmt::format("holes        {} px, filled from the farthest neighbour ({:.1f} %)\n",
+                        prepared.depth.holes, 100 * HoleShare(prepared));
+  }
+  return text;
+}
+
+}  // namespace
+
+void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome) {
+  const estimator::DisparityMap& disparity = prepared.input.disparity;
+  outcome->steps = estimator::CheckSteps(disparity, outcome->light_field.landing_step_px);
+  outcome->depth_noise_px = estimator::DepthNoisePx(disparity);
+  if (!outcome->scene) return;
+  outcome->patches = estimator::ResidualPatches(outcome->maps.residual, outcome->maps.hidden_share,
+                                                disparity.width_px, disparity.height_px,
+                                                outcome->scene->noise_sigma);
+}
+
+std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
+                                          const EstimateOutcome& outcome) {
+  std::vector<std::string> warnings;
+  if (outcome.steps.share > 0) {
+    warnings.push_back(
+        fmt::format("{:.1f} % of the pixels move by more than {:g} px from view to view (up to "
+                    "{:.1f} px): between such views the blur is sampled too coarsely{}",
+                    100 * outcome.steps.share, estimator::kLargestStepPx, outcome.steps.largest_px,
+                    options.camera_path.empty() ? "" : "; more --views make the steps smaller"));
+  }
+  if (outcome.depth_noise_px && *outcome.depth_noise_px > estimator::kLargestDepthNoisePx) {
+    warnings.push_back(fmt::format(
+        "{}: the depth has a noise of about {:.2f} px of disparity per view step, above {:g} px "
+        "it costs more than the estimate gains; smooth it along its surfaces first, and keep its "
+        "edges",
+        options.depth_path, *outcome.depth_noise_px, estimator::kLargestDepthNoisePx));
+  }
+  if (outcome.scene && !outcome.scene->converged) {
+    warnings.push_back(fmt::format(
+        "not converged: the relative residual is {:.1e} after {} iterations; allow more "
+        "(--max-iterations), or ask for less (--tolerance)",
+        outcome.scene->relative_residual, outcome.scene->iterations));
+  }
+  if (!outcome.patches.empty()) {
+    const estimator::ResidualPatch& worst = outcome.patches.front();
+    warnings.push_back(fmt::format(
+        "{} patch(es) of the photograph are not explained, the worst at x {} .. {}, y {} .. {} px "
+        "with a residual of {:.1f} grey levels (noise: {:.1f}): the depth is probably wrong there",
+        outcome.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
+        worst.y + worst.height_px - 1, kGreyLevels * worst.rms,
+        kGreyLevels * outcome.scene->noise_sigma));
+  }
+  return warnings;
+}
+
+json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepared,
+                  const EstimateOutcome& outcome) {
+  const model::LightField& light_field = outcome.light_field;
+  const EstimateSeconds& seconds = outcome.seconds;
+  const auto [least_px, most_px] = DisparityRangePx(prepared.input.disparity);
+  json out = {{"status", "ok"},
+              {"reason", ""},
+              {"output", options.output_folder},
+              {"solver", options.solver},
+              {"views", {light_field.u_count, light_field.v_count}},
+              {"size", {light_field.s_count, light_field.t_count}},
+              {"channels", light_field.channels},
+              {"transfer", prepared.input.transfer.Name()},
+              {"transfer_from", TransferFrom(options)},
+              {"seconds",
+               {{"setup", seconds.setup},
+                {"solve", seconds.solve},
+                {"views", seconds.views},
+                {"files", seconds.files},
+                {"total", seconds.total}}},
+              {"peak_rss_mib", PeakResidentMib()},
+              {"effects", light_field.origin.effects},
+              {"holes_filled", prepared.depth.holes},
+              {"clipped_fraction", outcome.clipped_fraction},
+              {"disparity",
+               {{"min_px", least_px},
+                {"max_px", most_px},
+                {"largest_step_px", outcome.steps.largest_px},
+                {"coarse_share", outcome.steps.share},
+                {"noise_px", nullptr}}},
+              {"warnings", EstimateWarnings(options, outcome)}};
+  if (outcome.depth_noise_px) out["disparity"]["noise_px"] = *outcome.depth_noise_px;
+  if (prepared.depth.depth) {
+    out["depth"] = {{"min_mm", prepared.depth.depth->min_mm},
+                    {"median_mm", prepared.depth.depth->median_mm},
+                    {"max_mm", prepared.depth.depth->max_mm}};
+  }
+  if (outcome.scene) AddScene(options, outcome, &out);
+  if (outcome.blocks) AddBlocks(outcome, &out);
+  return out;
+}
+
+std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome& outcome,
+                         const json& summary) {
+  const model::LightField& light_field = outcome.light_field;
+  const EstimateSeconds& seconds = outcome.seconds;
+  std::string text = DepthText(prepared);
+  text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n",
+                      light_field.u_count, light_field.v_count, light_field.s_count,
+                      light_field.t_count, light_field.channels);
+  text += SolverText(summary, outcome);
+  text += fmt::format("device       {}, {} thread(s)\n", summary["device"].get<std::string>(),
+                      summary["threads"].get<int>());
+  text += AccuracyText(outcome);
+  text += fmt::format(
+      "time         {:.2f} s: set-up {:.2f}, solve {:.2f}, views {:.2f}, files {:.2f}\n",
+      seconds.total, seconds.setup, seconds.solve, seconds.views, seconds.files);
+  text += fmt::format("memory       {:.0f} MiB at most ({:.0f} forecast)\n",
+                      summary["peak_rss_mib"].get<double>(),
+                      summary["predicted_memory_mib"].get<double>());
+  if (outcome.clipped_fraction > 0) {
+    text += fmt::format(
+        "clipped      {:.2f} % of the values, by the views' files (--format tiff "
+        "keeps them)\n",
+        100 * outcome.clipped_fraction);
+  }
+  return text;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,26 @@
+#include "report_folder.h"
+
+#include <fmt/format.h>
+
+#include <system_error>
+
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+
+namespace fs = std::filesystem;
+
+ReportFolder::ReportFolder(const std::string& path) : path_(path) {
+  std::error_code failure;
+  if (path.empty() || fs::exists(path, failure)) return;
+  made_ = fs::create_directory(path, failure);
+  if (failure)
+    throw Error(fmt::format("{}: the folder cannot be made: {}", path, failure.message()));
+}
+
+ReportFolder::~ReportFolder() {
+  std::error_code not_empty;
+  if (made_) fs::remove(path_, not_empty);
+}
+
+}  // namespace thicklens::tools
