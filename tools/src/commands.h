@@ -59,6 +59,7 @@ void AddExplainCommand(CLI::App* program, CommandAction* action);
 void AddDoctorCommand(CLI::App* program, CommandAction* action);
 void AddCameraCommand(CLI::App* program, CommandAction* action);
 void AddTargetCommand(CLI::App* program, CommandAction* action);
+void AddBenchCommand(CLI::App* program, CommandAction* action);
 
 }  // namespace thicklens::tools
 

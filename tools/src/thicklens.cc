@@ -89,6 +89,7 @@ int Main(int argc, char** argv) {
   tools::AddCompareCommand(&program, &action);
   tools::AddReportCommand(&program, &action);
   tools::AddExplainCommand(&program, &action);
+  tools::AddBenchCommand(&program, &action);
   tools::AddDoctorCommand(&program, &action);
   tools::AddCameraCommand(&program, &action);
   tools::AddTargetCommand(&program, &action);

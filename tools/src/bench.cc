@@ -1,0 +1,271 @@
+// thicklens bench: what the solvers cost on this machine, and what they give for it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bench_scene.h"
+#include "build_info.h"
+#include "commands.h"
+#include "interrupt.h"
+#include "light_field_options.h"
+#include "option_values.h"
+#include "progress_line.h"
+#include "thicklens/error.h"
+#include "thicklens/estimator/compare.h"
+#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/scene_solver.h"
+#include "thicklens/kernels/device.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::tools {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kBlockPx = 16;
+constexpr int kSamplePx = 64;  // edge of the part that blocks are measured on
+
+struct BenchOptions {
+  CommonOptions common;
+  std::string size = "256x256";
+  ViewsOption views;
+  int repeat = 5;
+  bool full = false;
+  std::uint64_t seed = 1;
+};
+
+// One way from picture and depth to the views, all of it.
+struct Contender {
+  std::string solver, block_solver, prior;
+  const BenchScene* scene = nullptr;
+  std::function<model::LightField(const BenchScene&)> estimate;
+  std::vector<double> seconds;
+  double psnr_db = 0;
+};
+
+std::pair<int, int> SizeOf(const std::string& text) {
+  const auto parts = SplitPixels("--size", text, 'x', "WIDTHxHEIGHT");
+  if (parts.size() != 2 || parts[0] < kSamplePx || parts[1] < kSamplePx) {
+    throw UsageError(fmt::format("--size: WIDTHxHEIGHT, both at least {}, is expected, found '{}'",
+                                 kSamplePx, text));
+  }
+  return {parts[0], parts[1]};
+}
+
+std::string ProcessorName() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.rfind("model name", 0) != 0) continue;
+    const std::size_t colon = line.find(": ");
+    if (colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+}
+
+std::vector<Contender> Contenders(const BenchScene& whole, const BenchScene& sample, int threads,
+                                  kernels::Backend* backend) {
+  std::vector<Contender> contenders;
+  for (const auto solver : {estimator::BlockSolver::kUmfpack, estimator::BlockSolver::kCholmod,
+                            estimator::BlockSolver::kEigen}) {
+    if (!estimator::IsBuiltIn(solver)) continue;
+    contenders.push_back({"blocks",
+                          estimator::BlockSolverName(solver),
+                          "ridge",
+                          &sample,
+                          [=](const BenchScene& scene) {
+                            estimator::BlockOptions options;
+                            options.solver = solver;
+                            options.block_px = kBlockPx;
+                            options.threads = threads;
+                            options.progress = [](int, int) { ThrowIfInterrupted(); };
+                            estimator::EstimateSummary summary;
+                            return estimator::EstimateByBlocks(scene.input, options, backend,
+                                                               &summary);
+                          },
+                          {},
+                          0});
+  }
+  for (const auto prior :
+       {estimator::Prior::kRidge, estimator::Prior::kGradient, estimator::Prior::kTotalVariation}) {
+    contenders.push_back({"scene",
+                          "",
+                          estimator::PriorName(prior),
+                          &whole,
+                          [=](const BenchScene& scene) {
+                            estimator::SceneOptions options;
+                            options.prior = prior;
+                            options.threads = threads;
+                            options.progress = [](int, int) { ThrowIfInterrupted(); };
+                            estimator::SceneSummary summary;
+                            return estimator::EstimateScene(scene.input, options, &summary,
+                                                            nullptr);
+                          },
+                          {},
+                          0});
+  }
+  contenders.push_back({"functional",
+                        "",
+                        "ridge",
+                        &whole,
+                        [=](const BenchScene& scene) {
+                          estimator::FunctionalOptions options;
+                          options.threads = threads;
+                          options.progress = [](int, int) { ThrowIfInterrupted(); };
+                          estimator::FunctionalSummary summary;
+                          return estimator::EstimateFunctional(scene.input, options, &summary);
+                        },
+                        {},
+                        0});
+  contenders.push_back({"dibr",
+                        "",
+                        "",
+                        &whole,
+                        [=](const BenchScene& scene) {
+                          return estimator::WarpedLightField(scene.input, true, threads);
+                        },
+                        {},
+                        0});
+  return contenders;
+}
+
+double PsnrDb(const BenchScene& scene, const model::LightField& estimate, int threads) {
+  const int border_px =
+      std::min(20, std::min(scene.input.picture.width_px, scene.input.picture.height_px) / 4);
+  return estimator::CompareLightFields(scene.truth, estimate, border_px, std::nullopt, threads)
+      .mean.psnr_db;
+}
+
+// Round by round, so that what else the machine does falls on all alike.
+void Measure(const BenchOptions& options, int threads, std::vector<Contender>* contenders) {
+  ProgressLine progress("measuring", options.common.quiet);
+  const int total = options.repeat * static_cast<int>(contenders->size());
+  int done = 0;
+  for (int round = 0; round < options.repeat; ++round) {
+    for (Contender& contender : *contenders) {
+      ThrowIfInterrupted();
+      const Clock::time_point start = Clock::now();
+      const model::LightField estimate = contender.estimate(*contender.scene);
+      contender.seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
+      if (round == 0) contender.psnr_db = PsnrDb(*contender.scene, estimate, threads);
+      progress.Show(++done, total);
+    }
+  }
+}
+
+CommandResult BenchSolvers(const BenchOptions& options) {
+  const auto [width_px, height_px] = SizeOf(options.size);
+  auto [u_count, v_count] = ViewCounts(options.views);
+  if (u_count == 0) u_count = v_count = 7;
+  const int threads = model::ResolveThreads(options.common.threads);
+  BenchScene whole;
+  {
+    ProgressLine progress("simulating", options.common.quiet);
+    whole = MakeBenchScene(width_px, height_px, u_count, v_count, options.seed, 0,
+                           [&](int done, int total) {
+                             ThrowIfInterrupted();
+                             progress.Show(done, total);
+                           });
+  }
+  const BenchScene sample = options.full ? whole : MiddleOf(whole, kSamplePx, kSamplePx);
+  const auto backend =
+      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
+  std::vector<Contender> contenders = Contenders(whole, sample, threads, backend.get());
+  Measure(options, threads, &contenders);
+
+  const double pixels = static_cast<double>(width_px) * height_px;
+  const double share = pixels / (static_cast<double>(sample.input.picture.width_px) *
+                                 sample.input.picture.height_px);
+  std::string text = fmt::format(
+      "{} x {} px, {} x {} views, one channel, {} thread(s), medians of {}\n\n"
+      "{:<11}{:<9}{:<10}{:>10}{:>12}{:>10}\n",
+      width_px, height_px, u_count, v_count, threads, options.repeat, "solver", "", "prior",
+      "seconds", "blocks/it", "PSNR dB");
+  nlohmann::json rows = nlohmann::json::array();
+  std::optional<double> blocks_seconds;
+  bool extrapolated_any = false;
+  for (const Contender& contender : contenders) {
+    const bool extrapolated = contender.scene != &whole && !options.full;
+    const double seconds = Median(contender.seconds) * (extrapolated ? share : 1);
+    if (!blocks_seconds) blocks_seconds = seconds;
+    extrapolated_any = extrapolated_any || extrapolated;
+    const auto or_null = [](const std::string& name) {
+      return name.empty() ? nlohmann::json() : nlohmann::json(name);
+    };
+    rows.push_back({{"solver", contender.solver},
+                    {"block_solver", or_null(contender.block_solver)},
+                    {"prior", or_null(contender.prior)},
+                    {"size", {width_px, height_px}},
+                    {"views", {u_count, v_count}},
+                    {"threads", threads},
+                    {"extrapolated_from",
+                     extrapolated ? nlohmann::json({kSamplePx, kSamplePx}) : nlohmann::json()},
+                    {"seconds", seconds},
+                    {"seconds_of_runs", contender.seconds},
+                    {"psnr_db", contender.psnr_db}});
+    text += fmt::format("{:<11}{:<9}{:<10}{:>9.3g}{}{:>12.4g}{:>10.2f}\n", contender.solver,
+                        contender.block_solver, contender.prior, seconds, extrapolated ? "*" : " ",
+                        *blocks_seconds / seconds, contender.psnr_db);
+  }
+  if (extrapolated_any) {
+    text += fmt::format(
+        "\n* of {} x {} px in the middle of the picture, times {:.4g}; their PSNR is of that part. "
+        "--full measures all.\n",
+        kSamplePx, kSamplePx, share);
+  }
+  PrintResult(options.common, text);
+  return {{{"status", "ok"},
+           {"reason", ""},
+           {"machine",
+            {{"processor", ProcessorName()},
+             {"cores", static_cast<int>(std::thread::hardware_concurrency())},
+             {"build", BuildInfo()},
+             {"date", NowIso8601()}}},
+           {"scene", {{"kind", "slanted plane of noise"}, {"channels", 1}, {"seed", options.seed}}},
+           {"repeat", options.repeat},
+           {"rows", rows}},
+          ""};
+}
+
+}  // namespace
+
+void AddBenchCommand(CLI::App* program, CommandAction* action) {
+  CLI::App* bench =
+      program->add_subcommand("bench", "What accuracy costs in time, on this machine");
+  bench->require_subcommand(1);
+  CLI::App* command = bench->add_subcommand(
+      "solvers", "All light-field solvers on one simulated picture, in one run");
+  const auto options = std::make_shared<BenchOptions>();
+  command->add_option("--size", options->size, "Of the picture, px")
+      ->capture_default_str()
+      ->type_name("WIDTHxHEIGHT");
+  AddViewsOption(command, &options->views, "Views across and down; default 7x7");
+  command->add_option("--repeat", options->repeat, "Times that each is run; the median counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_flag("--full", options->full, "Blocks of the whole picture, not of a sample");
+  command->add_option("--seed", options->seed, "Of texture and noise")
+      ->capture_default_str()
+      ->type_name("N");
+  AddCommonOptions(command, &options->common);
+  command->callback([options, action] {
+    *action = [options] { RunCommand(options->common, [&] { return BenchSolvers(*options); }); };
+  });
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,119 @@
+#include "bench_scene.h"
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "thicklens/model/camera.h"
+#include "thicklens/model/light_field_grid.h"
+#include "thicklens/model/scene.h"
+#include "thicklens/model/scene_simulator.h"
+#include "thicklens/model/thick_lens.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr double kFocusDepthMm = 1000;
+constexpr double kNearMm = 750, kFarMm = 1500;
+
+model::Camera BenchCamera(int width_px, int height_px) {
+  model::Camera camera;
+  camera.name = "bench";
+  camera.lens.front_focal_length_mm = camera.lens.rear_focal_length_mm = 12.5;
+  camera.lens.aperture_radius_mm = 4.46;
+  camera.sensor.width_px = width_px;
+  camera.sensor.height_px = height_px;
+  camera.sensor.pixel_pitch_mm = 0.0028;
+  camera.sensor.principal_point_px = {(width_px - 1) / 2.0, (height_px - 1) / 2.0};
+  camera.sensor.transfer = model::TransferCurve::Srgb();
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm =
+      model::Estimate{model::ImageDistanceMm(camera.lens, kFocusDepthMm), 0};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
+  camera.calibration->evidence.method = "assumed";
+  return camera;
+}
+
+// 1/z is linear in the picture: (1 - slope tan)/depth on a plane of that slope.
+model::PlaneOptions SlantedPlane(const model::Camera& camera) {
+  const double left = 1 / kNearMm, right = 1 / kFarMm;
+  const double half_width = (camera.sensor.width_px - 1) / 2.0 / camera.focal_scale_px();
+  model::PlaneOptions plane;
+  plane.depth_mm = 2 / (left + right);
+  plane.slope = {(left - right) / (left + right) / std::max(half_width, 1e-6), 0};
+  return plane;
+}
+
+model::LinearPicture Grey(const model::LinearPicture& picture) { return model::ToGrey(picture); }
+
+model::LightField GreyViews(const model::LightField& colours) {
+  model::LightField grey =
+      model::MakeLightField(colours.s_count, colours.t_count, colours.u_count, colours.v_count, 1);
+  grey.weights = colours.weights;
+  grey.transfer = colours.transfer;
+  grey.grid = colours.grid;
+  grey.camera = colours.camera;
+  grey.landing_step_px = colours.landing_step_px;
+  for (int l = 0; l < colours.v_count; ++l) {
+    for (int k = 0; k < colours.u_count; ++k)
+      model::SetView(&grey, k, l, Grey(model::ViewPicture(colours, k, l)));
+  }
+  return grey;
+}
+
+}  // namespace
+
+BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count, std::uint64_t seed,
+                          int threads, const std::function<void(int done, int total)>& progress) {
+  model::SceneSimulationOptions options;
+  options.camera = BenchCamera(width_px, height_px);
+  options.noise_sigma_grey_levels = 1;
+  options.u_count = u_count;
+  options.v_count = v_count;
+  options.seed = seed;
+  model::SceneLayer plane;
+  plane.plane = SlantedPlane(options.camera);
+  plane.texture.kind = model::TextureKind::kNoise;
+  plane.texture.saturation = 0;
+  options.layers = {plane};
+  const model::SceneSimulator simulator(options, {{}});
+  const model::SceneRun run{threads, progress};
+
+  BenchScene scene;
+  scene.truth = GreyViews(simulator.RenderLightField(u_count, v_count, run));
+  estimator::EstimateInput& input = scene.input;
+  input.camera = options.camera;
+  input.transfer = options.camera.sensor.transfer;
+  input.picture =
+      Grey(model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer));
+  input.grid = model::DefaultGrid(options.camera, u_count, v_count);
+  input.weights =
+      model::ApertureWeights(model::ApertureShapeOf(options.camera.psf), u_count, v_count);
+  input.disparity =
+      estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values, width_px, height_px);
+  return scene;
+}
+
+BenchScene MiddleOf(const BenchScene& scene, int width_px, int height_px) {
+  const estimator::EstimateInput& whole = scene.input;
+  const model::PixelRect part{(whole.picture.width_px - width_px) / 2,
+                              (whole.picture.height_px - height_px) / 2, width_px, height_px};
+  BenchScene middle;
+  middle.truth = model::CropViews(scene.truth, part);
+  middle.input = whole;
+  middle.input.picture = model::CropPicture(whole.picture, part);
+  middle.input.camera = model::CropCamera(*whole.camera, part);
+  middle.input.grid = middle.truth.grid;
+  middle.input.disparity.width_px = width_px;
+  middle.input.disparity.height_px = height_px;
+  middle.input.disparity.disparity.clear();
+  for (int y = part.y; y < part.y + height_px; ++y) {
+    const auto row = whole.disparity.disparity.begin() +
+                     static_cast<std::ptrdiff_t>(y) * whole.picture.width_px + part.x;
+    middle.input.disparity.disparity.insert(middle.input.disparity.disparity.end(), row,
+                                            row + width_px);
+  }
+  return middle;
+}
+
+}  // namespace thicklens::tools

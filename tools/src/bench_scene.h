@@ -1,0 +1,28 @@
+#ifndef THICKLENS_TOOLS_BENCH_SCENE_H_
+#define THICKLENS_TOOLS_BENCH_SCENE_H_
+
+#include <cstdint>
+#include <functional>
+
+#include "thicklens/estimator/estimate.h"
+#include "thicklens/model/light_field.h"
+
+namespace thicklens::tools {
+
+// One picture that every solver can be measured on, with the light field it is a picture of: a
+// slanted plane of noise from .75 m to 1.5 m before a lens of f/1.4 that is focused at 1 m, so that
+// the blur goes from 0 to 3 px of sigma, in grey, 8 bits, with noise of one grey level.
+// The photograph is made of hundreds of rays a pixel, far finer than any solver's views.
+struct BenchScene {
+  estimator::EstimateInput input;
+  model::LightField truth;
+};
+BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count, std::uint64_t seed,
+                          int threads, const std::function<void(int done, int total)>& progress);
+
+// The same for a part of the picture, in its middle.
+BenchScene MiddleOf(const BenchScene& scene, int width_px, int height_px);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_BENCH_SCENE_H_
