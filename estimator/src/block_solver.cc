@@ -1,17 +1,16 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <memory>
 #include <mutex>
 #include <utility>
 
 #include "block_system.h"
+#include "estimate_input.h"
 #include "linear_solver.h"
+#include "run_cost.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/estimate.h"
@@ -22,88 +21,8 @@ namespace {
 
 using kernels::BlockGeometry;
 using kernels::Kernels;
-using Clock = std::chrono::steady_clock;
-
 constexpr int kDefaultBlockPx = 16;  // the source's
-constexpr double kBytesPerMib = 1024.0 * 1024.0;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
-
-double LargestDisparityPx(const DisparityMap& map) {
-  double largest = 0;
-  for (const float value : map.disparity) {
-    largest = std::max(largest, static_cast<double>(std::abs(value)));
-  }
-  return largest * map.step.cwiseAbs().maxCoeff();
-}
-
-// A file or field must be named by whoever read it; here the numbers are.
-void CheckInput(const EstimateInput& input) {
-  const auto fail = [](const std::string& what) { throw Error("estimate: " + what); };
-  const model::LinearPicture& picture = input.picture;
-  if (picture.channels != 1 && picture.channels != 3) {
-    fail(fmt::format("the picture has {} channels: it must have 1 or 3", picture.channels));
-  }
-  if (picture.width_px < 1 || picture.height_px < 1 ||
-      picture.values.size() !=
-          Index(picture.width_px) * Index(picture.height_px) * Index(picture.channels)) {
-    fail(fmt::format("the picture is {}x{} px with {} values", picture.width_px, picture.height_px,
-                     picture.values.size()));
-  }
-  if (!std::all_of(picture.values.begin(), picture.values.end(),
-                   [](float value) { return std::isfinite(value); })) {
-    fail("the picture has values that are not finite");
-  }
-  if (input.disparity.width_px != picture.width_px ||
-      input.disparity.height_px != picture.height_px) {
-    fail(fmt::format("the depth is {}x{} px, the picture {}x{} px: the sizes must be equal",
-                     input.disparity.width_px, input.disparity.height_px, picture.width_px,
-                     picture.height_px));
-  }
-  if (!std::all_of(input.disparity.disparity.begin(), input.disparity.disparity.end(),
-                   [](float value) { return std::isfinite(value); })) {
-    fail("the disparity has holes: they must be filled");
-  }
-  const double widest_px = LargestDisparityPx(input.disparity);
-  const int size_px = std::max(picture.width_px, picture.height_px);
-  if (!(widest_px <= size_px)) {
-    fail(
-        fmt::format("the largest disparity is {:.4g} px per view step: it must be at most the "
-                    "picture's size, {} px; is its scale right?",
-                    widest_px, size_px));
-  }
-  if (input.weights.size() < 2) {
-    fail(fmt::format("views are {}x{}: a light field needs at least two", input.weights.cols(),
-                     input.weights.rows()));
-  }
-  if (!(input.weights >= 0).all() || !(std::abs(input.weights.sum() - 1) < 1e-6)) {
-    fail(fmt::format("the weights of the views sum to {}: they must be >= 0 with sum 1",
-                     input.weights.sum()));
-  }
-  if (input.grid.has_value() != input.camera.has_value()) {
-    fail("a camera and a grid come together");
-  }
-  if (input.grid && input.grid->planes.uv_depth_mm != 0) {
-    fail(fmt::format(
-        "the UV plane lies at depth {} mm: it must be the aperture (0), where a view has one "
-        "transmission for all its rays",
-        input.grid->planes.uv_depth_mm));
-  }
-  if (input.grid &&
-      (input.grid->s_count != picture.width_px || input.grid->t_count != picture.height_px ||
-       input.grid->u_count != input.weights.cols() ||
-       input.grid->v_count != input.weights.rows())) {
-    fail(fmt::format(
-        "the grid has {}x{} samples and {}x{} views, the picture {}x{} px and the "
-        "weights {}x{}: they must be equal",
-        input.grid->s_count, input.grid->t_count, input.grid->u_count, input.grid->v_count,
-        picture.width_px, picture.height_px, input.weights.cols(), input.weights.rows()));
-  }
-}
 
 // The blocks of a picture, row by row; those at the right and lower border may be smaller.
 std::vector<model::PixelRect> CutInBlocks(int width_px, int height_px, int block_px) {
@@ -114,14 +33,6 @@ std::vector<model::PixelRect> CutInBlocks(int width_px, int height_px, int block
     }
   }
   return blocks;
-}
-
-double ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  double total_pages = 0;
-  double resident_pages = 0;
-  file >> total_pages >> resident_pages;
-  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 // Bytes of a block's system beside its factor: patterns of its parts and of their sum, values, the

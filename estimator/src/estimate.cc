@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "estimate_input.h"
 #include "ray_irradiance.h"
-#include "ray_landing.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
 #include "warped_views.h"
@@ -16,19 +16,6 @@ namespace thicklens::estimator {
 namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
-
-// A light field of the input's sizes, without values of its own.
-model::LightField FrameOf(const EstimateInput& input) {
-  model::LightField frame = model::MakeLightField(
-      input.picture.width_px, input.picture.height_px, static_cast<int>(input.weights.cols()),
-      static_cast<int>(input.weights.rows()), input.picture.channels);
-  frame.weights = input.weights;
-  frame.transfer = input.transfer;
-  frame.grid = input.grid;
-  frame.camera = input.camera;
-  if (input.grid) frame.landing_step_px = LandingStepPx(*input.camera, *input.grid);
-  return frame;
-}
 
 }  // namespace
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "ray_landing.h"
 #include "thicklens/error.h"
 
 namespace thicklens::estimator {
@@ -107,6 +108,18 @@ void CheckInput(const EstimateInput& input) {
         input.grid->s_count, input.grid->t_count, input.grid->u_count, input.grid->v_count,
         picture.width_px, picture.height_px, input.weights.cols(), input.weights.rows()));
   }
+}
+
+model::LightField FrameOf(const EstimateInput& input) {
+  model::LightField frame = model::MakeLightField(
+      input.picture.width_px, input.picture.height_px, static_cast<int>(input.weights.cols()),
+      static_cast<int>(input.weights.rows()), input.picture.channels);
+  frame.weights = input.weights;
+  frame.transfer = input.transfer;
+  frame.grid = input.grid;
+  frame.camera = input.camera;
+  if (input.grid) frame.landing_step_px = LandingStepPx(*input.camera, *input.grid);
+  return frame;
 }
 
 }  // namespace thicklens::estimator

@@ -1,13 +1,10 @@
 #include "thicklens/estimator/functional_solver.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -16,6 +13,7 @@
 #include "aperture_prior.h"
 #include "estimate_input.h"
 #include "ray_landing.h"
+#include "run_cost.h"
 #include "scene_projection.h"
 #include "scene_rays.h"
 #include "thicklens/error.h"
@@ -24,22 +22,6 @@
 
 namespace thicklens::estimator {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-constexpr double kBytesPerMib = 1024.0 * 1024.0;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  double total_pages = 0;
-  double resident_pages = 0;
-  file >> total_pages >> resident_pages;
-  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
 
 // Views and iterations, counted together. Of iterations there may be fewer than expected, or more.
 class Progress {
@@ -188,18 +170,6 @@ bool ShowsSameRays(const EstimateInput& input, const Eigen::Vector2d& landing_st
   return landing_step_px.isZero(0) && (input.weights > 0).all();
 }
 
-model::LightField FrameOf(const EstimateInput& input, const Eigen::Vector2d& landing_step_px) {
-  model::LightField frame = model::MakeLightField(
-      input.picture.width_px, input.picture.height_px, static_cast<int>(input.weights.cols()),
-      static_cast<int>(input.weights.rows()), input.picture.channels);
-  frame.weights = input.weights;
-  frame.transfer = input.transfer;
-  frame.grid = input.grid;
-  frame.camera = input.camera;
-  frame.landing_step_px = landing_step_px;
-  return frame;
-}
-
 void CheckMemory(const FunctionalOptions& options, double bytes) {
   if (!options.memory_limit_mib || bytes <= *options.memory_limit_mib * kBytesPerMib) return;
   throw Error(fmt::format(
@@ -314,7 +284,7 @@ model::LightField EstimateFunctional(const EstimateInput& input, const Functiona
   AperturePrior prior(static_cast<int>(input.weights.cols()),
                       static_cast<int>(input.weights.rows()), options.gamma, summary->ridge);
   FunctionalSystem system(&rays, &prior, threads);
-  model::LightField light_field = FrameOf(input, landing_step_px);
+  model::LightField light_field = FrameOf(input);
   summary->setup_seconds = SecondsSince(start);
 
   for (int channel = 0; channel < channels; ++channel) {

@@ -1,19 +1,17 @@
 #include "thicklens/estimator/scene_solver.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <mutex>
 #include <numeric>
 #include <utility>
 
 #include "estimate_input.h"
 #include "ray_landing.h"
+#include "run_cost.h"
 #include "scene_data.h"
 #include "scene_priors.h"
 #include "scene_projection.h"
@@ -26,9 +24,6 @@
 namespace thicklens::estimator {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-constexpr double kBytesPerMib = 1024.0 * 1024.0;
 // What is assumed of the noise where the photograph does not tell it, in stored values.
 constexpr double kUsualNoise = 1.0 / 255;
 // Of a noiseless photograph: no model of its rays is better than the rounding of 8 bits.
@@ -38,18 +33,6 @@ constexpr double kSlopeSmoothingPx = 2;
 
 // For the progress only.
 constexpr int kUsualIterations = 60;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  double total_pages = 0;
-  double resident_pages = 0;
-  file >> total_pages >> resident_pages;
-  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
-}
 
 // Iterations and views, counted together. Of iterations there may be more or fewer than expected.
 class Progress {

@@ -1,0 +1,21 @@
+#include "run_cost.h"
+
+#include <unistd.h>
+
+#include <fstream>
+
+namespace thicklens::estimator {
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double ResidentBytes() {
+  std::ifstream file("/proc/self/statm");
+  double total_pages = 0;
+  double resident_pages = 0;
+  file >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+}  // namespace thicklens::estimator

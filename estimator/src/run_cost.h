@@ -1,0 +1,16 @@
+#ifndef THICKLENS_ESTIMATOR_SRC_RUN_COST_H_
+#define THICKLENS_ESTIMATOR_SRC_RUN_COST_H_
+
+#include <chrono>
+
+namespace thicklens::estimator {
+
+// What a run has cost so far, for its summary and its limit.
+constexpr double kBytesPerMib = 1024.0 * 1024.0;
+using Clock = std::chrono::steady_clock;
+double SecondsSince(Clock::time_point start);
+double ResidentBytes();  // of the whole process, now
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SRC_RUN_COST_H_
