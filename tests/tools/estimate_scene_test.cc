@@ -180,6 +180,11 @@ TEST_F(EstimateSceneTest, TakesItsSettings) {
   summary = Summary(With(Usual(), {"--prior", "gradient", "--strength", "gcv"}));
   EXPECT_EQ(summary["prior"], "gradient");
   EXPECT_EQ(summary["strength_rule"], "gcv");
+  // Below what numbers of 32 bit can reach.
+  const Arguments exact = {"--prior", "gradient",         "--tolerance",
+                           "1e-10",   "--max-iterations", "500"};
+  EXPECT_EQ(Summary(With(With(Usual(), exact), {"--double"}))["converged"], true);
+  EXPECT_EQ(Summary(With(Usual(), exact))["converged"], false);
   const json loose = Summary(With(Usual(), {"--prior", "gradient", "--tolerance", "0.1"}));
   EXPECT_LT(loose["iterations"].get<int>(),
             Summary(With(Usual(), {"--prior", "gradient"}))["iterations"].get<int>());

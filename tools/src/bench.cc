@@ -192,9 +192,9 @@ CommandResult BenchSolvers(const BenchOptions& options) {
                                  sample.input.picture.height_px);
   std::string text = fmt::format(
       "{} x {} px, {} x {} views, one channel, {} thread(s), medians of {}\n\n"
-      "{:<11}{:<9}{:<10}{:>10}{:>12}{:>10}\n",
+      "{:<11}{:<9}{:<10}{:>10}{:>14}{:>10}\n",
       width_px, height_px, u_count, v_count, threads, options.repeat, "solver", "", "prior",
-      "seconds", "blocks/it", "PSNR dB");
+      "seconds", "times faster", "PSNR dB");
   nlohmann::json rows = nlohmann::json::array();
   std::optional<double> blocks_seconds;
   bool extrapolated_any = false;
@@ -217,7 +217,7 @@ CommandResult BenchSolvers(const BenchOptions& options) {
                     {"seconds", seconds},
                     {"seconds_of_runs", contender.seconds},
                     {"psnr_db", contender.psnr_db}});
-    text += fmt::format("{:<11}{:<9}{:<10}{:>9.3g}{}{:>12.4g}{:>10.2f}\n", contender.solver,
+    text += fmt::format("{:<11}{:<9}{:<10}{:>9.3g}{}{:>14.4g}{:>10.2f}\n", contender.solver,
                         contender.block_solver, contender.prior, seconds, extrapolated ? "*" : " ",
                         *blocks_seconds / seconds, contender.psnr_db);
   }

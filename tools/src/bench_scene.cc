@@ -44,8 +44,6 @@ model::PlaneOptions SlantedPlane(const model::Camera& camera) {
   return plane;
 }
 
-model::LinearPicture Grey(const model::LinearPicture& picture) { return model::ToGrey(picture); }
-
 model::LightField GreyViews(const model::LightField& colours) {
   model::LightField grey =
       model::MakeLightField(colours.s_count, colours.t_count, colours.u_count, colours.v_count, 1);
@@ -56,7 +54,7 @@ model::LightField GreyViews(const model::LightField& colours) {
   grey.landing_step_px = colours.landing_step_px;
   for (int l = 0; l < colours.v_count; ++l) {
     for (int k = 0; k < colours.u_count; ++k)
-      model::SetView(&grey, k, l, Grey(model::ViewPicture(colours, k, l)));
+      model::SetView(&grey, k, l, model::ToGrey(model::ViewPicture(colours, k, l)));
   }
   return grey;
 }
@@ -84,8 +82,8 @@ BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count,
   estimator::EstimateInput& input = scene.input;
   input.camera = options.camera;
   input.transfer = options.camera.sensor.transfer;
-  input.picture =
-      Grey(model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer));
+  input.picture = model::ToGrey(
+      model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer));
   input.grid = model::DefaultGrid(options.camera, u_count, v_count);
   input.weights =
       model::ApertureWeights(model::ApertureShapeOf(options.camera.psf), u_count, v_count);
