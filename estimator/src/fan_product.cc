@@ -1,8 +1,10 @@
 // Where a fan of rays is the product of two axes, and the filters of these.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
+#include "catmull_rom.h"
 #include "surface_taps.h"
 #include "thicklens/model/parallel.h"
 #include "view_fan.h"
@@ -107,23 +109,34 @@ std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
 
 namespace {
 
-// The linear weights that a pixel's rays put on the pixels along an axis.
-struct Tap {
-  int offset = 0;
-  double fraction = 0;  // goes to offset + 1
+// What one ray of a pixel reads along an axis.
+struct Taps {
+  int offset = 0;  // of the first, from the pixel
+  int count = 1;
+  std::array<double, 4> weight{1, 0, 0, 0};
 };
-Tap TapAt(int pixel, float source_px, int count) {
+
+// `is_near(n)`: pixel n of the line is of the ray's surface.
+template <typename IsNear>
+Taps TapsOnLine(int pixel, float source_px, int count, Between between, const IsNear& is_near) {
   const double at = std::clamp(pixel + static_cast<double>(source_px), 0.0, count - 1.0);
-  const int below = std::min(static_cast<int>(at), std::max(count - 2, 0));
-  return {below - pixel, at - below};
+  const int below = static_cast<int>(at);
+  const double fraction = at - below;
+  if (fraction == 0) return {below - pixel};
+  bool cubic = between == Between::kCubic && below >= 1 && below + 2 < count;
+  for (int n = below - 1; cubic && n <= below + 2; ++n) cubic = is_near(n);
+  if (cubic) return {below - 1 - pixel, 4, CatmullRomWeights(fraction)};
+  return {below - pixel, 2, {1 - fraction, fraction, 0, 0}};
 }
 
 }  // namespace
 
 template <typename Real>
-kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction, int width_px,
-                                    int height_px, const Eigen::VectorXd& weights, int threads) {
+kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction,
+                                    const DisparityMap& disparity, const Eigen::VectorXd& weights,
+                                    Between between, int threads) {
   using kernels::kFilterBlockPx;
+  const int width_px = disparity.width_px, height_px = disparity.height_px;
   kernels::PixelFilter<Real> filter;
   filter.axis = direction;
   filter.width_px = width_px;
@@ -131,10 +144,16 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
   const bool across = direction == kernels::Axis::kAcross;
   const int blocks = filter.blocks_in_row();
   filter.radius_px.assign(Index(blocks) * Index(height_px), 0);
-  const auto tap_of = [&](int x, int y, int position) {
+  const auto tolerance = static_cast<float>(SurfaceTolerance(disparity));
+  const auto taps_of = [&](int x, int y, int position) {
     const std::size_t i = Index(y) * Index(width_px) + Index(x);
     const float way = axis.source_px[Index(position)][i];
-    return across ? TapAt(x, way, width_px) : TapAt(y, way, height_px);
+    const float* const line =
+        disparity.disparity.data() + (across ? Index(y) * Index(width_px) : Index(x));
+    const std::size_t step = across ? 1 : Index(width_px);
+    const float here = disparity.disparity[i];
+    return TapsOnLine(across ? x : y, way, across ? width_px : height_px, between,
+                      [&](int n) { return std::abs(line[Index(n) * step] - here) <= tolerance; });
   };
   const auto for_row = [&](int y, const auto& use) {
     for (int x = 0; x < width_px; ++x) {
@@ -142,12 +161,12 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
       if (axis.usable[i] == 0) continue;
       const std::size_t block = Index(y) * Index(blocks) + Index(x / kFilterBlockPx);
       for (int position = 0; position < axis.count; ++position)
-        use(block, x, tap_of(x, y, position), weights[position]);
+        use(block, x, taps_of(x, y, position), weights[position]);
     }
   };
   model::ParallelFor(height_px, threads, [&](int y) {
-    for_row(y, [&](std::size_t block, int, const Tap& tap, double) {
-      const int reach = std::max(-tap.offset, tap.fraction > 0 ? tap.offset + 1 : tap.offset);
+    for_row(y, [&](std::size_t block, int, const Taps& taps, double) {
+      const int reach = std::max(-taps.offset, taps.offset + taps.count - 1);
       filter.radius_px[block] = std::max(filter.radius_px[block], reach);
     });
   });
@@ -163,10 +182,9 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
                                  Index(offset + filter.radius_px[block]) * kFilterBlockPx +
                                  Index(x % kFilterBlockPx)];
     };
-    for_row(y, [&](std::size_t block, int x, const Tap& tap, double weight) {
-      coefficient(block, x, tap.offset) += static_cast<Real>(weight * (1 - tap.fraction));
-      if (tap.fraction > 0)
-        coefficient(block, x, tap.offset + 1) += static_cast<Real>(weight * tap.fraction);
+    for_row(y, [&](std::size_t block, int x, const Taps& taps, double weight) {
+      for (int n = 0; n < taps.count; ++n)
+        coefficient(block, x, taps.offset + n) += static_cast<Real>(weight * taps.weight[Index(n)]);
     });
     for (int x = 0; x < width_px; ++x) {
       if (axis.usable[Index(y) * Index(width_px) + Index(x)] != 0) continue;
@@ -177,9 +195,9 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
   return filter;
 }
 
-template kernels::PixelFilter<float> FilterOf(const FanAxis&, kernels::Axis, int, int,
-                                              const Eigen::VectorXd&, int);
-template kernels::PixelFilter<double> FilterOf(const FanAxis&, kernels::Axis, int, int,
-                                               const Eigen::VectorXd&, int);
+template kernels::PixelFilter<float> FilterOf(const FanAxis&, kernels::Axis, const DisparityMap&,
+                                              const Eigen::VectorXd&, Between, int);
+template kernels::PixelFilter<double> FilterOf(const FanAxis&, kernels::Axis, const DisparityMap&,
+                                               const Eigen::VectorXd&, Between, int);
 
 }  // namespace thicklens::estimator

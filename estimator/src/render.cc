@@ -142,7 +142,8 @@ struct ShiftedAxis {
     const double snapped_px = std::abs(source_px - nearest_px) < kRounding ? nearest_px : source_px;
     if (!(std::abs(snapped_px) < count)) return;  // all of it is outside
     whole = static_cast<int>(std::floor(snapped_px));
-    tap_weight = CatmullRomWeights(snapped_px - whole);
+    const std::array<double, 4> weights = CatmullRomWeights(snapped_px - whole);
+    for (std::size_t n = 0; n < weights.size(); ++n) tap_weight[n] = static_cast<float>(weights[n]);
     first = static_cast<int>(std::max(0.0, std::ceil(-snapped_px)));
     last = static_cast<int>(std::min(count - 1.0, std::floor(count - 1 - snapped_px)));
   }

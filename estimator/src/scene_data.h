@@ -18,8 +18,9 @@ template <typename Real>
 model::LinearPicture Interleaved(const std::vector<Real>& planes, int width_px, int height_px,
                                  int channels);
 
-// sum_j H_ij^2 of each pixel i, about: that of the fan of its own disparity on one surface, with
-// the products of the sums of the weights over rows and over columns for weights.
+// sum_j H_ij^2 of each pixel i, within a tenth: that of the fan of its own disparity on one
+// surface, linear between pixels, with the products of the sums of the weights over rows and over
+// columns for weights.
 template <typename Real>
 std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
 

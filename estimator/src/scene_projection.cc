@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "thicklens/error.h"
-#include "view_fan.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -134,13 +133,13 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                 static_cast<int>(weights.rows()), options.threads);
     is_product = IsProduct(fan, axes, disparity, options.tolerance_px, options.threads);
     for (const Product& product : products) {
-      projection.terms.push_back({FilterOf<Real>(axes.across, kernels::Axis::kAcross, fan.width_px,
-                                                 fan.height_px, product.across, options.threads),
-                                  FilterOf<Real>(axes.down, kernels::Axis::kDown, fan.width_px,
-                                                 fan.height_px, product.down, options.threads)});
+      projection.terms.push_back({FilterOf<Real>(axes.across, kernels::Axis::kAcross, disparity,
+                                                 product.across, options.between, options.threads),
+                                  FilterOf<Real>(axes.down, kernels::Axis::kDown, disparity,
+                                                 product.down, options.between, options.threads)});
     }
   }
-  projection.rows = RowsOf<Real>(fan, disparity, is_product, options.threads);
+  projection.rows = RowsOf<Real>(fan, disparity, is_product, options.between, options.threads);
   projection.rows_transposed = kernels::Transposed(projection.rows);
   return projection;
 }

@@ -52,16 +52,24 @@ std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
                                      const DisparityMap& disparity, double tolerance_px,
                                      int threads);
 
-// The filter of one axis: pixel p gets sum_i weights_i x(p + source_i), linear between pixels.
-// Pixels without an axis get sum_i weights_i x(p).
-template <typename Real>
-kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction, int width_px,
-                                    int height_px, const Eigen::VectorXd& weights, int threads);
+// How a picture is read between its pixels.
+enum class Between {
+  kLinear,
+  kCubic,  // where the pixels that it takes are of one surface; linear elsewhere
+};
 
-// The rows of the pixels that are no product.
+// The filter of one axis: pixel p gets sum_i weights_i x(p + source_i). kCubic asks for four pixels
+// of p's surface in the line of the axis. Pixels without an axis get sum_i weights_i x(p).
+template <typename Real>
+kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction,
+                                    const DisparityMap& disparity, const Eigen::VectorXd& weights,
+                                    Between between, int threads);
+
+// The rows of the pixels that are no product. kCubic asks for 16 pixels of a ray's surface.
 template <typename Real>
 kernels::PixelRows<Real> RowsOf(const ViewFan& fan, const DisparityMap& disparity,
-                                const std::vector<unsigned char>& is_product, int threads);
+                                const std::vector<unsigned char>& is_product, Between between,
+                                int threads);
 
 }  // namespace thicklens::estimator
 
