@@ -103,27 +103,9 @@ QuadraticPrior<Real> GradientPrior(const std::vector<Real>& slope_squared, doubl
 }
 
 template <typename Real>
-QuadraticPrior<Real> VariationPrior(const DataTerm<Real>& data,
-                                    const std::vector<Real>& slope_squared, double lambda,
-                                    const std::vector<Real>& radiance) {
-  QuadraticPrior<Real> prior;
-  prior.pull.assign(slope_squared.size(), static_cast<Real>(kLeastPull));
-  prior.smoothness.resize(slope_squared.size());
-  const int width = data.width_px;
-  ForBands(data.height_px, data.threads, [&](int y0, int y1) {
-    std::vector<Real> squares(Index(width));
-    for (int y = y0; y < y1; ++y) {
-      const std::size_t row = Index(y) * Index(width);
-      SquaredDifferences(data, radiance, y, &squares);
-      const Real half = static_cast<Real>(lambda / 2);
-      const Real floor = static_cast<Real>(kVariationEps * kVariationEps);
-      for (int i = 0; i < width; ++i) {
-        const Real s2 = slope_squared[row + Index(i)];
-        prior.smoothness[row + Index(i)] = half * s2 / std::sqrt(s2 * squares[Index(i)] + floor);
-      }
-    }
-  });
-  return prior;
+kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squared,
+                                             double lambda) {
+  return {&slope_squared, lambda, kVariationEps, kLeastPull};
 }
 
 namespace {
@@ -148,17 +130,17 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
     const double eta =
         strength /
         (2 * std::sqrt(MeanSquaredGradient(data, slope_squared) + kVariationEps * kVariationEps));
+    system->SetPrior(GradientPrior(slope_squared, eta));
+    system->SetVariation(VariationPrior(slope_squared, strength));
     int calls = 0;
-    const auto renew = [&](const std::vector<Real>& at) {
-      const bool start = calls++ < kStartIterations;
-      if (calls == 1) system->SetPrior(GradientPrior(slope_squared, eta));
-      if (start) return false;
-      system->SetPrior(VariationPrior(data, slope_squared, strength, at));
+    const auto renew = [&] {
+      if (calls++ < kStartIterations) return false;
+      system->TouchVariation();
       ++outcome.reweightings;
       return true;
     };
     outcome.iterations = system->SolveRenewed(cg, renew, radiance).iterations;
-    system->SetPrior(VariationPrior(data, slope_squared, strength, *radiance));
+    system->TouchVariation();
   } else {
     system->SetPrior(prior == Prior::kRidge ? RidgePrior(slope_squared, strength)
                                             : GradientPrior(slope_squared, strength));
@@ -169,15 +151,14 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
   return outcome;
 }
 
-#define THICKLENS_PRIORS(Real)                                                                  \
-  template double StrengthForNoise(Prior, double, const DataTerm<Real>&,                        \
-                                   const std::vector<Real>&);                                   \
-  template QuadraticPrior<Real> RidgePrior(const std::vector<Real>&, double);                   \
-  template QuadraticPrior<Real> GradientPrior(const std::vector<Real>&, double);                \
-  template QuadraticPrior<Real> VariationPrior(const DataTerm<Real>&, const std::vector<Real>&, \
-                                               double, const std::vector<Real>&);               \
-  template RadianceOutcome SolveRadiance(Prior, double, const DataTerm<Real>&,                  \
-                                         const std::vector<Real>&, const RadianceLimits&,       \
+#define THICKLENS_PRIORS(Real)                                                             \
+  template double StrengthForNoise(Prior, double, const DataTerm<Real>&,                   \
+                                   const std::vector<Real>&);                              \
+  template QuadraticPrior<Real> RidgePrior(const std::vector<Real>&, double);              \
+  template QuadraticPrior<Real> GradientPrior(const std::vector<Real>&, double);           \
+  template kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>&, double); \
+  template RadianceOutcome SolveRadiance(Prior, double, const DataTerm<Real>&,             \
+                                         const std::vector<Real>&, const RadianceLimits&,  \
                                          SceneSystem<Real>*, std::vector<Real>*);
 THICKLENS_PRIORS(float)
 THICKLENS_PRIORS(double)

@@ -29,12 +29,9 @@ template <typename Real>
 QuadraticPrior<Real> RidgePrior(const std::vector<Real>& slope_squared, double mu);
 template <typename Real>
 QuadraticPrior<Real> GradientPrior(const std::vector<Real>& slope_squared, double eta);
-// The quadratic that touches lambda sum (g + eps^2)^(1/2), g = sum s^2 |dr|^2, from above at
-// `radiance`: lambda/2 g/(g0 + eps^2)^(1/2) up to a constant.
+// lambda sum (g + eps^2)^(1/2) + kLeastPull |r|^2, g = sum s^2 |dr|^2. Refers to the slopes.
 template <typename Real>
-QuadraticPrior<Real> VariationPrior(const DataTerm<Real>& data,
-                                    const std::vector<Real>& slope_squared, double lambda,
-                                    const std::vector<Real>& radiance);
+kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squared, double lambda);
 
 struct RadianceLimits {
   double tolerance = 1e-4;

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "coarse_start.h"
 #include "estimate_input.h"
 #include "ray_landing.h"
 #include "run_cost.h"
@@ -30,6 +31,26 @@ constexpr double kUsualNoise = 1.0 / 255;
 constexpr double kLeastNoise = 0.29 / 255;
 // Of the Gaussian over which the intensity is smoothed that says the slope of the transfer curve.
 constexpr double kSlopeSmoothingPx = 2;
+
+// A picture starts from the estimate at half its size, unless that is smaller than this.
+constexpr int kLeastCoarsePx = 128;
+// Of that estimate: what the full size mends costs more here.
+constexpr double kCoarseTolerance = 1e-4;
+constexpr int kCoarseIterations = 40;
+
+// The strength that stands for the same at half the size, where the data have a quarter of the
+// pixels and differences are twice as large.
+double CoarseStrength(Prior prior, double strength) {
+  switch (prior) {
+    case Prior::kRidge:
+      return strength;
+    case Prior::kGradient:
+      return strength / 4;
+    case Prior::kTotalVariation:
+      break;
+  }
+  return strength / 2;
+}
 
 // For the progress only.
 constexpr int kUsualIterations = 60;
@@ -60,7 +81,7 @@ class Progress {
 
 // The most that the process is expected to hold: the light field; H; the vectors of the solver.
 double VectorBytes(const EstimateInput& input, bool double_precision) {
-  constexpr double kPictures = 11;  // data, H^T W I, four of CG, right side, three inside of H, r
+  constexpr double kPictures = 12;  // data, H^T W I, five of CG, right side, three inside of H, r
   constexpr double kPlanes = 9;     // weights, slopes, diagonals, prior
   const double pixels = static_cast<double>(input.disparity.disparity.size());
   const double real = double_precision ? sizeof(double) : sizeof(float);
@@ -104,17 +125,25 @@ model::LightField ShowInAllViews(const EstimateInput& input, const model::Linear
 template <typename Real>
 class RadianceEstimate {
  public:
-  RadianceEstimate(const EstimateInput& input, const SceneOptions& options, SceneSummary* summary,
-                   Progress* progress)
-      : input_(input), options_(options), summary_(summary), progress_(progress) {}
+  RadianceEstimate(const EstimateInput& input, const SceneOptions& options,
+                   kernels::Backend* backend, SceneSummary* summary, Progress* progress)
+      : input_(input),
+        options_(options),
+        backend_(backend),
+        summary_(summary),
+        progress_(progress) {}
 
   // H, I and the weights.
   void Prepare(const model::LinearPicture& radiance_of_photograph) {
     disparity_ = input_.grid ? PhotographDisparity(input_.disparity,
                                                    LandingStepPx(*input_.camera, *input_.grid))
                              : input_.disparity;
+    const auto coarse_start = Clock::now();
+    start_ = StartOf(radiance_of_photograph);  // before H, so that both H are never held at once
+    coarse_seconds_ = SecondsSince(coarse_start);
     ProjectionOptions projection;
     projection.threads = summary_->threads;
+    projection.between = options_.cubic ? Between::kCubic : Between::kLinear;
     projection.progress = [this] { progress_->Tell(); };
     projection_ = MakeSceneProjection<Real>(disparity_, input_.weights, projection);
     const std::vector<float>& hidden = projection_.hidden_share;
@@ -132,19 +161,28 @@ class RadianceEstimate {
     data_.projection.apply_transposed = [this](const Real* y, int channels, Real* x) {
       projection_.ApplyTransposed(y, channels, x);
     };
+    for (const auto& term : projection_.terms) {
+      data_.filters.products.push_back({&term.across, &term.down});
+    }
+    data_.filters.rows = &projection_.rows;
+    data_.filters.rows_transposed = &projection_.rows_transposed;
     data_.photograph = Planar<Real>(radiance_of_photograph);
     slope_squared_ = SlopeSquared(radiance_of_photograph);
     data_.weight = DataWeights(slope_squared_, hidden, options_.hidden_weights);
     data_.squared_row = SquaredRows<Real>(disparity_, input_.weights);
   }
 
-  double operator_bytes() const { return projection_.memory_mib() * kBytesPerMib; }
+  double operator_bytes() const {
+    constexpr double kOnDevice = 2;  // at most: filters as they are and transposed
+    const bool on_device = backend_ != nullptr && backend_->is_opencl();
+    return projection_.memory_mib() * kBytesPerMib * (on_device ? 1 + kOnDevice : 1);
+  }
 
   model::LinearPicture Solve() {
-    SceneSystem<Real> system(data_);
-    std::vector<Real> radiance = data_.photograph;
+    SceneSystem<Real> system(data_, backend_);
+    std::vector<Real> radiance = Planar<Real>(start_);
     RadianceLimits limits;
-    limits.tolerance = options_.tolerance;
+    limits.tolerance = options_.tolerance_or_usual();
     limits.max_iterations = options_.max_iterations;
     limits.on_iteration = [this] { progress_->CountIteration(); };
     summary_->strength = options_.strength;
@@ -175,7 +213,33 @@ class RadianceEstimate {
     maps->blur_sigma_px = BlurSigmaPx(disparity_, input_.weights);
   }
 
+  // Of the part of Prepare that solves at half the size.
+  double coarse_seconds() const { return coarse_seconds_; }
+
  private:
+  // Where the iteration starts.
+  model::LinearPicture StartOf(const model::LinearPicture& picture) const {
+    if (std::min(picture.width_px, picture.height_px) < 2 * kLeastCoarsePx) return picture;
+    EstimateInput half;
+    half.picture = HalfSize(picture);
+    half.disparity = HalfSize(disparity_);
+    half.weights = input_.weights;
+    half.transfer = input_.transfer;
+    SceneOptions options = options_;
+    options.tolerance = std::max(options.tolerance_or_usual(), kCoarseTolerance);
+    options.max_iterations = std::min(options.max_iterations, kCoarseIterations);
+    options.strength = CoarseStrength(options.prior, options.strength);
+    if (options.strength_rule == StrengthRule::kGcv) options.strength_rule = StrengthRule::kAuto;
+    SceneSummary summary;
+    summary.threads = summary_->threads;
+    summary.noise_sigma = StoredNoiseSigma(half.picture, half.transfer).value_or(kUsualNoise / 2);
+    const std::function<void(int, int)> tell = [this](int, int) { progress_->Tell(); };
+    Progress progress(tell, 1, 0);
+    RadianceEstimate coarse(half, options, backend_, &summary, &progress);
+    coarse.Prepare(half.picture);
+    return WithDetail(picture, half.picture, coarse.Solve());
+  }
+
   // s^2. Without slope weights that of the whole picture, so that strengths keep their unit.
   std::vector<Real> SlopeSquared(const model::LinearPicture& picture) const {
     const std::vector<double> slopes = StoredSlopes(picture, input_.transfer, kSlopeSmoothingPx);
@@ -191,6 +255,7 @@ class RadianceEstimate {
 
   const EstimateInput& input_;
   const SceneOptions& options_;
+  kernels::Backend* backend_;
   SceneSummary* summary_;
   Progress* progress_;
   DisparityMap disparity_;
@@ -198,6 +263,8 @@ class RadianceEstimate {
   DataTerm<Real> data_;
   std::vector<Real> slope_squared_;
   StoredResidual residual_;
+  model::LinearPicture start_;
+  double coarse_seconds_ = 0;
 };
 
 std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, bool noise_known) {
@@ -206,7 +273,7 @@ std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, 
   if (!summary.converged) {
     message +=
         fmt::format("; stopped at a relative residual of {:.2g}, above the tolerance of {:.2g}",
-                    summary.relative_residual, options.tolerance);
+                    summary.relative_residual, options.tolerance_or_usual());
   }
   if (!noise_known && options.strength_rule != StrengthRule::kGiven) {
     message += "; no part of the photograph tells its noise: 1/255 is assumed";
@@ -217,7 +284,7 @@ std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, 
 void FillOrigin(const SceneOptions& options, const SceneSummary& summary, bool falloff,
                 model::LightFieldOrigin* origin) {
   origin->method = "scene";
-  origin->device = "cpu";
+  origin->device = summary.device;
   origin->prior = PriorName(options.prior);
   origin->strength = summary.strength;
   origin->noise_sigma = summary.noise_sigma;
@@ -229,10 +296,11 @@ void FillOrigin(const SceneOptions& options, const SceneSummary& summary, bool f
 
 template <typename Real>
 model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& options,
-                             SceneSummary* summary, SceneMaps* maps) {
+                             kernels::Backend* backend, SceneSummary* summary, SceneMaps* maps) {
   const auto start = Clock::now();
   summary->threads = model::ResolveThreads(options.threads);
   summary->prior = options.prior;
+  summary->device = backend != nullptr ? backend->name() : "cpu";
   const double fixed_bytes =
       ResidentBytes() + LightFieldBytes(input) + VectorBytes(input, options.double_precision);
   CheckMemory(options, fixed_bytes);
@@ -243,18 +311,18 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   const std::optional<double> noise = StoredNoiseSigma(input.picture, input.transfer);
   summary->noise_sigma = noise.value_or(kUsualNoise);
   const bool falloff = options.falloff && input.camera.has_value();
-  RadianceEstimate<Real> estimate(input, options, summary, &progress);
+  RadianceEstimate<Real> estimate(input, options, backend, summary, &progress);
   estimate.Prepare(falloff ? WithoutFalloff(input.picture, *input.grid, *input.camera,
                                             input.weights, summary->threads)
                            : input.picture);
   const double bytes = fixed_bytes + estimate.operator_bytes();
   summary->predicted_memory_mib = bytes / kBytesPerMib;
   CheckMemory(options, bytes);
-  summary->setup_seconds = SecondsSince(start);
+  summary->setup_seconds = SecondsSince(start) - estimate.coarse_seconds();
 
   const auto solve_start = Clock::now();
   model::LinearPicture radiance = estimate.Solve();
-  summary->solve_seconds = SecondsSince(solve_start);
+  summary->solve_seconds = SecondsSince(solve_start) + estimate.coarse_seconds();
   progress.EndIterations();
 
   const auto views_start = Clock::now();
@@ -290,6 +358,8 @@ std::string PriorName(Prior prior) {
   return "tv";
 }
 
+double UsualTolerance(Prior prior) { return prior == Prior::kTotalVariation ? 5e-5 : 1e-3; }
+
 bool SceneOptions::IsValid(std::string* why) const {
   const auto fail = [why](std::string reason) {
     if (why != nullptr) *why = std::move(reason);
@@ -298,8 +368,8 @@ bool SceneOptions::IsValid(std::string* why) const {
   if (strength_rule == StrengthRule::kGiven && (!(strength > 0) || !std::isfinite(strength))) {
     return fail(fmt::format("strength is {}: it must be finite and > 0", strength));
   }
-  if (!(tolerance > 0) || !(tolerance < 1)) {
-    return fail(fmt::format("tolerance is {}: it must be > 0 and < 1", tolerance));
+  if (tolerance && (!(*tolerance > 0) || !(*tolerance < 1))) {
+    return fail(fmt::format("tolerance is {}: it must be > 0 and < 1", *tolerance));
   }
   if (max_iterations < 1) {
     return fail(fmt::format("max_iterations is {}: it must be >= 1", max_iterations));
@@ -312,13 +382,19 @@ bool SceneOptions::IsValid(std::string* why) const {
 }
 
 model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
-                                SceneSummary* summary, SceneMaps* maps) {
+                                SceneSummary* summary, SceneMaps* maps, kernels::Backend* backend) {
   std::string why;
   if (!options.IsValid(&why)) throw Error("scene solver: " + why);
+  if (options.double_precision && backend != nullptr && !backend->has_double()) {
+    throw Error(
+        fmt::format("device {}: it has no double, which double precision asks for; the device must "
+                    "be cpu, or the precision float",
+                    backend->name()));
+  }
   CheckInput(input);
   *summary = SceneSummary();
-  return options.double_precision ? EstimateIn<double>(input, options, summary, maps)
-                                  : EstimateIn<float>(input, options, summary, maps);
+  return options.double_precision ? EstimateIn<double>(input, options, backend, summary, maps)
+                                  : EstimateIn<float>(input, options, backend, summary, maps);
 }
 
 }  // namespace thicklens::estimator

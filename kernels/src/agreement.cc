@@ -1,10 +1,10 @@
-#include <algorithm>
+#include "agreement.h"
+
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -13,55 +13,7 @@
 namespace thicklens::kernels {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kChannels = 2;
-
-// The largest difference so far, and of what.
-struct Worst {
-  double error = 0;
-  std::string what;
-
-  void Add(const std::string& name, double candidate) {
-    if (!(candidate > error)) return;
-    error = candidate;
-    what = name;
-  }
-};
-
-// Largest difference over the largest right number; infinite where sizes differ or one is no number
-// and the other is.
-template <typename Number>
-double Difference(const std::vector<Number>& found, const std::vector<Number>& right) {
-  if (found.size() != right.size()) return kInfinity;
-  double largest = 0;
-  double difference = 0;
-  for (std::size_t i = 0; i < right.size(); ++i) {
-    const auto a = static_cast<double>(found[i]);
-    const auto b = static_cast<double>(right[i]);
-    if (std::isnan(a) && std::isnan(b)) continue;
-    if (!std::isfinite(a - b)) return kInfinity;
-    largest = std::max(largest, std::abs(b));
-    difference = std::max(difference, std::abs(a - b));
-  }
-  return difference == 0 ? 0 : difference / largest;
-}
-
-// Numbers that are the same on every machine: no distribution of the standard library is.
-class Numbers {
- public:
-  double Between(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_()) / static_cast<double>(0xffffffffU);
-  }
-  template <typename Real>
-  std::vector<Real> Vector(int count, double low, double high) {
-    std::vector<Real> values(static_cast<std::size_t>(count));
-    for (Real& value : values) value = static_cast<Real>(Between(low, high));
-    return values;
-  }
-
- private:
-  std::mt19937 engine_{12345};
-};
 
 // Blocks of a light field of 23 x 19 samples and 5 x 3 views.
 BlockGeometry BlockAt(int first_x, int first_y, int width_px, int height_px) {
@@ -216,21 +168,23 @@ class Comparison {
 };
 
 template <typename Real>
-Worst Compare(Kernels<Real>* device) {
-  return Comparison<Real>(device).Run();
+Worst Compare(Backend* backend, Kernels<Real>* device) {
+  Worst worst = Comparison<Real>(device).Run();
+  CompareSteps<Real>(backend, &worst);
+  return worst;
 }
 
 }  // namespace
 
 AgreementCheck CheckAgreement(Backend* backend) {
   AgreementCheck check;
-  const Worst in_float = Compare(backend->NewFloat().get());
+  const Worst in_float = Compare(backend, backend->NewFloat().get());
   check.float_error = in_float.error;
   check.double_error = std::numeric_limits<double>::quiet_NaN();
   check.worst = in_float.error > 0 ? in_float.what + " in float" : in_float.what;
   check.agrees = in_float.error <= check.float_limit;
   if (!backend->has_double()) return check;
-  const Worst in_double = Compare(backend->NewDouble().get());
+  const Worst in_double = Compare(backend, backend->NewDouble().get());
   check.double_error = in_double.error;
   check.agrees = check.agrees && in_double.error <= check.double_limit;
   if (in_double.error / check.double_limit > in_float.error / check.float_limit) {

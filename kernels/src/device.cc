@@ -24,6 +24,12 @@ class TwinBackend : public Backend {
   std::string description() const override { return "C++ on the processor, without OpenCL"; }
   std::unique_ptr<Kernels<float>> NewFloat() override { return NewReference<float>(); }
   std::unique_ptr<Kernels<double>> NewDouble() override { return NewReference<double>(); }
+  std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) override {
+    return NewNativeSteps(data);
+  }
+  std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
+    return NewNativeSteps(data);
+  }
 };
 
 class OpenClBackend : public Backend {
@@ -39,6 +45,12 @@ class OpenClBackend : public Backend {
   }
   std::unique_ptr<Kernels<double>> NewDouble() override {
     return NewOpenClKernels<double>(device_, Built("double", &double_program_));
+  }
+  std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) override {
+    return NewOpenClSteps(device_, Built("float", &float_program_), data);
+  }
+  std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
+    return NewOpenClSteps(device_, Built("double", &double_program_), data);
   }
 
  private:

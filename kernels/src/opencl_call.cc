@@ -108,11 +108,38 @@ DeviceArray::DeviceArray(OpenClQueue* queue, const std::string& what, void* data
 
 void DeviceArray::BringHome() { queue_->BringHome(what_, buffer_, data_, bytes_); }
 
+DeviceMemory::DeviceMemory(OpenClQueue* queue, const std::string& what, std::size_t bytes)
+    : queue_(queue), what_(what), bytes_(std::max(bytes, sizeof(double))) {
+  queue_->CheckAllocation(what, bytes_);
+  Guarded(*queue_->device_, what_,
+          [&] { buffer_ = cl::Buffer(queue_->device_->context, CL_MEM_READ_WRITE, bytes_); });
+}
+
+void DeviceMemory::Clear() {
+  Guarded(*queue_->device_, what_,
+          [&] { queue_->queue_.enqueueFillBuffer(buffer_, cl_uchar{0}, 0, bytes_); });
+}
+
+void DeviceMemory::Write(const void* from) {
+  Guarded(*queue_->device_, what_,
+          [&] { queue_->queue_.enqueueWriteBuffer(buffer_, CL_TRUE, 0, bytes_, from); });
+}
+
+void DeviceMemory::Read(void* to) const {
+  Guarded(*queue_->device_, what_,
+          [&] { queue_->queue_.enqueueReadBuffer(buffer_, CL_TRUE, 0, bytes_, to); });
+}
+
 OpenClCall::OpenClCall(OpenClQueue* queue, const std::string& kernel)
     : queue_(queue), name_("kernel " + kernel), entry_(&queue->EntryOf(kernel)) {}
 
 OpenClCall& OpenClCall::OnDevice(const DeviceArray& array) {
   SetBuffer(array.buffer_);
+  return *this;
+}
+
+OpenClCall& OpenClCall::OnDevice(const DeviceMemory& memory) {
+  SetBuffer(memory.buffer_);
   return *this;
 }
 
@@ -133,15 +160,22 @@ void OpenClCall::AddArray(const std::string& what, void* data, std::size_t bytes
   SetBuffer(arrays_.back().buffer);
 }
 
-void OpenClCall::Run(std::size_t items) {
+std::size_t OpenClCall::Groups(std::size_t items) const {
+  return (items + entry_->group_items - 1) / entry_->group_items;
+}
+
+void OpenClCall::Enqueue(std::size_t items) {
   Guarded(*queue_->device_, name_, [&] {
     const std::size_t group = entry_->group_items;
-    const std::size_t groups = (items + group - 1) / group;
-    queue_->queue_.enqueueNDRangeKernel(entry_->kernel, cl::NullRange, cl::NDRange(groups * group),
-                                        cl::NDRange(group));
-    // What goes wrong while the kernel runs is then said with its name.
-    queue_->queue_.finish();
+    queue_->queue_.enqueueNDRangeKernel(entry_->kernel, cl::NullRange,
+                                        cl::NDRange(Groups(items) * group), cl::NDRange(group));
   });
+}
+
+void OpenClCall::Run(std::size_t items) {
+  Enqueue(items);
+  // What goes wrong while the kernel runs is then said with its name.
+  Guarded(*queue_->device_, name_, [&] { queue_->queue_.finish(); });
   for (const Array& array : arrays_) {
     if (array.is_written) queue_->BringHome(array.what, array.buffer, array.data, array.bytes);
   }

@@ -34,6 +34,7 @@ class OpenClQueue {
  private:
   friend class OpenClCall;
   friend class DeviceArray;
+  friend class DeviceMemory;
 
   struct Entry {
     cl::Kernel kernel;
@@ -69,6 +70,25 @@ class DeviceArray {
   cl::Buffer buffer_;
 };
 
+// Memory of the device alone.
+class DeviceMemory {
+ public:
+  // Of 0 bytes it is some, which no one is to read.
+  DeviceMemory(OpenClQueue* queue, const std::string& what, std::size_t bytes);
+  void Clear();  // all bytes 0
+  void Write(const void* from);
+  void Read(void* to) const;  // when all calls before are done
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  friend class OpenClCall;
+
+  OpenClQueue* queue_;
+  std::string what_;
+  std::size_t bytes_;
+  cl::Buffer buffer_;
+};
+
 // One call of a kernel: arguments in the kernel's order, then Run. Arrays must not be empty.
 class OpenClCall {
  public:
@@ -97,9 +117,14 @@ class OpenClCall {
     return *this;
   }
   OpenClCall& OnDevice(const DeviceArray& array);
+  OpenClCall& OnDevice(const DeviceMemory& memory);
 
   // Returns when all is done and the outputs are at home.
   void Run(std::size_t items);
+  // Returns at once; what is called or read later waits. All arrays must be on the device.
+  void Enqueue(std::size_t items);
+  // Of so many items.
+  std::size_t Groups(std::size_t items) const;
 
  private:
   struct Array {

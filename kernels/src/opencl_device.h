@@ -1,6 +1,7 @@
 #ifndef THICKLENS_KERNELS_SRC_OPENCL_DEVICE_H_
 #define THICKLENS_KERNELS_SRC_OPENCL_DEVICE_H_
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 #include <CL/opencl.hpp>
 
 #include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/radiance_steps.h"
 
 namespace thicklens::kernels {
 
@@ -34,16 +36,30 @@ struct OpenClDevice {
   std::string name;         // "opencl:0:0"
   std::string description;  // for people
   bool has_double = false;
+  bool is_cpu = false;
 };
 
+// How kernels over pictures divide their work on a device: filter.cl.
+struct ItemForm {
+  int lanes = 1;   // pixels beside each other that an item computes together
+  int tile = 32;   // pixels beside each other that share their terms; a multiple of lanes
+  int slice = 32;  // rows that share their number of entries
+};
+ItemForm FormOf(const OpenClDevice& device, std::size_t bytes_of_real);
+
 // All kernel files as one program, each behind its #line. `real` is "float" or "double"; the
-// program sees it as the macro REAL (and REAL_IS_DOUBLE). Throws Error with the device and the
-// build log.
+// program sees it as the macro REAL (and REAL_IS_DOUBLE), and the form as LANES, TILE and SLICE.
+// Throws Error with the device and the build log.
 cl::Program BuildKernels(const OpenClDevice& device, const std::string& real);
 
 template <typename Real>
 std::unique_ptr<Kernels<Real>> NewOpenClKernels(std::shared_ptr<const OpenClDevice> device,
                                                 const cl::Program& program);
+// Keeps nothing of `data`.
+template <typename Real>
+std::unique_ptr<RadianceSteps<Real>> NewOpenClSteps(std::shared_ptr<const OpenClDevice> device,
+                                                    const cl::Program& program,
+                                                    const DataTerm<Real>& data);
 
 }  // namespace thicklens::kernels
 

@@ -93,12 +93,20 @@ std::shared_ptr<const OpenClDevice> OpenOpenClDevice(int platform, int device) {
         fmt::format("{} ({}, driver {})", OneLine(opened->device.getInfo<CL_DEVICE_NAME>()),
                     platform_text, OneLine(opened->device.getInfo<CL_DRIVER_VERSION>()));
     opened->has_double = HasDouble(opened->device);
+    opened->is_cpu = (opened->device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU) != 0;
     opened->context = cl::Context(opened->device);
     return opened;
   } catch (const cl::Error& failure) {
     throw Error(
         fmt::format("device {}: {}: {}", name, failure.what(), OpenClErrorText(failure.err())));
   }
+}
+
+// A CPU reads a line of its cache at once, and a row's entries one after the other.
+ItemForm FormOf(const OpenClDevice& device, std::size_t bytes_of_real) {
+  constexpr std::size_t kLineBytes = 64;
+  const int lanes = static_cast<int>(kLineBytes / bytes_of_real);
+  return device.is_cpu ? ItemForm{lanes, lanes, 1} : ItemForm{};
 }
 
 cl::Program BuildProgram(const OpenClDevice& device, const std::vector<EmbeddedFile>& files,
@@ -108,10 +116,13 @@ cl::Program BuildProgram(const OpenClDevice& device, const std::vector<EmbeddedF
     throw Error(fmt::format("device {}: it has no double", device.name));
   }
   std::string source;
-  if (is_double) source += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n";
+  if (device.has_double) source += "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n";
   for (const EmbeddedFile& file : files) source += LineDirective(file.path) + file.text + "\n";
+  const ItemForm form = FormOf(device, is_double ? sizeof(double) : sizeof(float));
   const std::string options =
-      fmt::format("-cl-std=CL1.2 -DREAL={}{}", real, is_double ? " -DREAL_IS_DOUBLE" : "");
+      fmt::format("-cl-std=CL1.2 -DREAL={}{} -DSUM={} -DLANES={} -DTILE={} -DSLICE={}", real,
+                  is_double ? " -DREAL_IS_DOUBLE" : "", device.has_double ? "double" : "float",
+                  form.lanes, form.tile, form.slice);
   try {
     cl::Program program(device.context, source);
     program.build({device.device}, options.c_str());

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "support/error_message.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
+#include "thicklens/kernels/device.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::estimator {
@@ -110,7 +112,7 @@ TEST(SceneSolver, BeatsWarpingOnASimulatedScene) {
     EXPECT_GT(psnr, dibr + 1) << PriorName(prior);
     best = std::max(best, psnr);
     EXPECT_TRUE(summary.converged) << summary.message;
-    EXPECT_LE(summary.relative_residual, options.tolerance);
+    EXPECT_LE(summary.relative_residual, options.tolerance_or_usual());
     EXPECT_GT(255 * summary.noise_sigma, 1);
     EXPECT_LT(255 * summary.noise_sigma, 1.3);
     // H and the noise, but no more.
@@ -127,6 +129,83 @@ TEST(SceneSolver, BeatsWarpingOnASimulatedScene) {
     EXPECT_TRUE(found.IsValid(&why)) << why;
   }
   EXPECT_GT(best, dibr + 3);
+}
+
+// A machine on which tests run has an OpenCL device: none is a failure here.
+kernels::Backend* OpenClBackend() {
+  static const std::shared_ptr<kernels::Backend> backend = [] {
+    kernels::DeviceRequest request;
+    request.kind = kernels::DeviceRequest::Kind::kOpenCl;
+    return kernels::OpenBackend(request, nullptr);
+  }();
+  return backend.get();
+}
+
+TEST(SceneSolver, ADeviceGivesTheSameLightField) {
+  const Simulated& simulated = SimulatedScene();
+  for (const bool double_precision : {false, true}) {
+    for (const Prior prior : {Prior::kRidge, Prior::kGradient, Prior::kTotalVariation}) {
+      if (double_precision && prior != Prior::kTotalVariation) continue;  // costs time
+      SceneOptions options;
+      options.prior = prior;
+      options.double_precision = double_precision;
+      options.tolerance = 1e-5;
+      SceneSummary native, device;
+      const model::LightField expected = EstimateScene(simulated.input, options, &native, nullptr);
+      const model::LightField found =
+          EstimateScene(simulated.input, options, &device, nullptr, OpenClBackend());
+      double largest = 0;
+      for (std::size_t i = 0; i < expected.values.size(); ++i) {
+        const float difference = std::abs(found.values[i] - expected.values[i]);
+        largest = std::max(largest, static_cast<double>(difference));
+      }
+      EXPECT_LE(largest, 1e-4) << PriorName(prior);  // of values up to 1
+      EXPECT_TRUE(device.converged);
+      EXPECT_EQ(device.device, OpenClBackend()->name());
+      EXPECT_EQ(found.origin.device, OpenClBackend()->name());
+      EXPECT_EQ(native.device, "cpu");
+      EXPECT_EQ(expected.origin.device, "cpu");
+    }
+  }
+}
+
+TEST(SceneSolver, ADeviceFindsTheSameStrength) {
+  const Simulated& simulated = SimulatedScene();
+  SceneOptions options;
+  options.prior = Prior::kGradient;
+  options.strength_rule = StrengthRule::kGcv;
+  SceneSummary native, device;
+  EstimateScene(simulated.input, options, &native, nullptr);
+  EstimateScene(simulated.input, options, &device, nullptr, OpenClBackend());
+  EXPECT_NEAR(device.strength, native.strength, 0.02 * native.strength);
+}
+
+// A device that can do nothing but say so.
+class FloatOnly : public kernels::Backend {
+ public:
+  bool is_opencl() const override { return true; }
+  bool has_double() const override { return false; }
+  std::string name() const override { return "opencl:7:7"; }
+  std::string description() const override { return "made up"; }
+  std::unique_ptr<kernels::Kernels<float>> NewFloat() override { return nullptr; }
+  std::unique_ptr<kernels::Kernels<double>> NewDouble() override { return nullptr; }
+  std::unique_ptr<kernels::RadianceSteps<float>> NewSteps(
+      const kernels::DataTerm<float>& data) override {
+    return kernels::NewNativeSteps(data);
+  }
+  std::unique_ptr<kernels::RadianceSteps<double>> NewSteps(
+      const kernels::DataTerm<double>& data) override {
+    return kernels::NewNativeSteps(data);
+  }
+};
+
+TEST(SceneSolver, ADeviceWithoutDoubleIsRefusedForDoublePrecision) {
+  FloatOnly backend;
+  SceneOptions options;
+  options.double_precision = true;
+  SceneSummary summary;
+  EXPECT_THAT(ErrorOf([&] { EstimateScene(MadeUp(1.3F), options, &summary, nullptr, &backend); }),
+              AllOf(HasSubstr("opencl:7:7"), HasSubstr("no double"), HasSubstr("cpu")));
 }
 
 TEST(SceneSolver, CrossValidationFindsAStrengthAboutAsGood) {

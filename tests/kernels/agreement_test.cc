@@ -90,6 +90,56 @@ class Faulty : public Kernels<Real> {
   std::unique_ptr<Kernels<Real>> twin_;
 };
 
+// The native steps with a fault: sums are wrong by that share, of pictures the last number but one.
+template <typename Real>
+class FaultySteps : public RadianceSteps<Real> {
+ public:
+  FaultySteps(Fault fault, const DataTerm<Real>& data)
+      : fault_(std::move(fault)), native_(NewNativeSteps(data)) {}
+
+  void SetPrior(const QuadraticPrior<Real>& prior) override { native_->SetPrior(prior); }
+  void SetVariation(const TotalVariation<Real>& variation) override {
+    native_->SetVariation(variation);
+  }
+  void TouchVariation() override { native_->TouchVariation(); }
+  void Start(const std::vector<Real>& x) override { native_->Start(x); }
+  void StartFor(const std::vector<Real>& photograph, const std::vector<Real>& x) override {
+    native_->StartFor(photograph, x);
+  }
+  double SquaredRightSide() override {
+    return Spoil("SquaredRightSide", native_->SquaredRightSide());
+  }
+  ResidualSums UpdateResidual() override {
+    ResidualSums sums = native_->UpdateResidual();
+    sums.squared = Spoil("UpdateResidual", sums.squared);
+    return sums;
+  }
+  double Turn(double beta) override { return Spoil("Turn", native_->Turn(beta)); }
+  double Curvature() override { return Spoil("Curvature", native_->Curvature()); }
+  void Advance(double step) override { native_->Advance(step); }
+  std::vector<Real> Radiance() override { return Spoil("Advance", native_->Radiance()); }
+  std::vector<Real> Project(const std::vector<Real>& x) override {
+    return Spoil("Project", native_->Project(x));
+  }
+  std::vector<Real> ProjectTransposed(const std::vector<Real>& y) override {
+    return Spoil("ProjectTransposed", native_->ProjectTransposed(y));
+  }
+
+ private:
+  double Spoil(const std::string& method, double sum) const {
+    return method == fault_.method ? sum * (1 + fault_.amount) : sum;
+  }
+  std::vector<Real> Spoil(const std::string& method, std::vector<Real> numbers) const {
+    if (method == fault_.method) {
+      numbers[numbers.size() - 2] += static_cast<Real>(fault_.amount);
+    }
+    return numbers;
+  }
+
+  Fault fault_;
+  std::unique_ptr<RadianceSteps<Real>> native_;
+};
+
 class FaultyBackend : public Backend {
  public:
   FaultyBackend(Fault in_float, Fault in_double)
@@ -103,6 +153,12 @@ class FaultyBackend : public Backend {
   }
   std::unique_ptr<Kernels<double>> NewDouble() override {
     return std::make_unique<Faulty<double>>(in_double_);
+  }
+  std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) override {
+    return std::make_unique<FaultySteps<float>>(in_float_, data);
+  }
+  std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
+    return std::make_unique<FaultySteps<double>>(in_double_, data);
   }
 
  private:
@@ -126,7 +182,8 @@ TEST(Agreement, SeesAFaultOfEveryMethod) {
   for (const char* method :
        {"FindRays", "WeighRays", "WarpDifferences", "SixTermMasks", "Multiply",
         "MultiplyTransposed", "AddNormalProduct", "FormPicture", "AddBlock", "WeighRays columns",
-        "WarpDifferences columns", "SixTermMasks columns"}) {
+        "WarpDifferences columns", "SixTermMasks columns", "SquaredRightSide", "UpdateResidual",
+        "Turn", "Curvature", "Advance", "Project", "ProjectTransposed"}) {
     const std::string name = std::string(method).substr(0, std::string(method).find(' '));
     const AgreementCheck in_float = Check({method, 0.01}, {});
     EXPECT_FALSE(in_float.agrees) << method;

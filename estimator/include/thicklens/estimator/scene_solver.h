@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "thicklens/estimator/estimate.h"
+#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 
@@ -19,6 +20,9 @@ enum class Prior {
 Prior PriorFromName(const std::string& name);  // "ridge", "gradient", "tv"; throws Error
 std::string PriorName(Prior prior);
 
+// Below which nothing is gained: 5e-5 for total variation, 1e-3 for the others.
+double UsualTolerance(Prior prior);
+
 enum class StrengthRule {
   kAuto,   // from the photograph's noise
   kGcv,    // generalised cross-validation
@@ -29,20 +33,24 @@ struct SceneOptions {
   Prior prior = Prior::kTotalVariation;
   StrengthRule strength_rule = StrengthRule::kAuto;
   double strength = 0;  // of the prior, in its own unit (see EstimateScene); only for kGiven, > 0
-  double tolerance = 5e-5;  // relative residual at which conjugate gradients stop, > 0, < 1
+  // Relative residual at which conjugate gradients stop, > 0, < 1. Absent: UsualTolerance.
+  std::optional<double> tolerance;
   // Of conjugate gradients, all solves for one strength together; >= 1.
   int max_iterations = 200;
   bool double_precision = false;
   // Compare stored values, as the eye and the metrics do. Off: the mean slope s everywhere.
   bool slope_weights = true;
   bool hidden_weights = true;  // trust pixels less that show what the centre view does not
-  bool falloff = true;         // the irradiance of (12), where there is a camera
-  int threads = 0;             // 0: one per core
+  // Bicubic between the pixels of a surface. Off: linear, as in EstimateFunctional.
+  bool cubic = true;
+  bool falloff = true;                     // the irradiance of (12), where there is a camera
+  int threads = 0;                         // 0: one per core
   std::optional<double> memory_limit_mib;  // for the whole process
   // Called from any thread, one at a time, for each iteration and each view, and now and then
   // between. May throw to stop.
   std::function<void(int done, int total)> progress;
 
+  double tolerance_or_usual() const { return tolerance.value_or(UsualTolerance(prior)); }
   bool IsValid(std::string* why) const;
 };
 
@@ -51,7 +59,7 @@ struct SceneSummary {
   Prior prior = Prior::kTotalVariation;
   double strength = 0;
   double noise_sigma = 0;  // of stored values in [0, 1], as found in the photograph
-  int iterations = 0;      // of conjugate gradients, all solves for all strengths together
+  int iterations = 0;      // of conjugate gradients at full size, for all strengths together
   int reweightings = 0;    // of total variation: one an iteration, after the first few
   bool converged = false;  // the last system, to the tolerance
   // |A r - b|/|b| of the last system, recomputed from the answer.
@@ -65,6 +73,7 @@ struct SceneSummary {
   double setup_seconds = 0, solve_seconds = 0, views_seconds = 0;
   double predicted_memory_mib = 0;
   int threads = 0;
+  std::string device;  // of the iterations
 };
 
 // What the estimate knows of itself, picture-sized.
@@ -90,10 +99,13 @@ struct SceneMaps {
 //   kAuto      mu = .2 sigma^2/var(s (I - H I)), eta = .125 sigma^2/var(s grad I), both variances
 //              without their noise; lambda = 1e-3 (255 sigma)^1.5
 //   kGcv       the minimum of generalised cross-validation near that, the trace times 1.4
-// Derived here; H as in SceneProjection. Throws Error for options and inputs that do not fit and a
-// memory limit that is too low. The result does not depend on the number of threads.
+// The iteration starts from the estimate at half the size, which starts likewise.
+// Derived here; H as in SceneProjection. The iterations are computed where the backend is (null:
+// by C++ on the processor). Throws Error for options and inputs that do not fit, a memory limit
+// that is too low, and what a device reports. The result does not depend on the number of threads.
 model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
-                                SceneSummary* summary, SceneMaps* maps);
+                                SceneSummary* summary, SceneMaps* maps,
+                                kernels::Backend* backend = nullptr);
 
 // Standard deviation of the noise of stored values in [0, 1], quantisation included: of 16 x 16
 // blocks with a mean of 12/255 to 243/255 the rms of (p00 - p10 - p01 + p11)/2, and of these the

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/radiance_steps.h"
 
 namespace thicklens::kernels {
 
@@ -65,6 +66,8 @@ class Backend {
   // Throws Error if there is no double on the device.
   virtual std::unique_ptr<Kernels<float>> NewFloat() = 0;
   virtual std::unique_ptr<Kernels<double>> NewDouble() = 0;
+  virtual std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) = 0;
+  virtual std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) = 0;
 };
 
 // Opens what is asked for. kAuto falls back to the twin and says in `notice` (one line; may be
