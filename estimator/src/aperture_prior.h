@@ -11,6 +11,7 @@ namespace thicklens::estimator {
 // cosine transform (DCT-II), to
 //   gamma (4 sin^2(pi i/(2 U)) + 4 sin^2(pi j/(2 V))) + mu;
 // derived here: a difference with free ends is one of a sequence that is mirrored at its ends.
+template <typename Real>
 class AperturePrior {
  public:
   // gamma >= 0, mu > 0. Throws Error for more than 64 samples of an axis.
@@ -21,13 +22,13 @@ class AperturePrior {
 
   // x = A^-1 x for every point of planes (row by row of the aperture) that are `stride` numbers
   // apart. The same bits for any number of threads.
-  void ApplyInverse(std::size_t points, std::size_t stride, int threads, float* planes);
+  void ApplyInverse(std::size_t points, std::size_t stride, int threads, Real* planes);
 
  private:
   int u_count_, v_count_;
-  std::vector<float> across_, down_;        // transforms
-  std::vector<float> inverse_eigenvalues_;  // V x U
-  std::vector<float> work_;
+  std::vector<Real> across_, down_;        // transforms
+  std::vector<Real> inverse_eigenvalues_;  // V x U
+  std::vector<Real> work_;
 };
 
 }  // namespace thicklens::estimator

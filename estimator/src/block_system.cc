@@ -7,6 +7,7 @@
 
 #include "ray_irradiance.h"
 #include "ray_landing.h"
+#include "same_point.h"
 #include "thicklens/model/parallel.h"
 #include "warped_views.h"
 
@@ -16,9 +17,6 @@ namespace {
 using kernels::BlockGeometry;
 using kernels::CsrMatrix;
 using kernels::CsrPattern;
-
-// A point whose disparity differs by more than this from a sample's is not what the sample shows.
-constexpr double kSamePointPx = 0.3;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
@@ -85,28 +83,6 @@ BlockGeometry RayField::Block(int x, int y, int width_px, int height_px) const {
   return BlockOf(prior_, {x, y, width_px, height_px}, input_.weights);
 }
 
-// Bilinear neighbourhood of (s, t) in a view: every tap that has weight shows the disparity.
-bool RayField::ShowsSamePoint(int view, double s, double t, double disparity) const {
-  const int width = input_.picture.width_px;
-  const int height = input_.picture.height_px;
-  const double px_per_unit =
-      std::max(std::abs(input_.disparity.step.x()), std::abs(input_.disparity.step.y()));
-  // Before they become integers; NaN is outside, too.
-  if (!(s >= 0 && s <= width - 1 && t >= 0 && t <= height - 1)) return false;
-  const int s0 = static_cast<int>(std::floor(s));
-  const int t0 = static_cast<int>(std::floor(t));
-  const int s1 = s > s0 ? s0 + 1 : s0;
-  const int t1 = t > t0 ? t0 + 1 : t0;
-  const std::vector<float>& map = disparity_[Index(view)];
-  for (const int tt : {t0, t1}) {
-    for (const int ss : {s0, s1}) {
-      const double there = map[Index(tt) * Index(width) + Index(ss)];
-      if (!(std::abs(there - disparity) * px_per_unit <= kSamePointPx)) return false;
-    }
-  }
-  return true;
-}
-
 RayField::Slopes RayField::SlopesOf(const BlockGeometry& block, bool cut_hidden) const {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   Slopes slopes;
@@ -119,7 +95,8 @@ RayField::Slopes RayField::SlopesOf(const BlockGeometry& block, bool cut_hidden)
     const double m_u = -disparity * input_.disparity.step.x();
     const double m_v = -disparity * input_.disparity.step.y();
     const auto linked = [&](int next, double next_s, double next_t) {
-      return !cut_hidden || ShowsSamePoint(next, next_s, next_t, disparity);
+      return !cut_hidden ||
+             ShowsSamePoint(input_.disparity, disparity_[Index(next)], next_s, next_t, disparity);
     };
     // Without a next view the slope still serves the six-term mask.
     if (k + 1 == block.u_count ? !cut_hidden : linked(view + 1, s + m_u, t)) slopes.u[ray] = m_u;

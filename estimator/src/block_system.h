@@ -38,8 +38,6 @@ class RayField {
   std::vector<double> IrradianceOf(const kernels::BlockGeometry& block) const;
 
  private:
-  bool ShowsSamePoint(int view, double s, double t, double disparity) const;
-
   const EstimateInput& input_;
   // Of each view's samples; before prior_, which is made together with it.
   std::vector<std::vector<float>> disparity_;

@@ -27,8 +27,8 @@ double LargestDisparityPx(const DisparityMap& map) {
 }
 
 void CheckPicture(const model::LinearPicture& picture) {
-  if (picture.channels != 1 && picture.channels != 3) {
-    Fail(fmt::format("the picture has {} channels: it must have 1 or 3", picture.channels));
+  if (picture.channels < 1) {
+    Fail(fmt::format("the picture has {} channels: it must have at least 1", picture.channels));
   }
   if (picture.width_px < 1 || picture.height_px < 1 ||
       picture.values.size() !=

@@ -8,13 +8,20 @@ namespace thicklens::estimator {
 // Numbers that hot loops take together. What is computed with them becomes the vector instructions
 // of the function that it is inlined into.
 constexpr std::size_t kLanes = 8;
-typedef float Lanes __attribute__((vector_size(kLanes * sizeof(float))));
+template <typename Real>
+struct LanesOf {
+  typedef Real Type __attribute__((vector_size(kLanes * sizeof(Real))));
+};
+template <typename Real>
+using Lanes = typename LanesOf<Real>::Type;
 
-inline __attribute__((always_inline)) void Load(const float* from, Lanes* to) {
-  __builtin_memcpy(to, from, sizeof(Lanes));
+template <typename Real>
+inline __attribute__((always_inline)) void Load(const Real* from, Lanes<Real>* to) {
+  __builtin_memcpy(to, from, sizeof(Lanes<Real>));
 }
-inline __attribute__((always_inline)) void Store(const Lanes& from, float* to) {
-  __builtin_memcpy(to, &from, sizeof(Lanes));
+template <typename Real>
+inline __attribute__((always_inline)) void Store(const Lanes<Real>& from, Real* to) {
+  __builtin_memcpy(to, &from, sizeof(Lanes<Real>));
 }
 
 }  // namespace thicklens::estimator

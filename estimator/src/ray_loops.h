@@ -18,9 +18,10 @@ struct RayRun {
 };
 
 // The way to the source of the ray x is disparity[x] * (shift_x, shift_y), px.
+template <typename Real>
 struct RayRow {
-  const float* disparity = nullptr;
-  float shift_x = 0, shift_y = 0;
+  const Real* disparity = nullptr;
+  Real shift_x = 0, shift_y = 0;
   const RayRun* first = nullptr;
   const RayRun* last = nullptr;
   std::ptrdiff_t width_px = 0;
@@ -29,10 +30,12 @@ struct RayRow {
 // warped[x] = what the picture has at the source of ray x, linear between its pixels, for the rays
 // in runs. `row`: the same row of that picture. May write kLanes - 1 numbers after each run, and
 // read as many after the picture's last.
-void WarpRow(const RayRow& rays, const float* row, float* warped);
+template <typename Real>
+void WarpRow(const RayRow<Real>& rays, const Real* row, Real* warped);
 // The transpose: adds to the picture. May read kLanes - 1 numbers after the last value, and touch
 // (not change) as many of the picture after its last.
-void SpreadRow(const RayRow& rays, const float* values, float* row);
+template <typename Real>
+void SpreadRow(const RayRow<Real>& rays, const Real* values, Real* row);
 
 }  // namespace thicklens::estimator
 

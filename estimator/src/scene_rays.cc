@@ -14,9 +14,10 @@ constexpr int kBandRows = 8;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-std::int32_t Floor(float x) {
+template <typename Real>
+std::int32_t Floor(Real x) {
   const auto toward_zero = static_cast<std::int32_t>(x);
-  return toward_zero - (static_cast<float>(toward_zero) > x ? 1 : 0);
+  return toward_zero - (static_cast<Real>(toward_zero) > x ? 1 : 0);
 }
 
 template <typename Choose>
@@ -32,14 +33,16 @@ std::vector<float> OfCells(const DisparityMap& map, const Choose& choose) {
 
 }  // namespace
 
-ViewRays::ViewRays(const DisparityMap& map, const std::vector<float>& lowest,
-                   const std::vector<float>& highest, const ViewDisparity& view, double a, double b)
+template <typename Real>
+ViewRays<Real>::ViewRays(const DisparityMap& map, const std::vector<float>& lowest,
+                         const std::vector<float>& highest, const ViewDisparity& view, double a,
+                         double b)
     : width_px_(map.width_px),
-      shift_x_(static_cast<float>(a * map.step.x())),
-      shift_y_(static_cast<float>(b * map.step.y())) {
+      shift_x_(static_cast<Real>(a * map.step.x())),
+      shift_y_(static_cast<Real>(b * map.step.y())) {
   disparity_.reserve(view.disparity.size() + kMargin);
-  disparity_ = view.disparity;
-  disparity_.resize(view.disparity.size() + kMargin, 0.0F);
+  disparity_.assign(view.disparity.begin(), view.disparity.end());
+  disparity_.resize(view.disparity.size() + kMargin, Real{0});
   const double tolerance = SurfaceTolerance(map);
   const auto room = static_cast<float>(tolerance);
   std::size_t i = 0;
@@ -73,8 +76,9 @@ ViewRays::ViewRays(const DisparityMap& map, const std::vector<float>& lowest,
   odd_.shrink_to_fit();
 }
 
-void ViewRays::AddOdd(const DisparityMap& map, double tolerance, const ViewDisparity& view,
-                      std::size_t i) {
+template <typename Real>
+void ViewRays<Real>::AddOdd(const DisparityMap& map, double tolerance, const ViewDisparity& view,
+                            std::size_t i) {
   const std::size_t x = i % Index(map.width_px), y = i / Index(map.width_px);
   const SurfaceTaps taps =
       TapsAt(map, tolerance, static_cast<double>(x) + static_cast<double>(view.source_x[i]),
@@ -84,13 +88,14 @@ void ViewRays::AddOdd(const DisparityMap& map, double tolerance, const ViewDispa
   ray.pixel.fill(static_cast<std::int32_t>(taps.pixel[0]));
   for (std::size_t t = 0; t < Index(taps.count); ++t) {
     ray.pixel[t] = static_cast<std::int32_t>(taps.pixel[t]);
-    ray.weight[t] = static_cast<float>(taps.weight[t]);
+    ray.weight[t] = static_cast<Real>(taps.weight[t]);
   }
   odd_.push_back(ray);
   disparity_[i] = 0;
 }
 
-RayRow ViewRays::RowOf(int row) const {
+template <typename Real>
+RayRow<Real> ViewRays<Real>::RowOf(int row) const {
   return {disparity_.data() + Index(row) * Index(width_px_),
           shift_x_,
           shift_y_,
@@ -99,17 +104,19 @@ RayRow ViewRays::RowOf(int row) const {
           width_px_};
 }
 
-void ViewRays::Warp(int row, const float* picture, float* warped) const {
+template <typename Real>
+void ViewRays<Real>::Warp(int row, const Real* picture, Real* warped) const {
   WarpRow(RowOf(row), picture + Index(row) * Index(width_px_), warped);
   for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
     const OddRay& ray = odd_[n];
-    float sum = 0;
+    Real sum = 0;
     for (std::size_t t = 0; t < 4; ++t) sum += ray.weight[t] * picture[ray.pixel[t]];
     warped[ray.x] = sum;
   }
 }
 
-void ViewRays::Spread(int row, const float* values, float* picture) const {
+template <typename Real>
+void ViewRays<Real>::Spread(int row, const Real* values, Real* picture) const {
   SpreadRow(RowOf(row), values, picture + Index(row) * Index(width_px_));
   for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
     const OddRay& ray = odd_[n];
@@ -117,21 +124,23 @@ void ViewRays::Spread(int row, const float* values, float* picture) const {
   }
 }
 
-double ViewRays::bytes() const {
-  return static_cast<double>(disparity_.capacity() * sizeof(float) +
+template <typename Real>
+double ViewRays<Real>::bytes() const {
+  return static_cast<double>(disparity_.capacity() * sizeof(Real) +
                              runs_.capacity() * sizeof(RayRun) + odd_.capacity() * sizeof(OddRay) +
                              2 * run_start_.capacity() * sizeof(std::size_t));
 }
 
-SceneRays::SceneRays(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
-                     const std::function<void()>& progress)
+template <typename Real>
+SceneRays<Real>::SceneRays(const DisparityMap& disparity, const Eigen::ArrayXXd& weights,
+                           int threads, const std::function<void()>& progress)
     : width_px_(disparity.width_px),
       height_px_(disparity.height_px),
       threads_(threads),
       views_(static_cast<std::size_t>(weights.size())) {
   const auto u_count = static_cast<int>(weights.cols()), v_count = static_cast<int>(weights.rows());
   for (int l = 0; l < v_count; ++l) {
-    for (int k = 0; k < u_count; ++k) weights_.push_back(static_cast<float>(weights(l, k)));
+    for (int k = 0; k < u_count; ++k) weights_.push_back(static_cast<Real>(weights(l, k)));
   }
   const std::vector<float> lowest =
       OfCells(disparity, [](float a, float b) { return std::min(a, b); });
@@ -143,67 +152,78 @@ SceneRays::SceneRays(const DisparityMap& disparity, const Eigen::ArrayXXd& weigh
     if (!(weights_[Index(view)] > 0)) return;
     const double a = view % u_count - (u_count - 1) / 2.0;
     const double b = view / u_count - (v_count - 1) / 2.0;
-    views_[Index(view)] = ViewRays(disparity, lowest, highest, renderer.Render(a, b), a, b);
+    views_[Index(view)] = ViewRays<Real>(disparity, lowest, highest, renderer.Render(a, b), a, b);
   });
   const std::size_t bands = Index((height_px_ + kBandRows - 1) / kBandRows);
-  rows_.resize(std::max(bands, views_.size()) * (Index(width_px_) + ViewRays::kMargin));
+  rows_.resize(std::max(bands, views_.size()) * (Index(width_px_) + ViewRays<Real>::kMargin));
 }
 
-std::size_t SceneRays::plane_stride() const {
-  constexpr std::size_t kMultiple = ViewRays::kMargin;
-  return (pixels() + kMultiple - 1) / kMultiple * kMultiple + ViewRays::kMargin;
+template <typename Real>
+std::size_t SceneRays<Real>::plane_stride() const {
+  constexpr std::size_t kMultiple = ViewRays<Real>::kMargin;
+  return (pixels() + kMultiple - 1) / kMultiple * kMultiple + ViewRays<Real>::kMargin;
 }
 
-void SceneRays::Apply(const float* planes, std::size_t stride, float* photograph) {
+template <typename Real>
+void SceneRays<Real>::Apply(const Real* planes, std::size_t stride, Real* photograph) {
   const std::size_t width = Index(width_px_);
   const int bands = (height_px_ + kBandRows - 1) / kBandRows;
   model::ParallelFor(bands, threads_, [&](int band) {
     const int first = band * kBandRows, last = std::min(height_px_, first + kBandRows);
-    float* warped = rows_.data() + Index(band) * (width + ViewRays::kMargin);
-    std::fill(photograph + Index(first) * width, photograph + Index(last) * width, 0.0F);
+    Real* warped = rows_.data() + Index(band) * (width + ViewRays<Real>::kMargin);
+    std::fill(photograph + Index(first) * width, photograph + Index(last) * width, Real{0});
     for (std::size_t k = 0; k < views_.size(); ++k) {
-      const float weight = weights_[k];
+      const Real weight = weights_[k];
       if (!(weight > 0)) continue;
       for (int y = first; y < last; ++y) {
         views_[k].Warp(y, planes + k * stride, warped);
-        float* sum = photograph + Index(y) * width;
+        Real* sum = photograph + Index(y) * width;
         for (std::size_t x = 0; x < width; ++x) sum[x] += weight * warped[x];
       }
     }
   });
 }
 
-void SceneRays::ApplyTransposed(const float* photograph, float* planes) {
+template <typename Real>
+void SceneRays<Real>::ApplyTransposed(const Real* photograph, Real* planes) {
   const std::size_t width = Index(width_px_), stride = plane_stride();
   model::ParallelFor(static_cast<int>(views_.size()), threads_, [&](int view) {
     const std::size_t k = Index(view);
-    float* plane = planes + k * stride;
-    std::fill(plane, plane + stride, 0.0F);
-    const float weight = weights_[k];
+    Real* plane = planes + k * stride;
+    std::fill(plane, plane + stride, Real{0});
+    const Real weight = weights_[k];
     if (!(weight > 0)) return;
-    float* values = rows_.data() + k * (width + ViewRays::kMargin);
+    Real* values = rows_.data() + k * (width + ViewRays<Real>::kMargin);
     for (int y = 0; y < height_px_; ++y) {
-      const float* row = photograph + Index(y) * width;
+      const Real* row = photograph + Index(y) * width;
       for (std::size_t x = 0; x < width; ++x) values[x] = weight * row[x];
       views_[k].Spread(y, values, plane);
     }
   });
 }
 
-void SceneRays::Show(std::size_t k, const float* plane, float* shown) const {
+template <typename Real>
+void SceneRays<Real>::Show(std::size_t k, const Real* plane, float* shown) const {
   const std::size_t width = Index(width_px_);
-  std::vector<float> warped(width + ViewRays::kMargin);
+  std::vector<Real> warped(width + ViewRays<Real>::kMargin);
   for (int y = 0; y < height_px_; ++y) {
     views_[k].Warp(y, plane, warped.data());
-    std::copy(warped.begin(), warped.begin() + static_cast<std::ptrdiff_t>(width),
-              shown + Index(y) * width);
+    for (std::size_t x = 0; x < width; ++x) {
+      shown[Index(y) * width + x] = static_cast<float>(warped[x]);
+    }
   }
 }
 
-double SceneRays::bytes() const {
-  double sum = static_cast<double>(rows_.capacity() * sizeof(float));
-  for (const ViewRays& view : views_) sum += view.bytes();
+template <typename Real>
+double SceneRays<Real>::bytes() const {
+  double sum = static_cast<double>(rows_.capacity() * sizeof(Real));
+  for (const ViewRays<Real>& view : views_) sum += view.bytes();
   return sum;
 }
+
+template class ViewRays<float>;
+template class ViewRays<double>;
+template class SceneRays<float>;
+template class SceneRays<double>;
 
 }  // namespace thicklens::estimator

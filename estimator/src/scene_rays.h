@@ -14,6 +14,7 @@
 namespace thicklens::estimator {
 
 // The rays of one view: where in the centre view each of its samples has its source.
+template <typename Real>
 class ViewRays {
  public:
   ViewRays() = default;
@@ -26,9 +27,9 @@ class ViewRays {
   static constexpr std::size_t kMargin = 2 * kLanes;
 
   // warped(x) = sum_taps t(x, p) picture(p) of one row, by the taps of SurfaceTaps.
-  void Warp(int row, const float* picture, float* warped) const;
+  void Warp(int row, const Real* picture, Real* warped) const;
   // The transpose, added to the picture.
-  void Spread(int row, const float* values, float* picture) const;
+  void Spread(int row, const Real* values, Real* picture) const;
 
   double bytes() const;
 
@@ -37,14 +38,14 @@ class ViewRays {
   struct OddRay {
     std::int32_t x = 0;
     std::array<std::int32_t, 4> pixel{};
-    std::array<float, 4> weight{};
+    std::array<Real, 4> weight{};
   };
   void AddOdd(const DisparityMap& map, double tolerance, const ViewDisparity& view, std::size_t i);
-  RayRow RowOf(int row) const;
+  RayRow<Real> RowOf(int row) const;
 
   int width_px_ = 0;
-  float shift_x_ = 0, shift_y_ = 0;
-  std::vector<float> disparity_;
+  Real shift_x_ = 0, shift_y_ = 0;
+  std::vector<Real> disparity_;
   std::vector<RayRun> runs_;
   std::vector<OddRay> odd_;
   std::vector<std::size_t> run_start_, odd_start_;  // of each row, and the end
@@ -53,9 +54,10 @@ class ViewRays {
 // H in scene-ray form: R(p, k) is the radiance of the scene point that the pixel p of the centre
 // view shows, toward the aperture sample k;
 //   (H R)(x) = sum_k w_k sum_taps t_k(x, p) R(p, k),
-// with the rays and taps of SceneProjection's rows: where all R(p, k) of a point are equal, this is
-// its photograph. Derived here.
+// with the rays of SceneProjection and its taps for Between::kLinear: where all R(p, k) of a point
+// are equal, this is its photograph. Derived here.
 // A plane R(., k) stands at k * stride, k row by row of the aperture.
+template <typename Real>
 class SceneRays {
  public:
   // `disparity`: px per view step, 0 in the plane of focus, without holes. Weights V x U, sum 1.
@@ -71,20 +73,20 @@ class SceneRays {
   std::size_t view_count() const { return views_.size(); }
 
   // photograph = H R. Stride 0: all planes are that one.
-  void Apply(const float* planes, std::size_t stride, float* photograph);
+  void Apply(const Real* planes, std::size_t stride, Real* photograph);
   // R = H^T photograph; planes at plane_stride(), of which the margins become 0.
-  void ApplyTransposed(const float* photograph, float* planes);
+  void ApplyTransposed(const Real* photograph, Real* planes);
   // What view k shows of its plane (which has a margin), without the weight.
-  void Show(std::size_t k, const float* plane, float* shown) const;
+  void Show(std::size_t k, const Real* plane, float* shown) const;
 
   double bytes() const;
 
  private:
   int width_px_ = 0, height_px_ = 0;
   int threads_ = 1;
-  std::vector<ViewRays> views_;
-  std::vector<float> weights_;
-  std::vector<float> rows_;  // one with a margin for each piece of work
+  std::vector<ViewRays<Real>> views_;
+  std::vector<Real> weights_;
+  std::vector<Real> rows_;  // one with a margin for each piece of work
 };
 
 }  // namespace thicklens::estimator

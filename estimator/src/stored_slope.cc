@@ -1,6 +1,8 @@
 #include "stored_slope.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <opencv2/imgproc.hpp>
 
 namespace thicklens::estimator {
@@ -12,9 +14,25 @@ StoredValueTable::StoredValueTable(const model::TransferCurve& transfer) : trans
   }
 }
 
+namespace {
+
+// Of bands that are no colours, the mean.
+model::LinearPicture GreyOf(const model::LinearPicture& picture) {
+  if (picture.channels == 1 || picture.channels == 3) return model::ToGrey(picture);
+  const auto channels = static_cast<std::size_t>(picture.channels);
+  model::LinearPicture grey{picture.width_px, picture.height_px, 1, {}};
+  grey.values.resize(picture.values.size() / channels);
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    grey.values[i / channels] += picture.values[i] / static_cast<float>(channels);
+  }
+  return grey;
+}
+
+}  // namespace
+
 std::vector<double> StoredSlopes(const model::LinearPicture& picture,
                                  const model::TransferCurve& transfer, double smoothing_px) {
-  model::LinearPicture grey = model::ToGrey(picture);
+  model::LinearPicture grey = GreyOf(picture);
   cv::Mat smooth(grey.height_px, grey.width_px, CV_32F, grey.values.data());
   if (smoothing_px > 0) {
     cv::GaussianBlur(smooth, smooth, {}, smoothing_px, smoothing_px, cv::BORDER_REPLICATE);

@@ -73,8 +73,8 @@ std::string Complaint(const LightField& light_field) {
   for (const auto& count : counts) {
     if (count.value < 1) return fmt::format("{} is {}: it must be >= 1", count.name, count.value);
   }
-  if (light_field.channels != 1 && light_field.channels != 3) {
-    return fmt::format("channels is {}: it must be 1 (grey) or 3 (RGB)", light_field.channels);
+  if (light_field.channels < 1) {
+    return fmt::format("channels is {}: it must be >= 1", light_field.channels);
   }
   const std::size_t expected = light_field.ViewStart(light_field.channels, 0, 0);
   if (light_field.values.size() != expected) {

@@ -16,8 +16,8 @@ namespace {
 using ::testing::HasSubstr;
 using thicklens::testing::ErrorOf;
 
-constexpr std::size_t kPoints = 5 * AperturePrior::kPacket;
-constexpr std::size_t kStride = kPoints + 2 * AperturePrior::kPacket;
+constexpr std::size_t kPoints = 5 * AperturePrior<float>::kPacket;
+constexpr std::size_t kStride = kPoints + 2 * AperturePrior<float>::kPacket;
 
 std::vector<float> RandomPlanes(int views) {
   std::mt19937 engine(4);
@@ -34,7 +34,7 @@ void ExpectInverse(int u_count, int v_count, double gamma, double mu) {
       (gamma * d.transpose() * d + mu * Eigen::MatrixXd::Identity(views, views)).inverse();
   const std::vector<float> before = RandomPlanes(views);
   std::vector<float> after = before;
-  AperturePrior(u_count, v_count, gamma, mu).ApplyInverse(kPoints, kStride, 1, after.data());
+  AperturePrior<float>(u_count, v_count, gamma, mu).ApplyInverse(kPoints, kStride, 1, after.data());
   for (std::size_t point = 0; point < kStride; ++point) {
     Eigen::VectorXd x(views);
     for (int k = 0; k < views; ++k) x[k] = before[static_cast<std::size_t>(k) * kStride + point];
@@ -62,23 +62,23 @@ TEST(AperturePrior, IsTheInverseForWeakAndStrongSmoothness) {
 }
 
 TEST(AperturePrior, SameBitsOnAnyNumberOfThreads) {
-  constexpr std::size_t kMany = 1000 * AperturePrior::kPacket;
+  constexpr std::size_t kMany = 1000 * AperturePrior<float>::kPacket;
   std::mt19937 engine(4);
   std::uniform_real_distribution<float> uniform(-1, 1);
   std::vector<float> planes(15 * kMany);
   for (float& value : planes) value = uniform(engine);
   std::vector<float> expected = planes;
-  AperturePrior(5, 3, 1, 0.1).ApplyInverse(kMany, kMany, 1, expected.data());
+  AperturePrior<float>(5, 3, 1, 0.1).ApplyInverse(kMany, kMany, 1, expected.data());
   for (const int threads : {2, 3}) {
     std::vector<float> found = planes;
-    AperturePrior(5, 3, 1, 0.1).ApplyInverse(kMany, kMany, threads, found.data());
+    AperturePrior<float>(5, 3, 1, 0.1).ApplyInverse(kMany, kMany, threads, found.data());
     EXPECT_EQ(found, expected);
   }
 }
 
 TEST(AperturePrior, RefusesMoreSamplesThanItHasRoomFor) {
-  EXPECT_THAT(ErrorOf([] { AperturePrior(65, 1, 1, 1); }), HasSubstr("65x1"));
-  EXPECT_EQ(ErrorOf([] { AperturePrior(64, 1, 1, 1); }), "(no error)");
+  EXPECT_THAT(ErrorOf([] { AperturePrior<float>(65, 1, 1, 1); }), HasSubstr("65x1"));
+  EXPECT_EQ(ErrorOf([] { AperturePrior<float>(64, 1, 1, 1); }), "(no error)");
 }
 
 }  // namespace

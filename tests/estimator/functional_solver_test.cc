@@ -118,7 +118,8 @@ FunctionalOptions Precise() {
 // `photograph_disparity`: of the rays that meet on the photograph's pixels; `radiance`: what their
 // mean is.
 void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photograph_disparity,
-                         const model::LinearPicture& radiance, const FunctionalOptions& options) {
+                         const model::LinearPicture& radiance, const FunctionalOptions& options,
+                         double accuracy = 2e-4) {
   const auto u_count = static_cast<int>(input.weights.cols());
   const auto v_count = static_cast<int>(input.weights.rows());
   FunctionalSummary summary;
@@ -141,7 +142,7 @@ void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photogr
             ViewMatrix(input.disparity, found.u_offset(k), found.v_offset(l)) *
             rays.segment((l * u_count + k) * pixels, pixels);
         const model::LinearPicture view = model::ViewPicture(found, k, l);
-        EXPECT_LT((ChannelOf(view, channel) - expected).lpNorm<Eigen::Infinity>(), 2e-4)
+        EXPECT_LT((ChannelOf(view, channel) - expected).lpNorm<Eigen::Infinity>(), accuracy)
             << "view " << k << ", " << l << ", channel " << channel;
       }
     }
@@ -151,6 +152,15 @@ void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photogr
 TEST(FunctionalSolver, MinimisesTheFunctional) {
   const EstimateInput input = MakeInput(8, 7, 1, Gaussian(3, 3));
   ExpectDenseSolution(input, input.disparity, input.picture, Precise());
+}
+
+// To the rounding of a light field, which is stored in float.
+TEST(FunctionalSolver, MinimisesItInDouble) {
+  FunctionalOptions options = Precise();
+  options.double_precision = true;
+  options.tolerance = 1e-12;
+  const EstimateInput input = MakeInput(8, 7, 3, Gaussian(3, 3));
+  ExpectDenseSolution(input, input.disparity, input.picture, options, 2e-7);
 }
 
 TEST(FunctionalSolver, MinimisesItForOtherStrengths) {
@@ -299,6 +309,20 @@ TEST(FunctionalSolver, SameBitsOnAnyNumberOfThreads) {
     options.threads = threads;
     EXPECT_EQ(EstimateFunctional(input, options, &summary).values, one.values);
     EXPECT_EQ(summary.threads, threads);
+  }
+}
+
+TEST(FunctionalSolver, FloatIsAsGoodAsDouble) {
+  const EstimateInput input = MakeInput(101, 67, 1, Gaussian(5, 5));
+  FunctionalOptions options;
+  options.tolerance = 1e-5;
+  FunctionalSummary in_float, in_double;
+  const model::LightField one = EstimateFunctional(input, options, &in_float);
+  options.double_precision = true;
+  const model::LightField other = EstimateFunctional(input, options, &in_double);
+  EXPECT_NE(one.values, other.values);
+  for (std::size_t i = 0; i < one.values.size(); ++i) {
+    ASSERT_NEAR(one.values[i], other.values[i], 1e-4) << i;
   }
 }
 

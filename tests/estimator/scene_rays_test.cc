@@ -67,12 +67,12 @@ std::vector<float> RandomNumbers(std::size_t count, unsigned seed) {
   return numbers;
 }
 
-SceneRays Make(const Case& made, int threads = 1) {
-  return SceneRays(made.map, made.weights, threads, nullptr);
+SceneRays<float> Make(const Case& made, int threads = 1) {
+  return SceneRays<float>(made.map, made.weights, threads, nullptr);
 }
 
 // The planes without their margins.
-Eigen::VectorXd Dense(const SceneRays& rays, const std::vector<float>& planes) {
+Eigen::VectorXd Dense(const SceneRays<float>& rays, const std::vector<float>& planes) {
   Eigen::VectorXd dense(static_cast<Eigen::Index>(rays.view_count() * rays.pixels()));
   for (std::size_t k = 0; k < rays.view_count(); ++k) {
     for (std::size_t i = 0; i < rays.pixels(); ++i) {
@@ -89,7 +89,7 @@ Eigen::VectorXd Dense(const std::vector<float>& picture) {
 
 TEST(SceneRays, EqualTheRaysOneByOne) {
   for (const Case& made : Cases()) {
-    SceneRays rays = Make(made);
+    SceneRays<float> rays = Make(made);
     const Eigen::MatrixXd h = testing::PhotographMatrix(made.map, made.weights);
     const std::vector<float> planes = RandomNumbers(rays.view_count() * rays.plane_stride(), 1);
     std::vector<float> photograph(rays.pixels());
@@ -101,7 +101,7 @@ TEST(SceneRays, EqualTheRaysOneByOne) {
 
 TEST(SceneRays, TransposedEqualTheRaysOneByOne) {
   for (const Case& made : Cases()) {
-    SceneRays rays = Make(made);
+    SceneRays<float> rays = Make(made);
     const Eigen::MatrixXd h = testing::PhotographMatrix(made.map, made.weights);
     const std::vector<float> photograph = RandomNumbers(rays.pixels(), 2);
     std::vector<float> planes(rays.view_count() * rays.plane_stride(), 7.0F);
@@ -119,7 +119,7 @@ TEST(SceneRays, TransposedEqualTheRaysOneByOne) {
 
 TEST(SceneRays, PassTheDotProductTest) {
   for (const Case& made : Cases()) {
-    SceneRays rays = Make(made);
+    SceneRays<float> rays = Make(made);
     const std::vector<float> y = RandomNumbers(rays.pixels(), 3);
     std::vector<float> x = RandomNumbers(rays.view_count() * rays.plane_stride(), 4);
     std::vector<float> forward(y.size()), back(x.size());
@@ -131,13 +131,31 @@ TEST(SceneRays, PassTheDotProductTest) {
   }
 }
 
+TEST(SceneRays, PassItInDoubleToTheLastDigits) {
+  for (const Case& made : Cases()) {
+    SceneRays<double> rays(made.map, made.weights, 1, nullptr);
+    const std::vector<float> random_y = RandomNumbers(rays.pixels(), 3);
+    const std::vector<float> random_x = RandomNumbers(rays.view_count() * rays.plane_stride(), 4);
+    const std::vector<double> y(random_y.begin(), random_y.end());
+    const std::vector<double> x(random_x.begin(), random_x.end());
+    std::vector<double> forward(y.size()), back(x.size());
+    rays.Apply(x.data(), rays.plane_stride(), forward.data());
+    rays.ApplyTransposed(y.data(), back.data());
+    double left = 0, right = 0;
+    for (std::size_t i = 0; i < y.size(); ++i) left += forward[i] * y[i];
+    for (std::size_t i = 0; i < x.size(); ++i) right += x[i] * back[i];
+    EXPECT_NEAR(left, right, 1e-12 * static_cast<double>(y.size()));
+  }
+}
+
 // Where all rays of a point are equal, H is that of the scene.
 TEST(SceneRays, OfALambertianSceneAreItsProjection) {
   const Case made = Cases()[1];
   ProjectionOptions options;
   options.tolerance_px = 1e-9;
+  options.between = Between::kLinear;
   const auto projection = MakeSceneProjection<float>(made.map, made.weights, options);
-  SceneRays rays = Make(made);
+  SceneRays<float> rays = Make(made);
   std::vector<float> picture = RandomNumbers(rays.plane_stride(), 5);
   std::vector<float> expected(rays.pixels()), found(rays.pixels());
   projection.Apply(picture.data(), 1, expected.data());
@@ -147,7 +165,7 @@ TEST(SceneRays, OfALambertianSceneAreItsProjection) {
 
 TEST(SceneRays, ShowWhatAViewSees) {
   const Case made = Cases()[0];
-  const SceneRays rays = Make(made);
+  const SceneRays<float> rays = Make(made);
   std::vector<float> picture = RandomNumbers(rays.plane_stride(), 6);
   std::vector<float> shown(rays.pixels());
   rays.Show(3 * 4 + 2, picture.data(), shown.data());
@@ -158,14 +176,14 @@ TEST(SceneRays, ShowWhatAViewSees) {
 
 TEST(SceneRays, SameBitsOnAnyNumberOfThreads) {
   for (const Case& made : Cases()) {
-    SceneRays one = Make(made);
+    SceneRays<float> one = Make(made);
     const std::vector<float> planes = RandomNumbers(one.view_count() * one.plane_stride(), 7);
     std::vector<float> expected(one.pixels()), found(one.pixels());
     std::vector<float> expected_back(planes.size()), found_back(planes.size());
     one.Apply(planes.data(), one.plane_stride(), expected.data());
     one.ApplyTransposed(expected.data(), expected_back.data());
     for (const int threads : {2, 3}) {
-      SceneRays several = Make(made, threads);
+      SceneRays<float> several = Make(made, threads);
       several.Apply(planes.data(), several.plane_stride(), found.data());
       EXPECT_EQ(found, expected);
       several.ApplyTransposed(expected.data(), found_back.data());

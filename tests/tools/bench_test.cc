@@ -83,7 +83,7 @@ TEST(Bench, MeasuresEverySolverOnTheSameScene) {
     if (row["solver"] == "dibr") dibr_db = row["psnr_db"];
     if (row["solver"] == "scene" && row["prior"] == "ridge") ridge_db = row["psnr_db"];
   }
-  EXPECT_THAT(solvers, ::testing::IsSupersetOf({"blocks", "scene", "functional", "dibr"}));
+  EXPECT_THAT(solvers, ::testing::IsSupersetOf({"blocks", "scene", "functional", "grid", "dibr"}));
   EXPECT_GT(ridge_db, dibr_db + 1);
 }
 

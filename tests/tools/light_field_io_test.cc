@@ -148,6 +148,16 @@ TEST_F(LightFieldFolder, TiffKeepsEveryBit) {
   }
 }
 
+TEST_F(LightFieldFolder, BandsThatAreNoColoursAreNotWritten) {
+  for (const ViewFormat format : {ViewFormat::kPng, ViewFormat::kTiff}) {
+    for (const int channels : {2, 4, 5}) {
+      EXPECT_THAT(ErrorOf([&] { Write(Relative(3, 2, channels), format); }),
+                  AllOf(HasSubstr("channels is " + std::to_string(channels)),
+                        HasSubstr("1 (grey) or 3 (RGB)")));
+    }
+  }
+}
+
 // A round trip alone would not see red and blue exchanged twice.
 TEST_F(LightFieldFolder, TiffHasRedFirst) {
   model::LightField light_field = model::MakeLightField(1, 1, 1, 1, 3);

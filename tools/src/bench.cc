@@ -22,6 +22,7 @@
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/parallel.h"
@@ -118,19 +119,23 @@ std::vector<Contender> Contenders(const BenchScene& whole, const BenchScene& sam
                           {},
                           0});
   }
-  contenders.push_back({"functional",
-                        "",
-                        "ridge",
-                        &whole,
-                        [=](const BenchScene& scene) {
-                          estimator::FunctionalOptions options;
-                          options.threads = threads;
-                          options.progress = [](int, int) { ThrowIfInterrupted(); };
-                          estimator::FunctionalSummary summary;
-                          return estimator::EstimateFunctional(scene.input, options, &summary);
-                        },
-                        {},
-                        0});
+  for (const bool on_grid : {false, true}) {
+    contenders.push_back({on_grid ? "grid" : "functional",
+                          "",
+                          "ridge",
+                          &whole,
+                          [=](const BenchScene& scene) {
+                            estimator::FunctionalOptions options;
+                            options.threads = threads;
+                            options.progress = [](int, int) { ThrowIfInterrupted(); };
+                            const auto estimate =
+                                on_grid ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
+                            estimator::FunctionalSummary summary;
+                            return estimate(scene.input, options, &summary);
+                          },
+                          {},
+                          0});
+  }
   contenders.push_back({"dibr",
                         "",
                         "",

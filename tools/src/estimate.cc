@@ -24,6 +24,8 @@
 #include "light_field_page.h"
 #include "progress_line.h"
 #include "report_folder.h"
+#include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/output_file.h"
@@ -52,10 +54,14 @@ struct Outputs {
 
 void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& input,
                 const Progress& progress, EstimateOutcome* outcome) {
-  spdlog::debug("device: cpu");
+  // A device is worth its start where it is asked for.
+  const auto backend = kernels::OpenBackend(
+      kernels::ParseDeviceRequest(options.device == "auto" ? "cpu" : options.device), nullptr,
+      ThrowIfInterrupted);
+  spdlog::debug("device: {}", backend->description());
   estimator::SceneSummary scene;
-  outcome->light_field =
-      estimator::EstimateScene(input, SceneOptionsOf(options, progress), &scene, &outcome->maps);
+  outcome->light_field = estimator::EstimateScene(input, SceneOptionsOf(options, progress), &scene,
+                                                  &outcome->maps, backend.get());
   outcome->seconds.setup += scene.setup_seconds;
   outcome->seconds.solve = scene.solve_seconds;
   outcome->seconds.views = scene.views_seconds;
@@ -76,6 +82,37 @@ void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput&
   outcome->seconds.setup += blocks.setup_seconds;
   outcome->seconds.solve = blocks.solve_seconds;
   outcome->blocks = std::move(blocks);
+}
+
+void SolveFunctional(const EstimateOptions& options, const estimator::EstimateInput& input,
+                     const Progress& progress, EstimateOutcome* outcome) {
+  spdlog::debug("device: cpu");
+  const auto estimate =
+      options.solver == "grid" ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
+  estimator::FunctionalSummary functional;
+  outcome->light_field = estimate(input, FunctionalOptionsOf(options, progress), &functional);
+  outcome->seconds.setup += functional.setup_seconds;
+  outcome->seconds.solve = functional.solve_seconds;
+  outcome->seconds.views = functional.views_seconds;
+  outcome->functional = std::move(functional);
+}
+
+// Throws Error for settings that are not valid.
+void CheckSettings(const EstimateOptions& options) {
+  if (options.solver == "scene") {
+    SceneOptionsOf(options, {});
+  } else if (options.by_blocks()) {
+    BlockOptionsOf(options, {});
+  } else {
+    FunctionalOptionsOf(options, {});
+  }
+}
+
+void Solve(const EstimateOptions& options, const estimator::EstimateInput& input,
+           const Progress& progress, EstimateOutcome* outcome) {
+  if (options.solver == "scene") return SolveScene(options, input, progress, outcome);
+  if (options.by_blocks()) return SolveBlocks(options, input, progress, outcome);
+  SolveFunctional(options, input, progress, outcome);
 }
 
 // The photograph's disparity as the page shows it, px per view step.
@@ -119,20 +156,14 @@ CommandResult Estimate(const EstimateOptions& options) {
     ThrowIfInterrupted();
     line.Show(done, total);
   };
-  // What is not valid is told before anything is read.
-  if (options.by_blocks()) {
-    BlockOptionsOf(options, progress);
-  } else {
-    SceneOptionsOf(options, progress);
-  }
+  CheckSettings(options);  // before anything is read
   Outputs outputs(options);
   PreparedEstimate prepared = PrepareEstimate(options);
   ThrowIfInterrupted();
 
   EstimateOutcome outcome;
   outcome.seconds.setup = SecondsSince(start);
-  const auto solve = options.by_blocks() ? SolveBlocks : SolveScene;
-  solve(options, prepared.input, progress, &outcome);
+  Solve(options, prepared.input, progress, &outcome);
   model::LightFieldOrigin& origin = outcome.light_field.origin;
   origin.seconds = outcome.seconds.setup + outcome.seconds.solve + outcome.seconds.views;
   origin.version = Version();

@@ -101,9 +101,12 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
 
 void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
   command
-      ->add_option("--solver", options->solver,
-                   "scene: the whole picture at once; blocks: the source's, block by block")
-      ->check(CLI::IsMember({"scene", "blocks"}))
+      ->add_option(
+          "--solver", options->solver,
+          "scene: the whole picture at once. For comparison: blocks, the source's, block by "
+          "block; functional and grid, the source's functional for the whole picture, on the rays "
+          "of scene points or of the views")
+      ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
       ->capture_default_str()
       ->type_name("NAME");
   command->add_option("--memory-limit", options->memory_limit_mib, "For the whole program")
@@ -125,47 +128,58 @@ void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
                    "(cross-validation) or a number")
       ->check(IsStrength())
       ->type_name("RULE");
-  command
-      ->add_option("--tolerance", options->tolerance,
-                   fmt::format("Of scene: relative residual at which it stops; default {:g}",
-                               estimator::SceneOptions().tolerance))
-      ->check(Between(0, 1, "a relative residual"))
-      ->type_name("X");
-  command
-      ->add_option(
-          "--max-iterations", options->max_iterations,
-          fmt::format("Of scene, in all; default {}", estimator::SceneOptions().max_iterations))
-      ->check(CLI::Range(1, kMaxIterations))
-      ->type_name("N");
-  command->add_flag("--double", options->double_precision,
-                    "Of scene: numbers of 64 bit instead of 32");
 }
 
-void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
-  const estimator::BlockOptions usual;
-  command
-      ->add_option("--block-solver", options->block_solver,
-                   fmt::format("Of blocks: umfpack, cholmod or eigen; default {}",
-                               estimator::BlockSolverName(usual.solver)))
-      ->check(CLI::IsMember({"umfpack", "cholmod", "eigen"}))
-      ->type_name("NAME");
-  command
-      ->add_option("--block-px", options->block_px,
-                   "Their edge; default 16, or the largest that --memory-limit allows")
-      ->check(CLI::Range(1, 100000))
-      ->type_name("PX");
+void AddFunctionalOptions(CLI::App* command, EstimateOptions* options) {
+  const estimator::FunctionalOptions usual;
   command
       ->add_option("--gamma", options->gamma,
-                   fmt::format("Of blocks: weight of the smoothness along scene points; default "
-                               "{:g}",
+                   fmt::format("Of all but scene: weight of the smoothness along scene points; "
+                               "default {:g}",
                                usual.gamma))
       ->check(Finite())
       ->type_name("X");
   command
       ->add_option("--ridge", options->ridge,
-                   "Of blocks: weight mu of the distance to the warped picture; default 0.01/(U V)")
+                   "Of all but scene: weight mu of the distance to the warped picture; default "
+                   "0.01/(U V)")
       ->check(Finite())
       ->type_name("X");
+}
+
+void AddIterationOptions(CLI::App* command, EstimateOptions* options) {
+  const estimator::SceneOptions scene;
+  const estimator::FunctionalOptions functional;
+  command
+      ->add_option("--tolerance", options->tolerance,
+                   fmt::format("Of all but blocks: relative residual at which it stops; default "
+                               "{:g} (scene with tv) or {:g}",
+                               scene.tolerance_or_usual(), functional.tolerance))
+      ->check(Between(0, 1, "a relative residual"))
+      ->type_name("X");
+  command
+      ->add_option("--max-iterations", options->max_iterations,
+                   fmt::format("Of all but blocks: in all (scene; default {}), or for each channel "
+                               "(default {})",
+                               scene.max_iterations, functional.max_iterations))
+      ->check(CLI::Range(1, kMaxIterations))
+      ->type_name("N");
+  command->add_flag("--double", options->double_precision,
+                    "Of all but blocks: numbers of 64 bit instead of 32");
+}
+
+void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
+  const std::string usual = estimator::BlockSolverName(estimator::DefaultBlockSolver());
+  command
+      ->add_option("--block-solver", options->block_solver,
+                   fmt::format("Of blocks: umfpack, cholmod or eigen; default {}", usual))
+      ->check(CLI::IsMember({"umfpack", "cholmod", "eigen"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--block-px", options->block_px,
+                   "Of blocks: their edge; default 16, or the largest that --memory-limit allows")
+      ->check(CLI::Range(1, 100000))
+      ->type_name("PX");
   command
       ->add_option("--stencil", options->stencil,
                    "Of blocks, of the smoothness: warp (default), or the source's six differences")
@@ -179,35 +193,51 @@ void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("NAME");
 }
 
-// The first option of another solver than the one that is asked for; empty: none.
-std::string OptionOfBlocks(const EstimateOptions& options) {
-  if (options.block_solver) return "--block-solver";
-  if (options.block_px) return "--block-px";
-  if (options.gamma) return "--gamma";
-  if (options.ridge) return "--ridge";
-  if (options.stencil) return "--stencil";
-  return options.splat ? "--splat" : "";
+// An option that not every solver has.
+struct OptionOfSolvers {
+  const char* name;
+  bool is_given;
+  std::vector<std::string> solvers;
+};
+
+std::vector<OptionOfSolvers> OptionsOfSolvers(const EstimateOptions& options) {
+  const std::vector<std::string> scene = {"scene"}, blocks = {"blocks"};
+  const std::vector<std::string> smooth = {"blocks", "functional", "grid"};
+  const std::vector<std::string> iterative = {"scene", "functional", "grid"};
+  return {{"--prior", options.prior.has_value(), scene},
+          {"--strength", options.strength.has_value(), scene},
+          {"--tolerance", options.tolerance.has_value(), iterative},
+          {"--max-iterations", options.max_iterations.has_value(), iterative},
+          {"--double", options.double_precision, iterative},
+          {"--gamma", options.gamma.has_value(), smooth},
+          {"--ridge", options.ridge.has_value(), smooth},
+          {"--block-solver", options.block_solver.has_value(), blocks},
+          {"--block-px", options.block_px.has_value(), blocks},
+          {"--stencil", options.stencil.has_value(), blocks},
+          {"--splat", options.splat.has_value(), blocks}};
 }
 
-std::string OptionOfScene(const EstimateOptions& options) {
-  if (options.prior) return "--prior";
-  if (options.strength) return "--strength";
-  if (options.tolerance) return "--tolerance";
-  if (options.max_iterations) return "--max-iterations";
-  return options.double_precision ? "--double" : "";
+// "a", "a or b", "a, b or c".
+std::string Either(const std::vector<std::string>& names) {
+  if (names.size() < 2) return fmt::format("{}", fmt::join(names, ""));
+  return fmt::format("{} or {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
 }
 
 void CheckSolverUsage(const EstimateOptions& options) {
-  const std::string other = options.by_blocks() ? OptionOfScene(options) : OptionOfBlocks(options);
-  if (!other.empty()) {
-    throw UsageError(fmt::format("{} is of --solver {}, the solver is {}", other,
-                                 options.by_blocks() ? "scene" : "blocks", options.solver));
+  for (const OptionOfSolvers& option : OptionsOfSolvers(options)) {
+    const auto& solvers = option.solvers;
+    if (!option.is_given ||
+        std::find(solvers.begin(), solvers.end(), options.solver) != solvers.end()) {
+      continue;
+    }
+    throw UsageError(fmt::format("{} is of --solver {}, the solver is {}", option.name,
+                                 Either(solvers), options.solver));
   }
-  if (!options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
+  if (options.solver != "scene" && !options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
     throw UsageError(fmt::format(
-        "--device {} is for --solver blocks; the solver scene computes on the processor (auto or "
-        "cpu)",
-        options.device));
+        "--device {} is for --solver scene or blocks; the solver {} computes on the processor "
+        "(auto or cpu)",
+        options.device, options.solver));
   }
 }
 
@@ -245,6 +275,8 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
   AddLightFieldOptions(command, options);
   AddSolverOptions(command, options);
   AddSceneOptions(command, options);
+  AddIterationOptions(command, options);
+  AddFunctionalOptions(command, options);
   AddBlockOptions(command, options);
   AddCommonOptions(command, &options->common);
 }
@@ -299,6 +331,23 @@ estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress 
   solver.memory_limit_mib = options.memory_limit_mib;
   solver.falloff = options.falloff();
   solver.threads = options.common.threads;
+  solver.progress = std::move(progress);
+  std::string why;
+  if (!solver.IsValid(&why)) throw Error(why);
+  return solver;
+}
+
+estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options,
+                                                 Progress progress) {
+  estimator::FunctionalOptions solver;
+  if (options.gamma) solver.gamma = *options.gamma;
+  solver.ridge = options.ridge;
+  if (options.tolerance) solver.tolerance = *options.tolerance;
+  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
+  solver.double_precision = options.double_precision;
+  solver.falloff = options.falloff();
+  solver.threads = options.common.threads;
+  solver.memory_limit_mib = options.memory_limit_mib;
   solver.progress = std::move(progress);
   std::string why;
   if (!solver.IsValid(&why)) throw Error(why);

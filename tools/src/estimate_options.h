@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "light_field_options.h"
 #include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::tools {
@@ -33,12 +34,11 @@ struct EstimateOptions {
   std::vector<std::string> without;
   std::string device = "auto";
   std::string format = "png";
-  // Of the solver `scene` alone.
+  // Of some solvers, as the help says.
   std::optional<std::string> prior, strength;
   std::optional<double> tolerance;
   std::optional<int> max_iterations;
   bool double_precision = false;
-  // Of the solver `blocks` alone.
   std::optional<std::string> block_solver, stencil, splat;
   std::optional<double> gamma, ridge;
   std::optional<int> block_px;
@@ -57,6 +57,7 @@ void CheckEstimateUsage(const EstimateOptions& options);
 using Progress = std::function<void(int done, int total)>;
 estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress progress);
 estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress progress);
+estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options, Progress progress);
 
 }  // namespace thicklens::tools
 

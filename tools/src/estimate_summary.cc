@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 namespace thicklens::tools {
@@ -63,7 +64,7 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
                {"strength", scene.strength},
                {"strength_rule", NameOf(SceneOptionsOf(options, {}).strength_rule)},
                {"noise_sigma", scene.noise_sigma},
-               {"device", "cpu"},
+               {"device", scene.device},
                {"threads", scene.threads},
                {"predicted_memory_mib", scene.predicted_memory_mib},
                {"iterations", scene.iterations},
@@ -102,6 +103,40 @@ void AddBlocks(const EstimateOutcome& outcome, json* out) {
                {"residual_rms", nullptr}});
 }
 
+void AddFunctional(const estimator::FunctionalSummary& functional, json* out) {
+  out->update({{"block_solver", nullptr},
+               {"prior", "ridge"},
+               {"strength", functional.ridge},
+               {"noise_sigma", nullptr},
+               {"gamma", functional.gamma},
+               {"ridge", functional.ridge},
+               {"device", "cpu"},
+               {"threads", functional.threads},
+               {"predicted_memory_mib", functional.predicted_memory_mib},
+               {"iterations", functional.iterations},
+               {"converged", functional.converged},
+               {"relative_residual", functional.relative_residual},
+               {"rcond_min", nullptr},
+               {"row_share", nullptr},
+               {"hidden_share", nullptr},
+               {"residual_rms", nullptr}});
+}
+
+// How the iterations of a solver ended; a direct solver has none.
+struct Iterations {
+  int count = 0;
+  bool converged = false;
+  double relative_residual = 0;
+};
+std::optional<Iterations> IterationsOf(const EstimateOutcome& outcome) {
+  const auto of = [](const auto& summary) {
+    return Iterations{summary.iterations, summary.converged, summary.relative_residual};
+  };
+  if (outcome.scene) return of(*outcome.scene);
+  if (outcome.functional) return of(*outcome.functional);
+  return std::nullopt;
+}
+
 double HoleShare(const PreparedEstimate& prepared) {
   return static_cast<double>(prepared.depth.holes) /
          static_cast<double>(prepared.input.disparity.disparity.size());
@@ -114,6 +149,10 @@ std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
         summary["blocks"].get<int>(), summary["block_px"].get<int>(),
         summary["block_solver"].get<std::string>(), summary["stencil"].get<std::string>(),
         summary["gamma"].get<double>(), summary["ridge"].get<double>());
+  }
+  if (outcome.functional) {
+    return fmt::format("solver       {}: {}\n", summary["solver"].get<std::string>(),
+                       outcome.functional->message);
   }
   const estimator::SceneSummary& scene = *outcome.scene;
   return fmt::format("solver       scene: {}\n", scene.message) +
@@ -128,10 +167,10 @@ std::string AccuracyText(const EstimateOutcome& outcome) {
     return fmt::format("accuracy     relative residual {:.1e}, smallest rcond {:.1e}\n",
                        outcome.blocks->relative_residual, outcome.blocks->rcond_min);
   }
-  const estimator::SceneSummary& scene = *outcome.scene;
+  const Iterations iterations = IterationsOf(outcome).value_or(Iterations());
   return fmt::format("accuracy     relative residual {:.1e} after {} iterations{}\n",
-                     scene.relative_residual, scene.iterations,
-                     scene.converged ? "" : ", not converged");
+                     iterations.relative_residual, iterations.count,
+                     iterations.converged ? "" : ", not converged");
 }
 
 std::string DepthText(const PreparedEstimate& prepared) {
@@ -179,11 +218,12 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
         "edges",
         options.depth_path, *outcome.depth_noise_px, estimator::kLargestDepthNoisePx));
   }
-  if (outcome.scene && !outcome.scene->converged) {
+  const auto iterations = IterationsOf(outcome);
+  if (iterations && !iterations->converged) {
     warnings.push_back(fmt::format(
         "not converged: the relative residual is {:.1e} after {} iterations; allow more "
         "(--max-iterations), or ask for less (--tolerance)",
-        outcome.scene->relative_residual, outcome.scene->iterations));
+        iterations->relative_residual, iterations->count));
   }
   if (!outcome.patches.empty()) {
     const estimator::ResidualPatch& worst = outcome.patches.front();
@@ -236,6 +276,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
   }
   if (outcome.scene) AddScene(options, outcome, &out);
   if (outcome.blocks) AddBlocks(outcome, &out);
+  if (outcome.functional) AddFunctional(*outcome.functional, &out);
   return out;
 }
 

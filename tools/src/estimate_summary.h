@@ -10,6 +10,7 @@
 #include "estimate_options.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/estimate_checks.h"
+#include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field.h"
 
@@ -23,12 +24,13 @@ struct EstimateSeconds {
   double total = 0;  // until the light field was written, a page not included
 };
 
-// What came out of a run. One of `scene` and `blocks` is there.
+// What came out of a run. One of `scene`, `blocks` and `functional` is there.
 struct EstimateOutcome {
   model::LightField light_field;
   std::optional<estimator::SceneSummary> scene;
   estimator::SceneMaps maps;  // of `scene`
   std::optional<estimator::EstimateSummary> blocks;
+  std::optional<estimator::FunctionalSummary> functional;  // `grid`, too
   EstimateSeconds seconds;
   double clipped_fraction = 0;  // of the values, by the views' files
 

@@ -325,6 +325,10 @@ auto NamingTheFolder(const std::string& folder, const Work& work) {
 void RequireValid(const model::LightField& light_field) {
   std::string why;
   if (!light_field.IsValid(&why)) throw Error("light field: " + why);
+  if (light_field.channels != 1 && light_field.channels != 3) {
+    throw Error(fmt::format("light field: channels is {}: files of views hold 1 (grey) or 3 (RGB)",
+                            light_field.channels));
+  }
 }
 
 // Calls write(k, l, picture) for every view that there is, on several threads.

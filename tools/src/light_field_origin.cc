@@ -10,7 +10,8 @@ namespace thicklens::tools {
 
 bool IsEstimated(const LightFieldPageInput& input) {
   const std::string& method = input.light_field->origin.method;
-  return input.estimate || method == "scene" || method == "blocks";
+  return input.estimate || method == "scene" || method == "blocks" || method == "functional" ||
+         method == "grid";
 }
 
 std::string Times(int a, int b) { return fmt::format("{}\u00A0×\u00A0{}", a, b); }
@@ -67,14 +68,18 @@ std::string Seconds(const EstimateRecord& record) {
   return text;
 }
 
-// Blocks have one prior, which their ridge tells.
+// All solvers but that of the scene have one prior, which their ridge mu tells.
+bool RidgeTellsPrior(const EstimateRecord& record) {
+  return record.ridge && record.prior == "ridge";
+}
+
 std::string PriorInWords(const EstimateRecord& record) {
-  if (!record.block_solver.empty()) return "";
+  if (RidgeTellsPrior(record)) return "";
   return record.prior == "tv" ? "total variation" : record.prior;
 }
 
 std::string StrengthInWords(const EstimateRecord& record) {
-  if (!record.strength || !record.block_solver.empty()) return "";
+  if (!record.strength || RidgeTellsPrior(record)) return "";
   return fmt::format(
       "{:.3g}{}", *record.strength,
       record.strength_rule.empty() ? "" : fmt::format(" ({})", record.strength_rule));

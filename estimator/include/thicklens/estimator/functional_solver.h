@@ -13,9 +13,10 @@ struct FunctionalOptions {
   double gamma = 1;             // > 0
   std::optional<double> ridge;  // mu, > 0; default 1e-2/(U V)
   double tolerance = 1e-3;      // relative residual at which conjugate gradients stop, > 0, < 1
-  int max_iterations = 200;     // for each channel, >= 1
-  bool falloff = true;          // the irradiance of (12), where there is a camera
-  int threads = 0;              // 0: one per core
+  int max_iterations = 1000;    // for each channel, >= 1
+  bool double_precision = false;
+  bool falloff = true;                     // the irradiance of (12), where there is a camera
+  int threads = 0;                         // 0: one per core
   std::optional<double> memory_limit_mib;  // for the whole process
   // Called from any thread, one at a time, for each view and each iteration. May throw to stop.
   std::function<void(int done, int total)> progress;
@@ -47,7 +48,8 @@ struct FunctionalSummary {
 // to the unevenness of H, at most 1 + 1/(U V mu), whatever the blur:
 //   (Id + H A^-1 H^T) y = I - H R0,   R = R0 + A^-1 H^T y,
 // derived here, by conjugate gradients. As gamma grows R(p, .) becomes even: that is EstimateScene
-// with a ridge of U V mu and no weights of pixels. Each view then shows the R(., k) by its depth.
+// with a ridge of U V mu, a linear H and no weights of pixels. Each view shows the R(., k) by its
+// depth.
 // Throws Error for options and inputs that do not fit and a memory limit that is too low. The
 // result does not depend on the number of threads.
 model::LightField EstimateFunctional(const EstimateInput& input, const FunctionalOptions& options,

@@ -16,7 +16,8 @@ namespace thicklens::model {
 
 // Where a light field came from. Fields that do not apply are empty.
 struct LightFieldOrigin {
-  std::string method;  // "scene", "blocks", "simulated", "imported", "dibr"
+  // "scene", "blocks", "functional", "grid", "simulated", "imported", "dibr"
+  std::string method;
   std::string block_solver, stencil, splat, device;
   std::optional<int> block_px;
   std::optional<double> gamma, ridge;
@@ -39,7 +40,7 @@ struct LightFieldOrigin {
 // per view step, and there is no camera and no irradiance fall-off.
 struct LightField {
   int s_count = 0, t_count = 0, u_count = 0, v_count = 0;
-  int channels = 0;  // 1 (grey) or 3 (RGB)
+  int channels = 0;  // 1 (grey), 3 (RGB), or any number of bands
   // Radiance, 1 at full scale; may leave [0, 1]. One plane a channel and view:
   // ((channel * V + l) * U + k) * T * S + j * S + i.
   std::vector<float> values;

@@ -1,0 +1,61 @@
+#ifndef THICKLENS_ESTIMATOR_SRC_GRID_PHOTOGRAPH_H_
+#define THICKLENS_ESTIMATOR_SRC_GRID_PHOTOGRAPH_H_
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "thicklens/kernels/kernels.h"
+
+namespace thicklens::estimator {
+
+// The samples of a view that land nearest to a pixel of the picture, as pixels: sample
+// (x - s_shift, y - t_shift).
+struct LandingRect {
+  int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
+};
+LandingRect LandingIn(const kernels::BlockGeometry& picture, int k, int l);
+
+// H on the grid, for a whole picture: from the rays of a light field of one channel, views
+// (l * u_count + k) * t_count * s_count + t * s_count + s, to the photograph,
+//   (H L)(x) = sum over rays of E w g L / sum over rays of w g,
+// w the weight of the view, g the share of the pixel in the ray (bilinear), E the irradiance; the
+// numbers of kernels::Kernels::WeighRays. Rays that land outside of the picture take no part.
+template <typename Real>
+class GridPhotograph {
+ public:
+  // `irradiance`: of each view's samples; empty: 1. The block is the whole picture.
+  GridPhotograph(const kernels::BlockGeometry& picture, std::vector<std::vector<float>> irradiance,
+                 int threads);
+
+  std::size_t pixels() const { return inverse_sums_.size(); }
+
+  // photograph = H L.
+  void Apply(const Real* rays, Real* photograph) const;
+  // L += H^T photograph.
+  void AddTransposed(const Real* photograph, Real* rays) const;
+
+  double bytes() const;
+
+ private:
+  // A pixel gets `share` of the ray nearest to the pixel that is `offset` beside it.
+  struct Tap {
+    int offset = 0;
+    double share = 0;  // 0: nothing
+  };
+  static std::array<Tap, 2> TapsOf(double fraction);
+  // Calls visit(weight, x, count, sample): `count` pixels of the row y from x on get weight times
+  // the samples of the view from `sample` on.
+  template <typename Visit>
+  void ForRow(int k, int l, const Tap& in_y, int y, const Visit& visit) const;
+  const float* IrradianceFrom(int view, std::size_t sample) const;
+
+  kernels::BlockGeometry picture_;
+  std::vector<std::vector<float>> irradiance_;
+  int threads_;
+  std::vector<Real> inverse_sums_;  // 1/(sum of w g) of each pixel, 0 where that is 0
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SRC_GRID_PHOTOGRAPH_H_

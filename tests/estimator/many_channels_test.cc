@@ -1,0 +1,144 @@
+// Pictures of other bands than one or three: every solver takes each band as it takes a grey
+// picture.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "stored_slope.h"
+#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/grid_solver.h"
+#include "thicklens/estimator/scene_solver.h"
+#include "thicklens/kernels/device.h"
+#include "thicklens/model/light_field_grid.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr int kWidth = 26, kHeight = 21;
+
+// A slant with a near patch.
+EstimateInput InputOf(int channels) {
+  EstimateInput input;
+  input.picture = {kWidth, kHeight, channels, {}};
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<float> uniform(0.1F, 0.9F);
+  for (int i = 0; i < kWidth * kHeight * channels; ++i) {
+    input.picture.values.push_back(uniform(engine));
+  }
+  input.disparity = {kWidth, kHeight, {}, {1, 1}};
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    const int x = i % kWidth, y = i / kWidth;
+    const bool patch = x > 9 && x < 17 && y > 6 && y < 15;
+    input.disparity.disparity.push_back(patch ? 1.4F : 0.04F * static_cast<float>(x) - 0.7F);
+  }
+  input.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
+  return input;
+}
+
+model::LinearPicture Band(const model::LinearPicture& picture, int channel) {
+  model::LinearPicture band{picture.width_px, picture.height_px, 1, {}};
+  for (int y = 0; y < picture.height_px; ++y) {
+    for (int x = 0; x < picture.width_px; ++x) band.values.push_back(picture.at(x, y, channel));
+  }
+  return band;
+}
+
+using Estimator = std::function<model::LightField(const EstimateInput& input)>;
+
+void ExpectBandByBand(const Estimator& estimate, double accuracy) {
+  for (const int channels : {2, 4, 5}) {
+    const EstimateInput input = InputOf(channels);
+    const model::LightField all = estimate(input);
+    ASSERT_EQ(all.channels, channels);
+    for (int channel = 0; channel < channels; ++channel) {
+      EstimateInput grey = input;
+      grey.picture = Band(input.picture, channel);
+      const model::LightField one = estimate(grey);
+      const float* found = all.values.data() + all.ViewStart(channel, 0, 0);
+      for (std::size_t i = 0; i < one.values.size(); ++i) {
+        ASSERT_NEAR(found[i], one.values[i], accuracy) << channels << " channels, " << channel;
+      }
+    }
+  }
+}
+
+TEST(ManyChannels, ByBlocks) {
+  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
+  ExpectBandByBand(
+      [&](const EstimateInput& input) {
+        EstimateSummary summary;
+        return EstimateByBlocks(input, {}, backend.get(), &summary);
+      },
+      0);
+}
+
+TEST(ManyChannels, OfTheFunctional) {
+  for (const auto estimate : {EstimateFunctional, EstimateOnGrid}) {
+    ExpectBandByBand(
+        [&](const EstimateInput& input) {
+          FunctionalSummary summary;
+          return estimate(input, {}, &summary);
+        },
+        0);
+  }
+}
+
+TEST(ManyChannels, WarpedByTheDepth) {
+  ExpectBandByBand([](const EstimateInput& input) { return WarpedLightField(input, true, 2); }, 0);
+}
+
+// With equal weights of all pixels, and a prior that does not tie the bands together.
+TEST(ManyChannels, OfTheScene) {
+  ExpectBandByBand(
+      [](const EstimateInput& input) {
+        SceneOptions options;
+        options.prior = Prior::kRidge;
+        options.strength_rule = StrengthRule::kGiven;
+        options.strength = 0.05;
+        options.slope_weights = false;
+        options.double_precision = true;
+        options.tolerance = 1e-9;
+        options.max_iterations = 2000;
+        SceneSummary summary;
+        return EstimateScene(input, options, &summary, nullptr);
+      },
+      1e-6);
+}
+
+TEST(ManyChannels, OfTheSceneWithItsDefaults) {
+  const EstimateInput input = InputOf(6);
+  SceneSummary summary;
+  SceneMaps maps;
+  const model::LightField found = EstimateScene(input, {}, &summary, &maps);
+  std::string why;
+  EXPECT_TRUE(found.IsValid(&why)) << why;
+  EXPECT_EQ(found.channels, 6);
+  EXPECT_EQ(maps.residual.size(), static_cast<std::size_t>(kWidth * kHeight));
+  EXPECT_TRUE(std::all_of(found.values.begin(), found.values.end(),
+                          [](float value) { return std::isfinite(value); }));
+}
+
+TEST(ManyChannels, TheSlopeIsTheirMeans) {
+  const model::LinearPicture bands = InputOf(4).picture;
+  model::LinearPicture mean{kWidth, kHeight, 1, {}};
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      mean.values.push_back(
+          (bands.at(x, y, 0) + bands.at(x, y, 1) + bands.at(x, y, 2) + bands.at(x, y, 3)) / 4);
+    }
+  }
+  const model::TransferCurve srgb = model::TransferCurve::Srgb();
+  const std::vector<double> found = StoredSlopes(bands, srgb, 1);
+  const std::vector<double> expected = StoredSlopes(mean, srgb, 1);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], expected[i], 1e-5);
+}
+
+}  // namespace
+}  // namespace thicklens::estimator
