@@ -55,25 +55,10 @@ const FanView::Hidden& HiddenAt(const FanView& view, std::size_t i) {
       [](const FanView::Hidden& h, std::size_t at) { return Index(h.index) < at; });
 }
 
-void AddRay(const DisparityMap& map, double tolerance, Between between, double x, double y,
-            float disparity, double weight, Gatherer* gatherer) {
-  if (between == Between::kCubic) {
-    if (const auto cubic = CubicTapsAt(map, tolerance, x, y, disparity)) {
-      for (std::size_t t = 0; t < cubic->pixel.size(); ++t) {
-        if (cubic->weight[t] != 0) gatherer->Add(cubic->pixel[t], weight * cubic->weight[t]);
-      }
-      return;
-    }
-  }
-  const SurfaceTaps taps = TapsAt(map, tolerance, x, y, disparity);
-  for (int t = 0; t < taps.count; ++t)
-    gatherer->Add(taps.pixel[Index(t)], weight * taps.weight[Index(t)]);
-}
-
 template <typename Real>
 void FillBand(const ViewFan& fan, const DisparityMap& map,
-              const std::vector<unsigned char>& is_product, Between between, int first_row,
-              int last_row, Band<Real>* band) {
+              const std::vector<unsigned char>& is_product, int first_row, int last_row,
+              Band<Real>* band) {
   const double tolerance = SurfaceTolerance(map);
   Gatherer gatherer(map.disparity.size());
   for (int y = first_row; y < last_row; ++y) {
@@ -90,8 +75,10 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
           source_y = hidden.source_y;
           disparity = hidden.disparity;
         }
-        AddRay(map, tolerance, between, x + static_cast<double>(source_x),
-               y + static_cast<double>(source_y), disparity, view.weight, &gatherer);
+        const SurfaceTaps taps = TapsAt(map, tolerance, x + static_cast<double>(source_x),
+                                        y + static_cast<double>(source_y), disparity);
+        for (int t = 0; t < taps.count; ++t)
+          gatherer.Add(taps.pixel[Index(t)], view.weight * taps.weight[Index(t)]);
       }
       const std::size_t before = band->index.size();
       gatherer.MoveTo(&band->index, &band->weight);
@@ -105,13 +92,12 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
 
 template <typename Real>
 kernels::PixelRows<Real> RowsOf(const ViewFan& fan, const DisparityMap& disparity,
-                                const std::vector<unsigned char>& is_product, Between between,
-                                int threads) {
+                                const std::vector<unsigned char>& is_product, int threads) {
   constexpr int kBandRows = 32;
   const int bands = (fan.height_px + kBandRows - 1) / kBandRows;
   std::vector<Band<Real>> parts(Index(bands));
   model::ParallelFor(bands, threads, [&](int n) {
-    FillBand(fan, disparity, is_product, between, n * kBandRows,
+    FillBand(fan, disparity, is_product, n * kBandRows,
              std::min((n + 1) * kBandRows, fan.height_px), &parts[Index(n)]);
   });
   kernels::PixelRows<Real> rows;
@@ -137,8 +123,8 @@ kernels::PixelRows<Real> RowsOf(const ViewFan& fan, const DisparityMap& disparit
 }
 
 template kernels::PixelRows<float> RowsOf(const ViewFan&, const DisparityMap&,
-                                          const std::vector<unsigned char>&, Between, int);
+                                          const std::vector<unsigned char>&, int);
 template kernels::PixelRows<double> RowsOf(const ViewFan&, const DisparityMap&,
-                                           const std::vector<unsigned char>&, Between, int);
+                                           const std::vector<unsigned char>&, int);
 
 }  // namespace thicklens::estimator

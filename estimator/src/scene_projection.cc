@@ -139,7 +139,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                                  product.down, options.between, options.threads)});
     }
   }
-  projection.rows = RowsOf<Real>(fan, disparity, is_product, options.between, options.threads);
+  projection.rows = RowsOf<Real>(fan, disparity, is_product, options.threads);
   projection.rows_transposed = kernels::Transposed(projection.rows);
   return projection;
 }

@@ -15,12 +15,12 @@ namespace thicklens::estimator {
 // H of a scene whose points look the same from everywhere: from the radiance r of the points that
 // the centre view shows to the photograph, each pixel a mean of what the views see through it:
 //   (H r)(x) = sum_k w_k r(x + s_k(x)), s_k the way from the view's sample to its source
-// (ViewDisparity), bicubic where all taps of the source lie on its surface, else by those bilinear
-// ones that do. Rows sum to 1.
+// (ViewDisparity), by the bilinear taps of the source that lie on its surface. Rows sum to 1.
 // A pixel whose fan meets one surface only is computed by filters down and across the picture,
 // which take the fan for a product of its axes (weights that are no product are a sum of such, by
-// singular values); a pixel where that would misplace a ray by more than a tolerance has a row of
-// its own. Beside an edge a product may be linear along one axis, where a row would be cubic.
+// singular values), and which may read bicubic, as views are shown; a pixel where that would
+// misplace a ray by more than a tolerance has a row of its own, where taps cost more and are lost
+// in what the edge beside it does.
 // Derived here.
 // Pictures: `channels` planes of width * height numbers.
 template <typename Real>
@@ -54,8 +54,8 @@ class SceneProjection {
 };
 
 struct ProjectionOptions {
-  double tolerance_px = 0.2;  // of a ray's place, where the fan is taken for a product
-  Between between = Between::kCubic;
+  double tolerance_px = 0.2;          // of a ray's place, where the fan is taken for a product
+  Between between = Between::kCubic;  // of the products; rows are linear
   int threads = 1;
   std::function<void()> progress;  // called now and then, from any thread; may throw to stop
 };

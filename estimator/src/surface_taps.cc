@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "catmull_rom.h"
-
 namespace thicklens::estimator {
 
 double SurfaceTolerance(const DisparityMap& map) {
@@ -46,24 +44,6 @@ SurfaceTaps TapsAt(const DisparityMap& map, double tolerance, double x, double y
     return taps;
   }
   for (int t = 0; t < taps.count; ++t) taps.weight[static_cast<std::size_t>(t)] /= sum;
-  return taps;
-}
-
-std::optional<CubicTaps> CubicTapsAt(const DisparityMap& map, double tolerance, double x, double y,
-                                     float disparity) {
-  const int x0 = static_cast<int>(std::floor(x)) - 1, y0 = static_cast<int>(std::floor(y)) - 1;
-  if (x0 < 0 || y0 < 0 || x0 + 3 >= map.width_px || y0 + 3 >= map.height_px) return std::nullopt;
-  const std::array<double, 4> across = CatmullRomWeights(x - (x0 + 1));
-  const std::array<double, 4> down = CatmullRomWeights(y - (y0 + 1));
-  CubicTaps taps;
-  for (std::size_t n = 0; n < taps.pixel.size(); ++n) {
-    const std::size_t i = n % 4, j = n / 4;
-    taps.pixel[n] = (static_cast<std::size_t>(y0) + j) * static_cast<std::size_t>(map.width_px) +
-                    static_cast<std::size_t>(x0) + i;
-    const double difference = static_cast<double>(map.disparity[taps.pixel[n]]) - disparity;
-    if (!(std::abs(difference) <= tolerance)) return std::nullopt;
-    taps.weight[n] = across[i] * down[j];
-  }
   return taps;
 }
 

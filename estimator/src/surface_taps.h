@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <optional>
 
 #include "thicklens/estimator/view_geometry.h"
 
@@ -22,16 +21,6 @@ struct SurfaceTaps {
 // Bilinear at (x, y), cut to the picture, of the pixels whose disparity agrees; where none does,
 // the one closest to it.
 SurfaceTaps TapsAt(const DisparityMap& map, double tolerance, double x, double y, float disparity);
-
-// The picture between its pixels where these are smooth: 16 of them and their weights, sum 1.
-struct CubicTaps {
-  std::array<std::size_t, 16> pixel{};
-  std::array<double, 16> weight{};
-};
-// Bicubic (catmull_rom.h) at (x, y), if all 16 pixels are in the picture and their disparities
-// agree.
-std::optional<CubicTaps> CubicTapsAt(const DisparityMap& map, double tolerance, double x, double y,
-                                     float disparity);
 
 }  // namespace thicklens::estimator
 

@@ -65,11 +65,10 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
                                     const DisparityMap& disparity, const Eigen::VectorXd& weights,
                                     Between between, int threads);
 
-// The rows of the pixels that are no product. kCubic asks for 16 pixels of a ray's surface.
+// The rows of the pixels that are no product, linear between the pixels of a ray's surface.
 template <typename Real>
 kernels::PixelRows<Real> RowsOf(const ViewFan& fan, const DisparityMap& disparity,
-                                const std::vector<unsigned char>& is_product, Between between,
-                                int threads);
+                                const std::vector<unsigned char>& is_product, int threads);
 
 }  // namespace thicklens::estimator
 

@@ -41,7 +41,8 @@ struct SceneOptions {
   // Compare stored values, as the eye and the metrics do. Off: the mean slope s everywhere.
   bool slope_weights = true;
   bool hidden_weights = true;  // trust pixels less that show what the centre view does not
-  // Bicubic between the pixels of a surface. Off: linear, as in EstimateFunctional.
+  // Bicubic between the pixels of a surface, far from its edges. Off: linear, as in
+  // EstimateFunctional.
   bool cubic = true;
   bool falloff = true;                     // the irradiance of (12), where there is a camera
   int threads = 0;                         // 0: one per core
