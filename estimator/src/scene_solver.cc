@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <mutex>
 #include <numeric>
 #include <utility>
 
 #include "coarse_start.h"
 #include "estimate_input.h"
+#include "iteration_progress.h"
 #include "ray_landing.h"
 #include "run_cost.h"
 #include "scene_data.h"
@@ -52,32 +52,8 @@ double CoarseStrength(Prior prior, double strength) {
   return strength / 2;
 }
 
-// For the progress only.
-constexpr int kUsualIterations = 60;
-
-// Iterations and views, counted together. Of iterations there may be more or fewer than expected.
-class Progress {
- public:
-  Progress(const std::function<void(int, int)>& report, int iterations, int views)
-      : report_(report), iterations_(iterations), total_(iterations + views) {}
-
-  void Tell() { Report(0); }
-  void CountIteration() { Report(done_ < iterations_ ? 1 : 0); }
-  void EndIterations() { Report(iterations_ - done_); }
-  void CountView() { Report(1); }
-
- private:
-  void Report(int steps) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    done_ += steps;
-    if (report_) report_(done_, total_);
-  }
-
-  const std::function<void(int, int)>& report_;
-  const int iterations_, total_;
-  std::mutex mutex_;
-  int done_ = 0;  // only one thread iterates
-};
+// For the progress only: of iterations there may be more or fewer.
+int UsualIterations(const SceneOptions& options) { return std::min(options.max_iterations, 60); }
 
 // The most that the process is expected to hold: the light field; H; the vectors of the solver.
 double VectorBytes(const EstimateInput& input, bool double_precision) {
@@ -101,7 +77,7 @@ void CheckMemory(const SceneOptions& options, double bytes) {
 
 // All views of one radiance.
 model::LightField ShowInAllViews(const EstimateInput& input, const model::LinearPicture& radiance,
-                                 int threads, Progress* progress) {
+                                 int threads, IterationProgress* progress) {
   model::LightField light_field = model::MakeLightField(
       radiance.width_px, radiance.height_px, static_cast<int>(input.weights.cols()),
       static_cast<int>(input.weights.rows()), radiance.channels);
@@ -116,7 +92,7 @@ model::LightField ShowInAllViews(const EstimateInput& input, const model::Linear
     const ViewDisparity shown =
         RenderDisparity(input.disparity, light_field.u_offset(k), light_field.v_offset(l));
     model::SetView(&light_field, k, l, WarpPicture(radiance, input.disparity, shown));
-    progress->CountView();
+    progress->Count();
   });
   return light_field;
 }
@@ -126,7 +102,7 @@ template <typename Real>
 class RadianceEstimate {
  public:
   RadianceEstimate(const EstimateInput& input, const SceneOptions& options,
-                   kernels::Backend* backend, SceneSummary* summary, Progress* progress)
+                   kernels::Backend* backend, SceneSummary* summary, IterationProgress* progress)
       : input_(input),
         options_(options),
         backend_(backend),
@@ -181,10 +157,11 @@ class RadianceEstimate {
   model::LinearPicture Solve() {
     SceneSystem<Real> system(data_, backend_);
     std::vector<Real> radiance = Planar<Real>(start_);
+    start_ = {};
     RadianceLimits limits;
     limits.tolerance = options_.tolerance_or_usual();
     limits.max_iterations = options_.max_iterations;
-    limits.on_iteration = [this] { progress_->CountIteration(); };
+    limits.on_iteration = [this] { progress_->CountUpTo(UsualIterations(options_)); };
     summary_->strength = options_.strength;
     if (options_.strength_rule != StrengthRule::kGiven) {
       summary_->strength = StrengthForNoise(
@@ -234,7 +211,7 @@ class RadianceEstimate {
     summary.threads = summary_->threads;
     summary.noise_sigma = StoredNoiseSigma(half.picture, half.transfer).value_or(kUsualNoise / 2);
     const std::function<void(int, int)> tell = [this](int, int) { progress_->Tell(); };
-    Progress progress(tell, 1, 0);
+    IterationProgress progress(tell, UsualIterations(options));
     RadianceEstimate coarse(half, options, backend_, &summary, &progress);
     coarse.Prepare(half.picture);
     return WithDetail(picture, half.picture, coarse.Solve());
@@ -257,7 +234,7 @@ class RadianceEstimate {
   const SceneOptions& options_;
   kernels::Backend* backend_;
   SceneSummary* summary_;
-  Progress* progress_;
+  IterationProgress* progress_;
   DisparityMap disparity_;
   SceneProjection<Real> projection_;
   DataTerm<Real> data_;
@@ -305,8 +282,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
       ResidentBytes() + LightFieldBytes(input) + VectorBytes(input, options.double_precision);
   CheckMemory(options, fixed_bytes);
   const auto views = static_cast<int>(input.weights.size());
-  const int iterations = std::min(options.max_iterations, kUsualIterations);
-  Progress progress(options.progress, iterations, views);
+  IterationProgress progress(options.progress, UsualIterations(options) + views);
 
   const std::optional<double> noise = StoredNoiseSigma(input.picture, input.transfer);
   summary->noise_sigma = noise.value_or(kUsualNoise);
@@ -323,7 +299,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   const auto solve_start = Clock::now();
   model::LinearPicture radiance = estimate.Solve();
   summary->solve_seconds = SecondsSince(solve_start) + estimate.coarse_seconds();
-  progress.EndIterations();
+  progress.SkipTo(UsualIterations(options));
 
   const auto views_start = Clock::now();
   model::LightField light_field = ShowInAllViews(input, radiance, summary->threads, &progress);

@@ -135,12 +135,6 @@ Gathered PlainGather(const DisparityMap& map, const Eigen::ArrayXXd& weights,
   return gathered;
 }
 
-double LargestDifference(const std::vector<double>& a, const std::vector<double>& b) {
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-  return largest;
-}
-
 // What interpolation makes of a wave, `shift` beside the origin.
 std::complex<double> Transfer(double shift, double frequency, Between between) {
   std::complex<double> sum = 0;
@@ -204,25 +198,26 @@ TEST_P(SceneProjectionBetween, EqualsTheRaysOneByOne) {
       const Eigen::ArrayXXd weights = Weights(shape, u, v);
       const Gathered linear = PlainGather(map, weights, x, Between::kLinear);
       const Gathered cubic = PlainGather(map, weights, x, Between::kCubic);
+      // Compares where the rays say what is right, and says at how many pixels that is.
+      const auto compare = [&](const SceneProjection<double>& projection, double tolerance) {
+        std::vector<bool> is_linear(x.size(), between == Between::kLinear);
+        for (const std::int32_t pixel : projection.rows.pixel) is_linear[Index(pixel)] = true;
+        std::vector<double> y(x.size());
+        projection.Apply(x.data(), 1, y.data());
+        int compared = 0;
+        for (std::size_t i = 0; i < y.size(); ++i) {
+          if (!is_linear[i] && !cubic.is_cubic[i]) continue;
+          ++compared;
+          EXPECT_NEAR(y[i], is_linear[i] ? linear.picture[i] : cubic.picture[i], tolerance)
+              << u << "x" << v << " at " << i;
+        }
+        return compared;
+      };
       const auto strict = Make<double>(map, weights, 1e-9, 2, between);
-      std::vector<bool> has_row(x.size(), false);
-      for (const std::int32_t pixel : strict.rows.pixel) has_row[Index(pixel)] = true;
-      std::vector<double> y(x.size());
-      strict.Apply(x.data(), 1, y.data());
-      int exact = 0;
-      for (std::size_t i = 0; i < y.size(); ++i) {
-        const bool is_linear = has_row[i] || between == Between::kLinear;
-        if (!is_linear && !cubic.is_cubic[i]) continue;
-        ++exact;
-        ASSERT_NEAR(y[i], is_linear ? linear.picture[i] : cubic.picture[i], 1e-6)
-            << u << "x" << v << " at " << i;
-      }
-      EXPECT_GT(exact, 0.85 * static_cast<double>(y.size()));
+      EXPECT_GT(compare(strict, 1e-6), 0.85 * static_cast<double>(x.size()));
       const auto usual = Make<double>(map, weights, 0.2, 2, between);
       EXPECT_LE(usual.row_share(), strict.row_share());
-      usual.Apply(x.data(), 1, y.data());
-      EXPECT_LT(LargestDifference(y, linear.picture), between == Between::kCubic ? 0.5 : 0.15)
-          << u << "x" << v;
+      compare(usual, 0.1);
     }
   }
 }
