@@ -6,8 +6,12 @@ function(thicklens_compile_settings target)
     ${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
                       $<$<BOOL:${THICKLENS_WARNINGS_AS_ERRORS}>:-Werror>)
   if(THICKLENS_SANITIZE)
-    target_compile_options(${target} PUBLIC -fsanitize=${THICKLENS_SANITIZE}
-                                            -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    # Without the checks of each pointer for what the address sanitizer or the processor tells of an
+    # access anyway: they take a quarter of the time of compiling.
+    target_compile_options(
+      ${target}
+      PUBLIC -fsanitize=${THICKLENS_SANITIZE} -fno-sanitize=null,alignment,object-size
+             -fno-sanitize-recover=all -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${THICKLENS_SANITIZE})
     # Under a sanitizer Eigen would align memory by itself, but the Eigen inside of Debian's Ceres
     # does not: the linker takes one's malloc and the other's free.
