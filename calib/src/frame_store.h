@@ -15,7 +15,7 @@ namespace thicklens::calib {
 // that memory does not grow with the sweep. Thread safe; results do not depend on what is kept.
 class FrameStore {
  public:
-  static constexpr std::size_t kDefaultLimit = std::size_t{256} << 20;  // bytes
+  static constexpr std::size_t kDefaultLimit = std::size_t{128} << 20;  // bytes
 
   // `sweep` must outlive the store.
   explicit FrameStore(const FocusSweep& sweep, std::size_t byte_limit = kDefaultLimit);

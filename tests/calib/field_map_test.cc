@@ -91,6 +91,22 @@ TEST(FieldMap, SlowATiltIsMeasuredInDegrees) {
   EXPECT_THAT(c.warnings, Contains(HasSubstr("tilted")));
 }
 
+TEST(FieldMap, SlowALongSweepIsMappedFromAPartOfItsFrames) {
+  model::SweepSimulationOptions options = SweepCase("iii", 192, 3);
+  options.target.kind = model::TargetKind::kWhiteNoise;
+  options.step_mm *= static_cast<double>(options.frame_count) / 150;
+  options.frame_count = 150;
+  SimulatedSweep s = Simulate(options);
+  GiveFloor(&s);
+  const Calibration c = Calibrate(s.sweep, {});
+  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
+  EXPECT_NEAR(c.field.tilt_right_deg->value, 0, 4 * c.field.tilt_right_deg->sigma);
+  for (const FieldTile& tile : c.field.tiles) {
+    ASSERT_TRUE(tile.done) << tile.message;
+    EXPECT_NEAR(tile.focus_depth_mm.value, s.truth.focus_depth_mm, 1);
+  }
+}
+
 TEST(FieldMap, DepthsOfATargetInStepsAreParted) {
   constexpr double kStepMm = 12;
   const SimulatedSweep s = InStrips(2, [](double x_px) { return x_px < 0 ? 0.0 : kStepMm; });
