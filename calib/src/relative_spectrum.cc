@@ -200,8 +200,11 @@ class Fit {
     Eigen::MatrixXd damped = normal;
     damped.diagonal() *= 1 + damping;
     damped.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();
-    const Eigen::LLT<Eigen::MatrixXd> factor(damped);
+    const Eigen::VectorXd diagonal = damped.diagonal();
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(damped);  // in place
     if (factor.info() == Eigen::Success) return factor.solve(gradient);
+    damped = normal;
+    damped.diagonal() = diagonal;
     return damped.ldlt().solve(gradient);  // indefinite by rounding alone
   }
 
@@ -219,7 +222,7 @@ class Fit {
   }
 
   // Of (ln g, V) of every frame: sum over modes of |T|^2 |M|^2/N d d^T within a frame, minus the
-  // projection on T.
+  // projection on T. The lower triangle alone.
   Eigen::MatrixXd AmplitudeNormal(const Evaluation& e, Eigen::VectorXd* gradient) const {
     const Eigen::Index size = 2 * (n() - 1);
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
@@ -247,7 +250,7 @@ class Fit {
       ++row;
     }
     normal.selfadjointView<Eigen::Lower>().rankUpdate(projection, -1);
-    return normal.selfadjointView<Eigen::Lower>();
+    return normal;
   }
 
   // d M/dt = -2 pi i nu M. The frames' shifts hang together through T only weakly: a step of their
@@ -296,7 +299,7 @@ class Fit {
   bool Finish() {
     const Eigen::Index size = 2 * (n() - 1);
     Eigen::VectorXd gradient;
-    const Eigen::MatrixXd normal = AmplitudeNormal(Evaluate(state_), &gradient);
+    Eigen::MatrixXd normal = AmplitudeNormal(Evaluate(state_), &gradient);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     // The gains first: what is left of the factor for the variances is that of their own normal
     // matrix with the gains eliminated.
@@ -304,17 +307,26 @@ class Fit {
     for (const Eigen::Index first : {0, 1}) {
       for (Eigen::Index k = first; k < size; k += 2) order.push_back(k);
     }
-    Eigen::MatrixXd scaled = (scale.asDiagonal() * normal * scale.asDiagonal())(order, order);
+    Eigen::MatrixXd scaled(size, size);  // its lower triangle
+    for (Eigen::Index b = 0; b < size; ++b) {
+      for (Eigen::Index a = b; a < size; ++a) {
+        const auto [low, high] =
+            std::minmax(order[static_cast<std::size_t>(a)], order[static_cast<std::size_t>(b)]);
+        scaled(a, b) = scale[low] * scale[high] * normal(high, low);
+      }
+    }
+    normal.resize(0, 0);  // matrices of this size are what a long sweep's memory goes to
     scaled.diagonal().array() += 1e-12;
-    const Eigen::LLT<Eigen::MatrixXd> factor(scaled);
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(scaled);  // in place
     if (factor.info() != Eigen::Success) {
       result_.message = "the spectra do not tell the blur of every frame";
       return false;
     }
     Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(size / 2, size / 2);
-    Eigen::MatrixXd(factor.matrixLLT().bottomRightCorner(size / 2, size / 2))
+    scaled.bottomRightCorner(size / 2, size / 2)
         .triangularView<Eigen::Lower>()
         .solveInPlace(inverse_root);
+    scaled.resize(0, 0);
     for (Eigen::Index k = 0; k < size / 2; ++k) inverse_root.col(k) *= scale[2 * k + 1];
     const Eigen::MatrixXd inverse = inverse_root.transpose() * inverse_root;
     std::vector<Eigen::Index> rows;
