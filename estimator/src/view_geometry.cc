@@ -25,41 +25,6 @@ void CheckCount(const char* what, int width_px, int height_px, int channels, std
   }
 }
 
-// The farthest of the nearest known pixels to the left, right, above and below each pixel. NaN
-// where there is none.
-class FarthestNeighbours {
- public:
-  explicit FarthestNeighbours(const DisparityMap& map)
-      : map_(map), farthest_(map.disparity.size(), kHole) {
-    for (int y = 0; y < map.height_px; ++y) Sweep(IndexOf(0, y), 1, map.width_px);
-    for (int x = 0; x < map.width_px; ++x) Sweep(IndexOf(x, 0), map.width_px, map.height_px);
-  }
-
-  float at(std::size_t i) const { return farthest_[i]; }
-
- private:
-  std::ptrdiff_t IndexOf(int x, int y) const {
-    return static_cast<std::ptrdiff_t>(y) * map_.width_px + x;
-  }
-
-  // Along a row or a column, there and back.
-  void Sweep(std::ptrdiff_t start, std::ptrdiff_t stride, int count) {
-    float known = kHole;
-    for (int n = 0; n < count; ++n) Pass(start + n * stride, &known);
-    known = kHole;
-    for (int n = count - 1; n >= 0; --n) Pass(start + n * stride, &known);
-  }
-
-  void Pass(std::ptrdiff_t index, float* known) {
-    const auto i = static_cast<std::size_t>(index);
-    farthest_[i] = std::fmin(farthest_[i], *known);  // fmin: a NaN gives way
-    if (!std::isnan(map_.disparity[i])) *known = map_.disparity[i];
-  }
-
-  const DisparityMap& map_;
-  std::vector<float> farthest_;
-};
-
 }  // namespace
 
 // disparity * step = -m, m = (1 - d0/(z - zl)) du/ds of model::SlopeOnGrid, and the same in v. The
@@ -115,32 +80,6 @@ DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, doubl
                     map.integer ? " (0 in an integer map, or not finite)" : " (not finite)"));
   }
   return disparity;
-}
-
-DisparityMap FillHoles(const DisparityMap& map, std::size_t* filled) {
-  CheckCount("disparity map", map.width_px, map.height_px, 1, map.disparity.size());
-  DisparityMap full = map;
-  std::size_t holes = 0;
-  for (const float value : map.disparity) holes += std::isnan(value) ? 1 : 0;
-  if (filled != nullptr) *filled = holes;
-  if (holes == map.disparity.size()) {
-    throw Error(
-        fmt::format("disparity map: all of its {} values are holes: there is nothing to "
-                    "fill them from",
-                    holes));
-  }
-  // One known pixel fills its row and its column in the first round, and so all in the second.
-  const auto has_holes = [&full] {
-    return std::any_of(full.disparity.begin(), full.disparity.end(),
-                       [](float value) { return std::isnan(value); });
-  };
-  while (has_holes()) {
-    const FarthestNeighbours neighbours(full);
-    for (std::size_t i = 0; i < full.disparity.size(); ++i) {
-      if (std::isnan(full.disparity[i])) full.disparity[i] = neighbours.at(i);
-    }
-  }
-  return full;
 }
 
 }  // namespace thicklens::estimator

@@ -131,6 +131,32 @@ TEST(SceneSolver, BeatsWarpingOnASimulatedScene) {
   EXPECT_GT(best, dibr + 3);
 }
 
+// A sensor's shadow to the right of the card and speckle, a twentieth of the picture.
+TEST(SceneSolver, LosesLittleByHolesInTheDepth) {
+  EstimateInput input = SimulatedScene().input;
+  const DisparityMap truth = input.disparity;
+  std::mt19937 engine(9);
+  std::bernoulli_distribution is_speckle(0.03);
+  for (int y = 0; y < truth.height_px; ++y) {
+    for (int x = 0; x < truth.width_px; ++x) {
+      const bool is_shadow = std::hypot(x - 35, y - 40) > 18 && std::hypot(x - 40, y - 40) < 18;
+      if (!is_speckle(engine) && !is_shadow) continue;
+      input.disparity.disparity[Index(y * truth.width_px + x)] =
+          std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+  std::size_t filled = 0;
+  input.disparity = FillHoles(input.disparity, input.picture, &filled);
+  EXPECT_GT(filled, truth.disparity.size() / 20);
+  SceneSummary summary;
+  const auto psnr = [&] {
+    return MeanPsnr(SimulatedScene().truth, EstimateScene(input, {}, &summary, nullptr));
+  };
+  const double with_holes = psnr();
+  input.disparity = truth;
+  EXPECT_GT(with_holes, psnr() - 0.3);
+}
+
 // A machine on which tests run has an OpenCL device: none is a failure here.
 kernels::Backend* OpenClBackend() {
   static const std::shared_ptr<kernels::Backend> backend = [] {

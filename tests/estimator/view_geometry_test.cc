@@ -155,57 +155,6 @@ TEST(DisparityFromMap, RefusesWhatIsNoMap) {
   EXPECT_THAT(ErrorOf([] { DisparityFromMap({1, 1, {1}, false}, 1, kNan); }), HasSubstr("offset"));
 }
 
-// --- Holes.
-
-TEST(FillHoles, TakesTheFarthestOfTheFourNearest) {
-  std::mt19937 engine(3);
-  std::uniform_real_distribution<double> uniform(-2, 2);
-  std::bernoulli_distribution is_hole(0.4);
-  const int width = 13;
-  const int height = 9;
-  const DisparityMap map = MapOf(width, height, [&](int, int) {
-    const double disparity = uniform(engine);
-    return is_hole(engine) ? std::nan("") : disparity;
-  });
-  std::size_t filled = 0;
-  const DisparityMap full = FillHoles(map, &filled);
-  std::size_t holes = 0;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      if (!std::isnan(map.disparity[At(x, y, width)])) {
-        EXPECT_EQ(full.disparity[At(x, y, width)], map.disparity[At(x, y, width)]);
-        continue;
-      }
-      ++holes;
-      float farthest = kInfinity;
-      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-        for (int n = 1;; ++n) {
-          const int xx = x + n * dx;
-          const int yy = y + n * dy;
-          if (xx < 0 || yy < 0 || xx >= width || yy >= height) break;
-          const float there = map.disparity[At(xx, yy, width)];
-          if (std::isnan(there)) continue;
-          farthest = std::min(farthest, there);
-          break;
-        }
-      }
-      EXPECT_EQ(full.disparity[At(x, y, width)], farthest) << x << ", " << y;
-    }
-  }
-  EXPECT_GT(holes, 30U);
-  EXPECT_EQ(filled, holes);
-}
-
-TEST(FillHoles, ReachesPixelsWithNothingKnownInTheirRowOrColumn) {
-  DisparityMap map = MapOf(7, 5, [](int, int) { return std::nan(""); });
-  map.disparity[At(2, 1, 7)] = 0.75F;
-  std::size_t filled = 0;
-  for (const float value : FillHoles(map, &filled).disparity) EXPECT_EQ(value, 0.75F);
-  EXPECT_EQ(filled, 34U);
-  map.disparity[At(2, 1, 7)] = kNan;
-  EXPECT_THAT(ErrorOf([&] { FillHoles(map, nullptr); }), HasSubstr("holes"));
-}
-
 // --- Views of known geometry.
 
 TEST(RenderDisparity, GivesTheMapItselfWhereNothingMoves) {

@@ -342,7 +342,8 @@ TEST_F(EstimateSceneTest, HolesAreToldWithTheirShare) {
   const json summary =
       Summary({Picture(), depth, "--depth-kind", "disparity", "--views", "3x3"}, &result);
   EXPECT_EQ(summary["holes_filled"], 320);
-  EXPECT_THAT(result.out, HasSubstr("320 px, filled from the farthest neighbour (5.2 %)"));
+  EXPECT_NEAR(summary["holes_share"].get<double>(), 0.052, 5e-4);
+  EXPECT_THAT(result.out, HasSubstr("320 px, filled along the surfaces around them (5.2 %)"));
 }
 
 TEST_F(EstimateSceneTest, TheReportShowsEachFigureOnce) {

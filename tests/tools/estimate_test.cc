@@ -262,7 +262,7 @@ TEST_F(EstimateTest, HolesAreFilledAndCounted) {
   });
   const ProgramResult result = Run(With(AsDisparity(Picture(), depth), {"--json", json}));
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("15 px, filled from the farthest neighbour (1.5 %)"));
+  EXPECT_THAT(result.out, HasSubstr("15 px, filled along the surfaces around them (1.5 %)"));
   EXPECT_EQ(nlohmann::json::parse(ContentOf(json))["holes_filled"], 15);
 }
 

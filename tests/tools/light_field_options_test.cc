@@ -55,6 +55,11 @@ model::RawDepthMap MapOf(std::vector<float> values) {
   return {kWidth, kHeight, std::move(values), false};
 }
 
+// Tells nothing about surfaces.
+model::LinearPicture GreyPicture(int width_px = kWidth) {
+  return {width_px, kHeight, 1, std::vector<float>(static_cast<std::size_t>(width_px * kHeight))};
+}
+
 DepthOptions KindAndUnit(const std::string& kind, const std::string& unit) {
   DepthOptions options;
   options.kind = kind;
@@ -124,9 +129,9 @@ TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
   DepthOptions options = KindAndUnit("disparity", "");
   options.disparity_scale = 2;
   options.disparity_offset_px = -1;
-  // The hole's neighbours: 1 to the left, 3 to the right, -2 below; the farthest is the smallest.
+  // Around the hole 1 and 0 on the left, 3, -2 and .25 elsewhere: each a surface of its own.
   const PreparedDepth prepared = PrepareDepth(MapOf({1, kNan, 3, 0, -2, 0.25F}), "d.pfm", options,
-                                              kWidth, kHeight, nullptr, nullptr);
+                                              GreyPicture(), nullptr, nullptr);
   EXPECT_THAT(prepared.disparity.disparity, ElementsAre(1, -5, 5, -1, -5, -0.5F));
   EXPECT_EQ(prepared.disparity.step, Eigen::Vector2d(1, 1));
   EXPECT_EQ(prepared.holes, 1U);
@@ -136,7 +141,7 @@ TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
 TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
   EXPECT_THAT(UsageErrorOf([] {
                 PrepareDepth(MapOf(std::vector<float>(6, 500)), "d.pfm", KindAndUnit("z", "mm"),
-                             kWidth, kHeight, nullptr, nullptr);
+                             GreyPicture(), nullptr, nullptr);
               }),
               AllOf(HasSubstr("--camera"), HasSubstr("disparity")));
 }
@@ -148,7 +153,8 @@ TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
   for (const model::Camera* used : {static_cast<const model::Camera*>(nullptr), &camera}) {
     const auto message = [&](const model::RawDepthMap& map, int width_px) {
       return ErrorOf([&] {
-        PrepareDepth(map, "d.pfm", KindAndUnit("disparity", ""), width_px, kHeight, used, &grid);
+        PrepareDepth(map, "d.pfm", KindAndUnit("disparity", ""), GreyPicture(width_px), used,
+                     &grid);
       });
     };
     EXPECT_THAT(message(holes, kWidth), AllOf(StartsWith("d.pfm: "), HasSubstr("hole")));
@@ -163,7 +169,7 @@ TEST(PrepareDepth, DepthsNearerThanTheUvPlaneAreRefused) {
   const model::LightFieldGrid grid = model::GridOnPlanes(camera, {100, 1000}, 3, 3);
   EXPECT_THAT(ErrorOf([&] {
                 PrepareDepth(MapOf({500, 500, 500, 500, 500, 90}), "d.pfm", KindAndUnit("z", "mm"),
-                             kWidth, kHeight, &camera, &grid);
+                             GreyPicture(), &camera, &grid);
               }),
               StartsWith("d.pfm: "));
 }
@@ -172,8 +178,8 @@ TEST(PrepareDepth, WithACameraADepthBecomesItsDisparity) {
   const model::Camera camera = SmallCamera();
   const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
   const std::vector<float> depth_mm = {400, 800, 1200, 400, 0, 5000};
-  const PreparedDepth prepared = PrepareDepth(MapOf(depth_mm), "d.pfm", KindAndUnit("z", "mm"),
-                                              kWidth, kHeight, &camera, &grid);
+  const PreparedDepth prepared =
+      PrepareDepth(MapOf(depth_mm), "d.pfm", KindAndUnit("z", "mm"), GreyPicture(), &camera, &grid);
   EXPECT_EQ(prepared.holes, 1U);
   ASSERT_TRUE(prepared.depth);
   EXPECT_EQ(prepared.depth->min_mm, 400);
@@ -193,9 +199,8 @@ TEST(PrepareDepth, WithACameraADisparityIsPerViewStepOfItsGrid) {
   const std::vector<float> disparity_px = {-0.5F, 0, 0.5F, 0.25F, 0.125F, -0.25F};
   for (const auto& [u_count, v_count] : {std::pair{3, 3}, std::pair{1, 5}}) {
     const model::LightFieldGrid grid = model::DefaultGrid(camera, u_count, v_count);
-    const PreparedDepth prepared =
-        PrepareDepth(MapOf(disparity_px), "d.pfm", KindAndUnit("disparity", ""), kWidth, kHeight,
-                     &camera, &grid);
+    const PreparedDepth prepared = PrepareDepth(
+        MapOf(disparity_px), "d.pfm", KindAndUnit("disparity", ""), GreyPicture(), &camera, &grid);
     const Eigen::Vector2d step = prepared.disparity.step;
     for (std::size_t i = 0; i < disparity_px.size(); ++i) {
       const double found_px = prepared.disparity.disparity[i] * (u_count > 1 ? step.x() : step.y());
@@ -215,7 +220,7 @@ TEST(PrepareDepth, TheStepOfADisparityIsTakenOnTheAperture) {
       static_cast<float>(model::DisparityPx(camera, aperture_step_mm, depth_mm));
   const PreparedDepth prepared =
       PrepareDepth(MapOf(std::vector<float>(6, disparity_px)), "d.pfm",
-                   KindAndUnit("disparity", ""), kWidth, kHeight, &camera, &grid);
+                   KindAndUnit("disparity", ""), GreyPicture(), &camera, &grid);
   EXPECT_NEAR(prepared.disparity.disparity[0] * prepared.disparity.step.x(),
               -model::SlopeOnGrid(grid, depth_mm), 1e-4);
 }

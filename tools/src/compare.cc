@@ -172,11 +172,11 @@ std::optional<estimator::DibrInput> ReadDibr(const CompareOptions& options, cons
   model::RawDepthMap map = ReadDepthMap(map_path);
   if (IsToCrop(crop, map.width_px, map.height_px))
     map = NamingTheFile(map_path, [&] { return model::CropDepth(map, *crop); });
-  PreparedDepth prepared = PrepareDepth(map, map_path, depth, reference.s_count, reference.t_count,
+  PreparedDepth prepared = PrepareDepth(map, map_path, depth, dibr.photograph,
                                         reference.camera ? &*reference.camera : nullptr,
                                         reference.grid ? &*reference.grid : nullptr);
   if (prepared.holes > 0)
-    spdlog::warn("{}: {} holes are filled from the background beside them", PrintableUtf8(map_path),
+    spdlog::warn("{}: {} holes are filled along the surfaces beside them", PrintableUtf8(map_path),
                  prepared.holes);
   dibr.disparity = std::move(prepared.disparity);
   return dibr;

@@ -163,9 +163,9 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   input.weights = ViewWeights(options, input.camera);
   CheckViewCounts(input.weights);
   if (input.camera) input.grid = GridFor(options, *input.camera, input.weights);
-  prepared.depth = PrepareDepth(map, options.depth_path, options.depth, input.picture.width_px,
-                                input.picture.height_px, input.camera ? &*input.camera : nullptr,
-                                input.grid ? &*input.grid : nullptr);
+  prepared.depth =
+      PrepareDepth(map, options.depth_path, options.depth, input.picture,
+                   input.camera ? &*input.camera : nullptr, input.grid ? &*input.grid : nullptr);
   input.disparity = std::move(prepared.depth.disparity);
   if (prepared.depth.depth && options.depth.kind != "disparity") {
     TellUnlikelyDepth(options, *input.camera, *prepared.depth.depth);

@@ -183,7 +183,7 @@ std::string DepthText(const PreparedEstimate& prepared) {
   const auto [least_px, most_px] = DisparityRangePx(prepared.input.disparity);
   text += fmt::format("disparity    {:.3f} .. {:.3f} px per view step\n", least_px, most_px);
   if (prepared.depth.holes > 0) {
-    text += fmt::format("holes        {} px, filled from the farthest neighbour ({:.1f} %)\n",
+    text += fmt::format("holes        {} px, filled along the surfaces around them ({:.1f} %)\n",
                         prepared.depth.holes, 100 * HoleShare(prepared));
   }
   return text;
@@ -260,6 +260,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
               {"peak_rss_mib", PeakResidentMib()},
               {"effects", light_field.origin.effects},
               {"holes_filled", prepared.depth.holes},
+              {"holes_share", HoleShare(prepared)},
               {"clipped_fraction", outcome.clipped_fraction},
               {"disparity",
                {{"min_px", least_px},

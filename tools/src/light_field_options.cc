@@ -22,16 +22,18 @@ double ApertureStepMm(const model::LightFieldGrid& grid) {
   return std::abs(step.x() != 0 ? step.x() : step.y());
 }
 
-estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map, PreparedDepth* prepared) {
+estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
+                                     const model::LinearPicture& picture, PreparedDepth* prepared) {
   for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
-  return estimator::FillHoles(map, &prepared->holes);
+  return estimator::FillHoles(map, picture, &prepared->holes);
 }
 
-void RequireSize(const model::RawDepthMap& map, const std::string& map_name, int width_px,
-                 int height_px) {
-  if (map.width_px == width_px && map.height_px == height_px) return;
+void RequireSize(const model::RawDepthMap& map, const std::string& map_name,
+                 const model::LinearPicture& picture) {
+  if (map.width_px == picture.width_px && map.height_px == picture.height_px) return;
   throw Error(fmt::format("{}: it is {}x{} px, the picture {}x{} px: the sizes must be equal",
-                          map_name, map.width_px, map.height_px, width_px, height_px));
+                          map_name, map.width_px, map.height_px, picture.width_px,
+                          picture.height_px));
 }
 
 // Where the name of the map is not told by who found the fault.
@@ -45,20 +47,21 @@ auto NamingTheMap(const std::string& map_name, const Work& work) {
 }
 
 PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& map_name,
-                              model::DepthConvention convention, const model::Camera& camera,
+                              model::DepthConvention convention,
+                              const model::LinearPicture& picture, const model::Camera& camera,
                               const model::LightFieldGrid& grid) {
   if (convention.kind == model::DepthKind::kDisparity)
     convention.aperture_step_mm = ApertureStepMm(grid);
   // Of the picture, only its size counts here.
-  model::LinearPicture picture{map.width_px, map.height_px, 1, {}};
-  picture.values.assign(map.values.size(), 0.0F);
-  const model::Scene scene =
-      model::MakeScene(camera, std::move(picture), map, convention, map_name);
+  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  empty.values.assign(map.values.size(), 0.0F);
+  const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, map_name);
   PreparedDepth prepared;
   prepared.depth = scene.depth;
   prepared.disparity = NamingTheMap(map_name, [&] {
     return WithoutHoles(
-        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), &prepared);
+        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), picture,
+        &prepared);
   });
   return prepared;
 }
@@ -213,11 +216,11 @@ void AddDeviceOption(CLI::App* command, std::string* text) {
 }
 
 PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
-                           const DepthOptions& options, int width_px, int height_px,
+                           const DepthOptions& options, const model::LinearPicture& picture,
                            const model::Camera* camera, const model::LightFieldGrid* grid) {
   const model::DepthConvention convention = ConventionOf(options);
-  RequireSize(map, map_name, width_px, height_px);
-  if (camera != nullptr) return PrepareByCamera(map, map_name, convention, *camera, *grid);
+  RequireSize(map, map_name, picture);
+  if (camera != nullptr) return PrepareByCamera(map, map_name, convention, picture, *camera, *grid);
   if (convention.kind != model::DepthKind::kDisparity) {
     throw UsageError(fmt::format(
         "--depth-kind {}: millimetres need a camera (--camera CAMERA.yaml); without one the map "
@@ -228,7 +231,7 @@ PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map
   prepared.disparity = NamingTheMap(map_name, [&] {
     return WithoutHoles(estimator::DisparityFromMap(map, convention.disparity_scale,
                                                     convention.disparity_offset_px),
-                        &prepared);
+                        picture, &prepared);
   });
   return prepared;
 }

@@ -70,7 +70,7 @@ struct PreparedDepth {
 // Without a camera the map must be a disparity (UsageError else). With one, `grid` is its light
 // field's and the map is checked by model::MakeScene. Sizes must be the picture's. Throws Error.
 PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
-                           const DepthOptions& options, int width_px, int height_px,
+                           const DepthOptions& options, const model::LinearPicture& picture,
                            const model::Camera* camera, const model::LightFieldGrid* grid);
 
 }  // namespace thicklens::tools

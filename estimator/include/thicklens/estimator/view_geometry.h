@@ -32,10 +32,16 @@ DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vecto
 // 0 in an integer map. Throws Error if all are holes.
 DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, double offset_px);
 
-// Holes filled from the nearest known pixels to the left, right, above and below: of these the
-// farthest (smallest disparity), since a hole beside an edge belongs to what is behind. `filled`
-// (may be null) is told how many.
-DisparityMap FillHoles(const DisparityMap& map, std::size_t* filled);
+// Holes (NaN) filled along the surfaces around them, never between two. Each pixel goes with one of
+// the known pixels around the hole, that to which the shortest way leads without crossing edges of
+// the picture; where the picture does not tell, with the farther surface, since depth sensors are
+// blind beside near things. Inside of one surface the plane through it, fitted with its noise in
+// mind, is bent to meet all its rims; neighbours belong to two surfaces where their disparities
+// differ by more than six times the map's noise, at least .2, at most 1 px per view step. `picture`
+// shows what the map is the depth of. `filled` (may be null) is told how many. Throws Error if all
+// are holes or the sizes differ.
+DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
+                       std::size_t* filled);
 
 enum class Seen : std::uint8_t {
   kSeen,    // a point of the centre view
