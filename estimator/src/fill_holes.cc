@@ -17,8 +17,8 @@
 namespace thicklens::estimator {
 namespace {
 
-// Neighbours whose disparities differ by more belong to two surfaces: so many times the noise of the
-// map, within these, px per view step.
+// Neighbours whose disparities differ by more belong to two surfaces: so many times the noise of
+// the map, within these, px per view step.
 constexpr double kJumpOfNoise = 6;
 constexpr double kLeastJumpPx = 0.2;
 constexpr double kMostJumpPx = 1;
@@ -188,9 +188,8 @@ DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& pict
                        std::size_t* filled) {
   CheckSizes(map, picture);
   DisparityMap full = map;
-  const auto holes = static_cast<std::size_t>(
-      std::count_if(map.disparity.begin(), map.disparity.end(),
-                    [](float value) { return std::isnan(value); }));
+  const auto holes = static_cast<std::size_t>(std::count_if(
+      map.disparity.begin(), map.disparity.end(), [](float value) { return std::isnan(value); }));
   if (filled != nullptr) *filled = holes;
   if (holes == map.disparity.size()) {
     throw Error(

@@ -36,8 +36,6 @@ HoleFinder::HoleFinder(const DisparityMap& map, double jump)
       place_(map.disparity.size(), kNoPlace),
       seen_(map.disparity.size(), 0) {}
 
-bool HoleFinder::IsHole(int index) const { return std::isnan(map_.disparity[Index(index)]); }
-
 int HoleFinder::DistancePx(int index) const {
   return static_cast<int>(distance_px_.at<float>(Y(index), X(index)));
 }
@@ -161,10 +159,9 @@ void HoleFinder::CollectSurface(std::size_t group, int depth_px) {
 }
 
 void HoleFinder::FitPlanes(HoleRegion* region) {
-  const bool is_open = std::any_of(
-      region->pixels.begin(), region->pixels.end(), [this](int pixel) {
-        return X(pixel) == 0 || X(pixel) == width_ - 1 || Y(pixel) == 0 || Y(pixel) == height_ - 1;
-      });
+  const bool is_open = std::any_of(region->pixels.begin(), region->pixels.end(), [this](int pixel) {
+    return X(pixel) == 0 || X(pixel) == width_ - 1 || Y(pixel) == 0 || Y(pixel) == height_ - 1;
+  });
   const bool rim_is_enough = !is_open && region->planes.size() == 1;
   const int depth_px =
       rim_is_enough ? 0 : std::clamp(region->widest_px, kLeastDepthPx, kMostDepthPx);

@@ -2,6 +2,7 @@
 #define THICKLENS_ESTIMATOR_SRC_HOLE_REGION_H_
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -38,7 +39,9 @@ class HoleFinder {
   // False where there is no other.
   bool Next(HoleRegion* region);
 
-  bool IsHole(int index) const;
+  bool IsHole(int index) const {
+    return std::isnan(map_.disparity[static_cast<std::size_t>(index)]);
+  }
   // Calls visit(neighbour, dx, dy) for the 4, or all 8, neighbours inside the picture.
   template <int kCount, typename Visit>
   void ForNeighbours(int index, const Visit& visit) const {

@@ -56,8 +56,8 @@ void HoleTerritories::Find(const HoleRegion& region, std::vector<int>* rim_of,
   }
 }
 
-// Dijkstra's shortest ways from all of the rim at once; pixels wait in buckets of nearly equal cost,
-// and again where a shorter way is found.
+// Dijkstra's shortest ways from all of the rim at once; pixels wait in buckets of nearly equal
+// cost, and again where a shorter way is found.
 void HoleTerritories::Spread(const HoleRegion& region, const std::vector<int>& levels,
                              std::vector<int>* rim_of) {
   cost_.assign(region.pixels.size(), std::numeric_limits<float>::infinity());
@@ -68,8 +68,8 @@ void HoleTerritories::Spread(const HoleRegion& region, const std::vector<int>& l
     const std::size_t place = Index(finder_.PlaceOf(pixel));
     const int level = levels[Index(region.rim[Index(rim)].group)];
     const int wider_px = level == 0 ? 0 : std::max(0, width_px_[place] - from_width_px);
-    const float there = cost + StepCost(from, pixel, dx != 0 && dy != 0) +
-                        static_cast<float>(level * wider_px);
+    const float there =
+        cost + StepCost(from, pixel, dx != 0 && dy != 0) + static_cast<float>(level * wider_px);
     if (!(there < cost_[place])) return;
     cost_[place] = there;
     (*rim_of)[place] = rim;
@@ -104,14 +104,13 @@ void HoleTerritories::Start(const HoleRegion& region, const std::vector<int>& ri
                             std::vector<double>* start) const {
   start->resize(region.pixels.size());
   for (std::size_t i = 0; i < region.pixels.size(); ++i) {
-    (*start)[i] =
-        SurfaceAt(finder_, region, region.rim[Index(rim_of[i])], region.pixels[i], jump_);
+    (*start)[i] = SurfaceAt(finder_, region, region.rim[Index(rim_of[i])], region.pixels[i], jump_);
   }
 }
 
-// 1 for a group that meets a farther one, now or before, and one more than the groups that it meets behind it.
-std::vector<int> HoleTerritories::LevelsOf(const HoleRegion& region,
-                                           const std::vector<int>& rim_of,
+// 1 for a group that meets a farther one, now or before, and one more than the groups that it meets
+// behind it.
+std::vector<int> HoleTerritories::LevelsOf(const HoleRegion& region, const std::vector<int>& rim_of,
                                            const std::vector<double>& start) {
   const auto meet = [&](int group, double disparity, int other, double other_disparity) {
     if (group == other || group < 0 || other < 0) return;

@@ -43,7 +43,7 @@ class HoleTerritories {
   std::vector<std::vector<Waiting>> waiting_;  // by their cost
   std::vector<float> cost_;
   std::vector<std::pair<int, int>> near_and_far_;  // groups that meet
-  std::vector<int> width_px_;  // of the hole around each pixel
+  std::vector<int> width_px_;                      // of the hole around each pixel
 };
 
 // What the surface of a rim pixel says at another pixel: its plane, if that explains its rim to

@@ -217,9 +217,8 @@ TEST(FillHoles, TakesTheFarSurfaceWhereThePictureTellsNothing) {
   for (const int half_width : {1, 4, 15}) {
     Case step{80, 60, [](int x, int y) { return Step(x, y, kEdge); },
               [&](int x, int) { return std::abs(x - kEdge) <= half_width; }};
-    const Sides sides = SidesOf(step, step.Filled(), [&](int x, int y) {
-      return Step(x, y, kEdge - half_width);
-    });
+    const Sides sides =
+        SidesOf(step, step.Filled(), [&](int x, int y) { return Step(x, y, kEdge - half_width); });
     EXPECT_EQ(sides.between, 0) << half_width;
     EXPECT_EQ(sides.wrong, 0) << half_width;
   }
@@ -227,11 +226,11 @@ TEST(FillHoles, TakesTheFarSurfaceWhereThePictureTellsNothing) {
 
 // Speckle of the near surface that hangs together with the shadow beside it stays near.
 TEST(FillHoles, KeepsSpeckleOnItsSurfaceBesideAShadow) {
-  Case step{80, 60, [](int x, int y) { return Step(x, y, kEdge); }, [](int x, int y) {
+  Case step{80, 60, [](int x, int y) { return Step(x, y, kEdge); },
+            [](int x, int y) {
               return (x >= kEdge && x < kEdge + 20) || (x < kEdge && x >= 20 && y % 4 == 2);
             }};
-  const Sides sides =
-      SidesOf(step, step.Filled(), [](int x, int y) { return Step(x, y, kEdge); });
+  const Sides sides = SidesOf(step, step.Filled(), [](int x, int y) { return Step(x, y, kEdge); });
   EXPECT_EQ(sides.between, 0);
   EXPECT_EQ(sides.wrong, 0);
 }
@@ -243,10 +242,12 @@ TEST(FillHoles, KeepsAPoleAndIgnoresALoneValue) {
   const Surface truth = [&](int x, int y) { return is_pole(x) ? Near(x, y) : Far(x, y); };
   Case pole{80, 60, truth, [](int, int y) { return y >= 20 && y < 38; }};
   pole.light = [&](int x, int) { return is_pole(x) ? 0.5 : 0.2; };
-  DisparityMap map = pole.Map();
-  map.disparity[pole.At(60, 19)] = 9;
-  const Sides sides = SidesOf(pole, FillHoles(map, pole.Picture(), nullptr), truth);
-  EXPECT_EQ(sides.wrong, 1);  // the value itself
+  for (const float wrong : {9.0F, -9.0F}) {
+    DisparityMap map = pole.Map();
+    map.disparity[pole.At(60, 19)] = wrong;
+    const Sides sides = SidesOf(pole, FillHoles(map, pole.Picture(), nullptr), truth);
+    EXPECT_EQ(sides.wrong, 1);  // the value itself
+  }
 }
 
 // --- Hard cases.
