@@ -3,8 +3,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "catmull_rom.h"
+#include "product_row.h"
 #include "surface_taps.h"
 #include "thicklens/model/parallel.h"
 #include "view_fan.h"
@@ -31,78 +33,36 @@ struct CellRange {
   }
 };
 
-// Compares one view's rays of one row of pixels with the product's.
-class RowCheck {
- public:
-  RowCheck(const FanAxes& axes, const DisparityMap& map, const CellRange& range,
-           double tolerance_px)
-      : axes_(axes),
-        range_(range),
-        width_px_(map.width_px),
-        height_px_(map.height_px),
-        tolerance_px_(static_cast<float>(tolerance_px)),
-        same_surface_(static_cast<float>(SurfaceTolerance(map))) {}
-
-  bool IsRight(int x, int y, float source_x, float source_y, float disparity, int u, int v) const {
-    const std::size_t here = Index(y) * Index(width_px_) + Index(x);
-    if (axes_.down.usable[here] == 0) return false;
-    const float down = axes_.down.source_px[Index(v)][here];
-    if (!(std::abs(down - source_y) <= tolerance_px_)) return false;
-    const float at_y = static_cast<float>(y) + down;
-    const float row = std::floor(at_y);
-    const int y0 = static_cast<int>(row);
-    const int y1 = at_y > row ? y0 + 1 : y0;
-    if (y0 < 0 || y1 >= height_px_) return false;
-    const std::vector<float>& across = axes_.across.source_px[Index(u)];
-    for (int at = y0; at <= y1; ++at) {
-      const std::size_t there = Index(at) * Index(width_px_) + Index(x);
-      if (axes_.across.usable[there] == 0) return false;
-      const float way = across[there];
-      if (!(std::abs(way - source_x) <= tolerance_px_)) return false;
-      const float at_x = static_cast<float>(x) + way;
-      const float column = std::floor(at_x);
-      const int x0 = static_cast<int>(column);
-      const int x1 = at_x > column ? x0 + 1 : x0;
-      if (x0 < 0 || x1 >= width_px_) return false;
-      if (at > y0) continue;
-      const std::size_t cell = Index(y0) * Index(width_px_) + Index(x0);
-      if (!(disparity - range_.low[cell] <= same_surface_) ||
-          !(range_.high[cell] - disparity <= same_surface_))
-        return false;
-    }
-    return true;
-  }
-
- private:
-  const FanAxes& axes_;
-  const CellRange& range_;
-  int width_px_, height_px_;
-  float tolerance_px_, same_surface_;
-};
-
 }  // namespace
 
 std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
                                      const DisparityMap& disparity, double tolerance_px,
                                      int threads) {
   const CellRange range(disparity);
-  const RowCheck check(axes, disparity, range, tolerance_px);
-  std::vector<unsigned char> is_product(disparity.disparity.size(), 1);
+  std::vector<unsigned char> is_product(disparity.disparity.size());
   model::ParallelFor(fan.height_px, threads, [&](int y) {
-    const std::size_t row = Index(y) * Index(fan.width_px);
+    const std::size_t begin = Index(y) * Index(fan.width_px);
+    ProductRow row;
+    row.y = y;
+    row.width_px = fan.width_px;
+    row.height_px = fan.height_px;
+    row.tolerance_px = static_cast<float>(tolerance_px);
+    row.lowest = range.low.data();
+    row.highest = range.high.data();
+    row.same_surface = static_cast<float>(SurfaceTolerance(disparity));
+    std::vector<std::int32_t> all(Index(fan.width_px), 1);
     for (const FanView& view : fan.views) {
-      const int u = static_cast<int>(std::lround(view.a + (axes.across.count - 1) / 2.0));
-      const int v = static_cast<int>(std::lround(view.b + (axes.down.count - 1) / 2.0));
-      const auto shift_x = static_cast<float>(view.shift.x());
-      const auto shift_y = static_cast<float>(view.shift.y());
-      for (int x = 0; x < fan.width_px; ++x) {
-        const std::size_t i = row + Index(x);
-        const float d = view.disparity[i];  // NaN fails
-        if (is_product[i] != 0 && !check.IsRight(x, y, shift_x * d, shift_y * d, d, u, v)) {
-          is_product[i] = 0;
-        }
-      }
+      const auto u = static_cast<std::size_t>(std::lround(view.a + (axes.across.count - 1) / 2.0));
+      const auto v = static_cast<std::size_t>(std::lround(view.b + (axes.down.count - 1) / 2.0));
+      row.disparity = view.disparity.data() + begin;
+      row.shift_x = static_cast<float>(view.shift.x());
+      row.shift_y = static_cast<float>(view.shift.y());
+      row.down = axes.down.source_px[v].data() + begin;
+      row.across = axes.across.source_px[u].data();
+      CheckProducts(row, all.data());
     }
+    for (std::size_t x = 0; x < all.size(); ++x)
+      is_product[begin + x] = static_cast<unsigned char>(all[x]);
   });
   return is_product;
 }

@@ -115,6 +115,11 @@ FanAxes AxesOf(const ViewFan& fan, const DisparityMap& disparity, int u_count, i
         if (std::isnan(way[i])) axis->usable[i] = 0;
       }
     }
+    for (std::vector<float>& way : axis->source_px) {
+      for (std::size_t i = 0; i < way.size(); ++i) {
+        if (axis->usable[i] == 0) way[i] = kNone;
+      }
+    }
   }
   return axes;
 }

@@ -34,7 +34,8 @@ ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights,
                   const std::function<void()>& progress);
 
 // Where the rays of a column or a row of the aperture come from, if the fan is a product: px to the
-// source, along one axis, for each of `count` positions on it. NaN: not on the pixel's surface.
+// source, along one axis, for each of `count` positions on it. NaN, at all positions: at one of
+// them it is not on the pixel's surface.
 struct FanAxis {
   int count = 0;
   std::vector<std::vector<float>> source_px;  // [position][pixel]
