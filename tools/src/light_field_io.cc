@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -24,6 +25,7 @@
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "thicklens/model/parallel.h"
+#include "tiff_encoder.h"
 
 namespace thicklens::tools {
 
@@ -50,6 +52,8 @@ struct ViewSource {
   // The view (k, l) of the frame in linear light; called from several threads.
   std::function<model::LinearPicture(int k, int l)> read;
 };
+
+std::string NameOf(ViewFormat format) { return format == ViewFormat::kPng ? "png" : "tiff"; }
 
 // "view (3, 0): " in front of what went wrong with it.
 Error ViewError(int k, int l, const std::string& what) {
@@ -92,18 +96,6 @@ model::LinearPicture ReadTiffView(const std::string& path) {
                         row + static_cast<std::ptrdiff_t>(picture.cols) * picture.channels());
   }
   return light;
-}
-
-// Without compression: the noise of floats hardly gets smaller.
-std::string EncodeTiff(const model::LinearPicture& picture) {
-  cv::Mat values(picture.height_px, picture.width_px, CV_32FC(picture.channels));
-  std::copy(picture.values.begin(), picture.values.end(), values.ptr<float>());
-  SwapRedAndBlue(&values);
-  constexpr int kNoCompression = 1;
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".tiff", values, bytes, {cv::IMWRITE_TIFF_COMPRESSION, kNoCompression}))
-    throw Error("a view could not be encoded as TIFF");
-  return {bytes.begin(), bytes.end()};
 }
 
 std::string Listed(const std::vector<std::string>& names) {
@@ -322,13 +314,18 @@ auto NamingTheFolder(const std::string& folder, const Work& work) {
   }
 }
 
+// Throws Error unless files can hold such views.
+void RequireStorable(int channels) {
+  if (channels != 1 && channels != 3) {
+    throw Error(fmt::format("light field: channels is {}: files of views hold 1 (grey) or 3 (RGB)",
+                            channels));
+  }
+}
+
 void RequireValid(const model::LightField& light_field) {
   std::string why;
   if (!light_field.IsValid(&why)) throw Error("light field: " + why);
-  if (light_field.channels != 1 && light_field.channels != 3) {
-    throw Error(fmt::format("light field: channels is {}: files of views hold 1 (grey) or 3 (RGB)",
-                            light_field.channels));
-  }
+  RequireStorable(light_field.channels);
 }
 
 // Calls write(k, l, picture) for every view that there is, on several threads.
@@ -427,29 +424,57 @@ std::vector<std::string> LightFieldEntries() {
   return entries;
 }
 
-std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
-                            model::OutputFolder* folder) {
-  RequireValid(light_field);
-  model::LightFieldDescription description;
-  description.view_format = format == ViewFormat::kPng ? "png" : "tiff";
-  std::atomic<std::size_t> clipped{0};
-  ForEachView(light_field, [&](int k, int l, const model::LinearPicture& view) {
-    const std::string name = ViewFile(k, l, description.view_format);
-    if (format == ViewFormat::kTiff) {
-      folder->Write(name, EncodeTiff(view));
-      return;
-    }
+LightFieldWriter::LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format,
+                                   model::OutputFolder* folder)
+    : transfer_(transfer), format_(format), folder_(folder) {}
+
+double LightFieldWriter::BytesForView(double values) const {
+  constexpr double kTiffBytes = 4;  // the file
+  constexpr double kPngBytes = 10;  // stored values, rows of them, and the file as it grows
+  return values * (format_ == ViewFormat::kTiff ? kTiffBytes : kPngBytes);
+}
+
+void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view) {
+  RequireStorable(view.channels);
+  const auto start = std::chrono::steady_clock::now();
+  const std::string name = ViewFile(k, l, NameOf(format_));
+  std::size_t clipped = 0;
+  if (format_ == ViewFormat::kTiff) {
+    folder_->Write(name, EncodeFloatTiff(view));
+  } else {
     constexpr int kBits = 16;
-    folder->Write(name, EncodePng(model::ToStored(view, light_field.transfer, kBits)));
-    clipped += CountClipped(view, light_field.transfer, kBits);
-  });
+    folder_->Write(name, EncodePng(model::ToStored(view, transfer_, kBits)));
+    clipped = CountClipped(view, transfer_, kBits);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clipped_ += clipped;
+  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::size_t LightFieldWriter::Finish(const model::LightField& light_field) {
+  model::LightFieldDescription description;
+  description.view_format = NameOf(format_);
   if (light_field.camera) {
     description.camera_file = kCameraFile;
-    folder->Write(kCameraFile, model::CameraToYaml(*light_field.camera));
+    folder_->Write(kCameraFile, model::CameraToYaml(*light_field.camera));
   }
   description.light_field = model::DescriptionOf(light_field);
-  folder->Write(kLightFieldMarker, model::LightFieldDescriptionToYaml(description));
-  return clipped;
+  folder_->Write(kLightFieldMarker, model::LightFieldDescriptionToYaml(description));
+  return clipped_;
+}
+
+void WriteViews(const model::LightField& light_field, LightFieldWriter* writer) {
+  RequireValid(light_field);
+  ForEachView(light_field, [&](int k, int l, const model::LinearPicture& view) {
+    writer->WriteView(k, l, view);
+  });
+}
+
+std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
+                            model::OutputFolder* folder) {
+  LightFieldWriter writer(light_field.transfer, format, folder);
+  WriteViews(light_field, &writer);
+  return writer.Finish(light_field);
 }
 
 model::OutputFolder ClaimHciFolder(const std::string& path) {

@@ -2,6 +2,7 @@
 #define THICKLENS_TOOLS_LIGHT_FIELD_IO_H_
 
 #include <cstddef>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,6 +35,35 @@ enum class ViewFormat {
 // Entries that a folder of ours may hold: for OutputFolder.
 extern const char kLightFieldMarker[];  // "lightfield.yaml"
 std::vector<std::string> LightFieldEntries();
+
+// Writes a light field of which there is never more than some views: each as it is made, in any
+// order, from several threads at the same time; and then what describes them.
+class LightFieldWriter {
+ public:
+  // The folder must outlive it, and is committed by the caller.
+  LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format,
+                   model::OutputFolder* folder);
+
+  void WriteView(int k, int l, const model::LinearPicture& view);
+  // After the last view. The light field's values are not looked at. Returns how many values were
+  // clipped.
+  std::size_t Finish(const model::LightField& light_field);
+
+  // What it holds besides a view of so many values while it writes it.
+  double BytesForView(double values) const;
+  double seconds() const { return seconds_; }  // spent on views, of all threads together
+
+ private:
+  const model::TransferCurve transfer_;
+  const ViewFormat format_;
+  model::OutputFolder* folder_;
+  std::mutex mutex_;
+  std::size_t clipped_ = 0;
+  double seconds_ = 0;
+};
+
+// All views that there are.
+void WriteViews(const model::LightField& light_field, LightFieldWriter* writer);
 
 // Writes views/view_VV_UU.png or .tiff, lightfield.yaml, and camera.yaml if there is a camera,
 // below the folder's staging path; the caller commits. Returns how many values were clipped.
