@@ -110,15 +110,24 @@ void CheckInput(const EstimateInput& input) {
   }
 }
 
+model::LightField DescriptionOf(const EstimateInput& input) {
+  model::LightField description;
+  description.s_count = input.picture.width_px;
+  description.t_count = input.picture.height_px;
+  description.u_count = static_cast<int>(input.weights.cols());
+  description.v_count = static_cast<int>(input.weights.rows());
+  description.channels = input.picture.channels;
+  description.weights = input.weights;
+  description.transfer = input.transfer;
+  description.grid = input.grid;
+  description.camera = input.camera;
+  if (input.grid) description.landing_step_px = LandingStepPx(*input.camera, *input.grid);
+  return description;
+}
+
 model::LightField FrameOf(const EstimateInput& input) {
-  model::LightField frame = model::MakeLightField(
-      input.picture.width_px, input.picture.height_px, static_cast<int>(input.weights.cols()),
-      static_cast<int>(input.weights.rows()), input.picture.channels);
-  frame.weights = input.weights;
-  frame.transfer = input.transfer;
-  frame.grid = input.grid;
-  frame.camera = input.camera;
-  if (input.grid) frame.landing_step_px = LandingStepPx(*input.camera, *input.grid);
+  model::LightField frame = DescriptionOf(input);
+  frame.values.assign(frame.ViewStart(frame.channels, 0, 0), 0.0F);
   return frame;
 }
 

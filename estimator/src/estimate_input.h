@@ -8,7 +8,9 @@ namespace thicklens::estimator {
 // Throws Error, naming field and value, unless an estimate can start from the input. A file must be
 // named by whoever read it; here the numbers are.
 void CheckInput(const EstimateInput& input);
-// A light field of the input's sizes, without values of its own.
+// The light field that the input leads to, without its values.
+model::LightField DescriptionOf(const EstimateInput& input);
+// The same with values, all 0.
 model::LightField FrameOf(const EstimateInput& input);
 
 }  // namespace thicklens::estimator

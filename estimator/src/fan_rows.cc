@@ -86,6 +86,9 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
       band->length.push_back(static_cast<std::int32_t>(band->index.size() - before));
     }
   }
+  // All bands are held at once, and half of what they reserved may be empty.
+  band->index.shrink_to_fit();
+  band->weight.shrink_to_fit();
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "run_cost.h"
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -16,6 +17,12 @@ double ResidentBytes() {
   double resident_pages = 0;
   file >> total_pages >> resident_pages;
   return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+void ReturnFreedMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
 }
 
 }  // namespace thicklens::estimator

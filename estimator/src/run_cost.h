@@ -10,6 +10,8 @@ constexpr double kBytesPerMib = 1024.0 * 1024.0;
 using Clock = std::chrono::steady_clock;
 double SecondsSince(Clock::time_point start);
 double ResidentBytes();  // of the whole process, now
+// What was freed, but kept for later use, goes back to the system where that is possible.
+void ReturnFreedMemory();
 
 }  // namespace thicklens::estimator
 

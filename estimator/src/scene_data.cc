@@ -116,7 +116,7 @@ std::vector<float> BlurSigmaPx(const DisparityMap& disparity, const Eigen::Array
 
 template <typename Real>
 StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Real>& radiance,
-                                const model::TransferCurve& transfer) {
+                                const model::TransferCurve& transfer, int first_row, int last_row) {
   const StoredValueTable table(transfer);
   std::vector<Real> shown(radiance.size());
   data.projection.apply(radiance.data(), data.channels, shown.data());
@@ -124,10 +124,11 @@ StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Re
   residual.mean.assign(data.pixels(), 0.0F);
   const Sums sums = SumOverBands(data.height_px, data.threads, [&](int y0, int y1) {
     double sum = 0;
-    for (int channel = 0; channel < data.channels; ++channel) {
+    const int begin = std::max(y0, first_row), end = std::min(y1, last_row);
+    for (int channel = 0; begin < end && channel < data.channels; ++channel) {
       const std::size_t plane = Index(channel) * data.pixels();
-      for (std::size_t i = Index(y0) * Index(data.width_px); i < Index(y1) * Index(data.width_px);
-           ++i) {
+      for (std::size_t i = Index(begin) * Index(data.width_px);
+           i < Index(end) * Index(data.width_px); ++i) {
         const float difference = table.Encode(static_cast<float>(shown[plane + i])) -
                                  table.Encode(static_cast<float>(data.photograph[plane + i]));
         residual.mean[i] += difference / static_cast<float>(data.channels);
@@ -136,7 +137,8 @@ StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Re
     }
     return Sums{sum};
   });
-  residual.rms = std::sqrt(sums[0] / static_cast<double>(radiance.size()));
+  residual.rms = std::sqrt(
+      sums[0] / (static_cast<double>(last_row - first_row) * data.width_px * data.channels));
   return residual;
 }
 
@@ -147,7 +149,7 @@ StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Re
   template std::vector<Real> DataWeights(const std::vector<Real>&, const std::vector<float>&, \
                                          bool);                                               \
   template StoredResidual StoredResidualOf(const DataTerm<Real>&, const std::vector<Real>&,   \
-                                           const model::TransferCurve&);
+                                           const model::TransferCurve&, int, int);
 THICKLENS_SCENE_DATA(float)
 THICKLENS_SCENE_DATA(double)
 #undef THICKLENS_SCENE_DATA

@@ -32,14 +32,15 @@ std::vector<Real> DataWeights(const std::vector<Real>& slope_squared,
 // Standard deviation of the blur of each pixel, px: the root mean square of that of both axes.
 std::vector<float> BlurSigmaPx(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
 
-// H r - I in stored values: the mean of the channels at each pixel, and the rms of all.
+// H r - I in stored values in some rows: the mean of the channels at each pixel (0 in other rows),
+// and the rms of all.
 struct StoredResidual {
   std::vector<float> mean;
   double rms = 0;
 };
 template <typename Real>
 StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Real>& radiance,
-                                const model::TransferCurve& transfer);
+                                const model::TransferCurve& transfer, int first_row, int last_row);
 
 }  // namespace thicklens::estimator
 

@@ -30,13 +30,15 @@ void SquaredDifferences(const DataTerm<Real>& data, const std::vector<Real>& pic
   }
 }
 
-// Mean over the pixels of s^2 |grad I|^2, channels and both differences added.
+// Sum over the pixels of the rows [first, last) of s^2 |grad I|^2, channels and both differences
+// added.
 template <typename Real>
-double MeanSquaredGradient(const DataTerm<Real>& data, const std::vector<Real>& slope_squared) {
+double SumSquaredGradient(const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
+                          int first, int last) {
   const Sums sums = SumOverBands(data.height_px, data.threads, [&](int y0, int y1) {
     std::vector<Real> squares(Index(data.width_px));
     double sum = 0;
-    for (int y = y0; y < y1; ++y) {
+    for (int y = std::max(y0, first); y < std::min(y1, last); ++y) {
       SquaredDifferences(data, data.photograph, y, &squares);
       for (std::size_t i = 0; i < squares.size(); ++i) {
         sum += static_cast<double>(squares[i]) *
@@ -45,20 +47,33 @@ double MeanSquaredGradient(const DataTerm<Real>& data, const std::vector<Real>& 
     }
     return Sums{sum};
   });
-  return sums[0] / static_cast<double>(data.pixels());
+  return sums[0];
 }
 
-// Mean over pixels and channels of s^2 |I - H I|^2.
+// The mean over all pixels.
 template <typename Real>
-double MeanSquaredBlurLoss(const DataTerm<Real>& data, const std::vector<Real>& slope_squared) {
+double MeanSquaredGradient(const DataTerm<Real>& data, const std::vector<Real>& slope_squared) {
+  return SumSquaredGradient(data, slope_squared, 0, data.height_px) /
+         static_cast<double>(data.pixels());
+}
+
+// Sum over the pixels of the rows and channels of s^2 |I - H I|^2.
+template <typename Real>
+double SumSquaredBlurLoss(const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
+                          int first, int last) {
   std::vector<Real> blurred(data.photograph.size());
   data.projection.apply(data.photograph.data(), data.channels, blurred.data());
   double sum = 0;
-  for (std::size_t i = 0; i < blurred.size(); ++i) {
-    const double lost = static_cast<double>(data.photograph[i]) - static_cast<double>(blurred[i]);
-    sum += static_cast<double>(slope_squared[i % data.pixels()]) * lost * lost;
+  for (int channel = 0; channel < data.channels; ++channel) {
+    const std::size_t plane = Index(channel) * data.pixels();
+    for (std::size_t i = Index(first) * Index(data.width_px);
+         i < Index(last) * Index(data.width_px); ++i) {
+      const double lost =
+          static_cast<double>(data.photograph[plane + i]) - static_cast<double>(blurred[plane + i]);
+      sum += static_cast<double>(slope_squared[i]) * lost * lost;
+    }
   }
-  return sum / static_cast<double>(blurred.size());
+  return sum;
 }
 
 // How much larger the sharp scene's variance is than what the photograph shows of it, inverted:
@@ -71,17 +86,34 @@ constexpr double kLeastSignal = 0.25;
 }  // namespace
 
 template <typename Real>
-double StrengthForNoise(Prior prior, double sigma, const DataTerm<Real>& data,
-                        const std::vector<Real>& slope_squared) {
+SignalSum SignalOf(Prior prior, const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
+                   int first_row, int last_row) {
+  const double values = static_cast<double>(last_row - first_row) * data.width_px * data.channels;
+  switch (prior) {
+    case Prior::kRidge:
+      return {SumSquaredBlurLoss(data, slope_squared, first_row, last_row), values};
+    case Prior::kGradient:
+      return {SumSquaredGradient(data, slope_squared, first_row, last_row), 2 * values};
+    case Prior::kTotalVariation:
+      break;
+  }
+  return {};
+}
+
+double StrengthForNoise(Prior prior, double sigma, const SignalSum& signal) {
   if (prior == Prior::kTotalVariation) return 1e-3 * std::pow(255 * sigma, 1.5);
   const double noise = sigma * sigma;
+  const double mean = signal.squares / signal.count;
   if (prior == Prior::kRidge) {
-    const double lost = MeanSquaredBlurLoss(data, slope_squared) - noise;
-    return kRidgeShare * noise / std::max(lost, kLeastSignal * noise);
+    return kRidgeShare * noise / std::max(mean - noise, kLeastSignal * noise);
   }
-  const double differences = 2.0 * data.channels;
-  const double slope = MeanSquaredGradient(data, slope_squared) / differences - 2 * noise;
-  return kGradientShare * noise / std::max(slope, kLeastSignal * noise);
+  return kGradientShare * noise / std::max(mean - 2 * noise, kLeastSignal * noise);
+}
+
+template <typename Real>
+double StrengthForNoise(Prior prior, double sigma, const DataTerm<Real>& data,
+                        const std::vector<Real>& slope_squared) {
+  return StrengthForNoise(prior, sigma, SignalOf(prior, data, slope_squared, 0, data.height_px));
 }
 
 template <typename Real>
@@ -151,14 +183,15 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
   return outcome;
 }
 
-#define THICKLENS_PRIORS(Real)                                                             \
-  template double StrengthForNoise(Prior, double, const DataTerm<Real>&,                   \
-                                   const std::vector<Real>&);                              \
-  template QuadraticPrior<Real> RidgePrior(const std::vector<Real>&, double);              \
-  template QuadraticPrior<Real> GradientPrior(const std::vector<Real>&, double);           \
-  template kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>&, double); \
-  template RadianceOutcome SolveRadiance(Prior, double, const DataTerm<Real>&,             \
-                                         const std::vector<Real>&, const RadianceLimits&,  \
+#define THICKLENS_PRIORS(Real)                                                                   \
+  template SignalSum SignalOf(Prior, const DataTerm<Real>&, const std::vector<Real>&, int, int); \
+  template double StrengthForNoise(Prior, double, const DataTerm<Real>&,                         \
+                                   const std::vector<Real>&);                                    \
+  template QuadraticPrior<Real> RidgePrior(const std::vector<Real>&, double);                    \
+  template QuadraticPrior<Real> GradientPrior(const std::vector<Real>&, double);                 \
+  template kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>&, double);       \
+  template RadianceOutcome SolveRadiance(Prior, double, const DataTerm<Real>&,                   \
+                                         const std::vector<Real>&, const RadianceLimits&,        \
                                          SceneSystem<Real>*, std::vector<Real>*);
 THICKLENS_PRIORS(float)
 THICKLENS_PRIORS(double)

@@ -25,6 +25,17 @@ template <typename Real>
 double StrengthForNoise(Prior prior, double sigma, const DataTerm<Real>& data,
                         const std::vector<Real>& slope_squared);
 
+// The same in two steps, for a photograph of which only parts are looked at: squares of what the
+// prior speaks of, s (I - H I) or s grad I, in some of the photograph's rows, and how many they
+// are; total variation needs none.
+struct SignalSum {
+  double squares = 0, count = 0;
+};
+template <typename Real>
+SignalSum SignalOf(Prior prior, const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
+                   int first_row, int last_row);
+double StrengthForNoise(Prior prior, double sigma, const SignalSum& signal);
+
 template <typename Real>
 QuadraticPrior<Real> RidgePrior(const std::vector<Real>& slope_squared, double mu);
 template <typename Real>

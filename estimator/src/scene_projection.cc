@@ -115,6 +115,43 @@ double SceneProjection<Real>::memory_mib() const {
   return sum;
 }
 
+// Indices into `rows`.
+template <typename Real>
+std::pair<std::size_t, std::size_t> SceneProjection<Real>::RowsOfOwn(int first_row,
+                                                                     int last_row) const {
+  const auto from = [&](int row) {
+    const auto pixel = static_cast<std::int32_t>(row * width_px);
+    return static_cast<std::size_t>(std::lower_bound(rows.pixel.begin(), rows.pixel.end(), pixel) -
+                                    rows.pixel.begin());
+  };
+  return {from(first_row), from(last_row)};
+}
+
+template <typename Real>
+std::size_t SceneProjection<Real>::pixels_with_row(int first_row, int last_row) const {
+  const auto [first, last] = RowsOfOwn(first_row, last_row);
+  return last - first;
+}
+
+template <typename Real>
+double SceneProjection<Real>::bytes(int first_row, int last_row) const {
+  const auto [first, last] = RowsOfOwn(first_row, last_row);
+  constexpr std::size_t kForms = 2;  // as rows, and transposed
+  std::size_t sum = static_cast<std::size_t>(rows.start[last] - rows.start[first]) * kForms *
+                        (sizeof(Real) + sizeof(std::int32_t)) +
+                    (last - first) * kForms * (sizeof(std::int64_t) + sizeof(std::int32_t));
+  for (const Term& term : terms) {
+    for (const kernels::PixelFilter<Real>* filter : {&term.across, &term.down}) {
+      const auto start = [&](int row) {
+        return filter->start[static_cast<std::size_t>(row) *
+                             static_cast<std::size_t>(filter->blocks_in_row())];
+      };
+      sum += (start(last_row) - start(first_row)) * sizeof(Real);
+    }
+  }
+  return static_cast<double>(sum);
+}
+
 template <typename Real>
 SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                           const Eigen::ArrayXXd& weights,

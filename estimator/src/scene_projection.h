@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "thicklens/estimator/view_geometry.h"
@@ -48,8 +49,13 @@ class SceneProjection {
   // Of the photograph's pixels, those with a row of their own.
   double row_share() const;
   double memory_mib() const;
+  // Of the rows [first, last) of the photograph alone.
+  std::size_t pixels_with_row(int first_row, int last_row) const;
+  double bytes(int first_row, int last_row) const;
 
  private:
+  std::pair<std::size_t, std::size_t> RowsOfOwn(int first_row, int last_row) const;
+
   mutable std::vector<Real> between_, other_;
 };
 

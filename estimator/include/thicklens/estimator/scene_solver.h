@@ -44,9 +44,11 @@ struct SceneOptions {
   // Bicubic between the pixels of a surface, far from its edges. Off: linear, as in
   // EstimateFunctional.
   bool cubic = true;
-  bool falloff = true;                     // the irradiance of (12), where there is a camera
-  int threads = 0;                         // 0: one per core
-  std::optional<double> memory_limit_mib;  // for the whole process
+  bool falloff = true;  // the irradiance of (12), where there is a camera
+  int threads = 0;      // 0: one per core
+  // For the whole process. Where the picture as a whole takes more, it is solved in bands.
+  std::optional<double> memory_limit_mib;
+  int least_bands = 1;  // >= 1
   // Called from any thread, one at a time, for each iteration and each view, and now and then
   // between. May throw to stop.
   std::function<void(int done, int total)> progress;
@@ -75,6 +77,9 @@ struct SceneSummary {
   double predicted_memory_mib = 0;
   int threads = 0;
   std::string device;  // of the iterations
+  // The picture was solved in so many parts, from top to bottom. Of these the iterations and the
+  // relative residual are the most.
+  int bands = 1;
 };
 
 // What the estimate knows of itself, picture-sized.
@@ -104,9 +109,24 @@ struct SceneMaps {
 // Derived here; H as in SceneProjection. The iterations are computed where the backend is (null:
 // by C++ on the processor). Throws Error for options and inputs that do not fit, a memory limit
 // that is too low, and what a device reports. The result does not depend on the number of threads.
+//
+// In bands the noise and the strength are those of the whole photograph (kAuto looks at a part of
+// it, kGcv at the band in the middle), and each band is solved with rows around it, so many that
+// no seam shows: what bands change is what the tolerance leaves open.
 model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
                                 SceneSummary* summary, SceneMaps* maps,
                                 kernels::Backend* backend = nullptr);
+
+// Takes the views one by one as they are made: each once, in any order, from several threads at the
+// same time. May throw to stop.
+struct SceneViewSink {
+  std::function<void(int k, int l, const model::LinearPicture& view)> take;
+  double bytes = 0;  // that it needs for one view while it has it
+};
+// EstimateScene without ever holding all views; what comes back has none.
+model::LightField EstimateSceneViews(const EstimateInput& input, const SceneOptions& options,
+                                     const SceneViewSink& sink, SceneSummary* summary,
+                                     SceneMaps* maps, kernels::Backend* backend = nullptr);
 
 // Standard deviation of the noise of stored values in [0, 1], quantisation included: of 16 x 16
 // blocks with a mean of 12/255 to 243/255 the rms of (p00 - p10 - p01 + p11)/2, and of these the

@@ -1,0 +1,269 @@
+#include "scene_band_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "ray_landing.h"
+#include "run_cost.h"
+#include "thicklens/error.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Lower bands would be little but margin.
+constexpr int kLeastRows = 16;
+// Of a large photograph, bands of so many rows and pixels in all tell what the whole is like.
+constexpr int kSampleRows = 16;
+constexpr double kSamplePixels = 1 << 18;
+
+// What bands found, each on its own, as that of one picture.
+class JoinedSummary {
+ public:
+  void Add(const SceneSummary& of_band, int rows) {
+    iterations_ = std::max(iterations_, of_band.iterations);
+    reweightings_ = std::max(reweightings_, of_band.reweightings);
+    converged_ = converged_ && of_band.converged;
+    relative_residual_ = std::max(relative_residual_, of_band.relative_residual);
+    rows_ += rows;
+    row_share_ += rows * of_band.row_share;
+    hidden_share_ += rows * of_band.hidden_share;
+    squares_ += rows * of_band.residual_rms * of_band.residual_rms;
+    strength_ = of_band.strength;
+  }
+
+  void Fill(SceneSummary* summary) const {
+    summary->strength = strength_;
+    summary->iterations = iterations_;
+    summary->reweightings = reweightings_;
+    summary->converged = converged_;
+    summary->relative_residual = relative_residual_;
+    summary->row_share = row_share_ / rows_;
+    summary->hidden_share = hidden_share_ / rows_;
+    summary->residual_rms = std::sqrt(squares_ / rows_);
+  }
+
+ private:
+  int iterations_ = 0, reweightings_ = 0, rows_ = 0;
+  bool converged_ = true;
+  double strength_ = 0, relative_residual_ = 0;
+  double row_share_ = 0, hidden_share_ = 0, squares_ = 0;
+};
+
+// The rows of a band's result, to the end of those above.
+void AddRows(const model::LinearPicture& solved, const SceneBand& band,
+             model::LinearPicture* picture) {
+  const auto in_row =
+      static_cast<std::ptrdiff_t>(solved.width_px) * static_cast<std::ptrdiff_t>(solved.channels);
+  picture->values.insert(picture->values.end(),
+                         solved.values.begin() + (band.first - band.from) * in_row,
+                         solved.values.begin() + (band.last - band.from) * in_row);
+  picture->height_px += band.last - band.first;
+}
+
+}  // namespace
+
+template <typename Real>
+SceneBandRun<Real>::SceneBandRun(const EstimateInput& input, const SceneOptions& options,
+                                 kernels::Backend* backend, const SceneMemory& memory, int reach_px,
+                                 int iterations, IterationProgress* progress, SceneSummary* summary)
+    : input_(input),
+      options_(options),
+      backend_(backend),
+      memory_(memory),
+      reach_px_(reach_px),
+      iterations_(iterations),
+      progress_(progress),
+      summary_(summary) {}
+
+template <typename Real>
+model::LinearPicture SceneBandRun<Real>::Solve(const model::LinearPicture& photograph,
+                                               SceneMaps* maps) {
+  const auto start = Clock::now();
+  const int height_px = photograph.height_px;
+  if (!options_.slope_weights) {
+    mean_slope_ = MeanSlope(photograph, input_.transfer,
+                            BandsOf(height_px, options_.least_bands, BandMarginPx(reach_px_)));
+  }
+  int count = std::min(options_.least_bands, height_px);
+  if (options_.memory_limit_mib) {
+    bytes_per_pixel_ = memory_.LargestBytesPerPixel();
+    if (MostBytes(count, bytes_per_pixel_) > *options_.memory_limit_mib * kBytesPerMib) {
+      bytes_per_pixel_ = TakenSample(photograph).bytes_per_pixel;
+      count = BandsFor(bytes_per_pixel_);
+    }
+  }
+  summary_->setup_seconds += SecondsSince(start);
+  for (;;) {
+    std::optional<model::LinearPicture> radiance = SolveIn(count, photograph, maps);
+    if (radiance) return std::move(*radiance);
+    count = std::max(count + 1, BandsFor(bytes_per_pixel_));
+  }
+}
+
+template <typename Real>
+double SceneBandRun<Real>::MostBytes(int count, double bytes_per_pixel) const {
+  const int height_px = input_.picture.height_px;
+  const int rows =
+      count == 1
+          ? height_px
+          : std::min(height_px, (height_px + count - 1) / count + 2 * BandMarginPx(reach_px_));
+  return memory_.MostBytes(rows, memory_.OperatorBytes(rows, bytes_per_pixel));
+}
+
+template <typename Real>
+int SceneBandRun<Real>::BandsFor(double bytes_per_pixel) const {
+  const double limit = *options_.memory_limit_mib * kBytesPerMib;
+  const int least = std::min(options_.least_bands, input_.picture.height_px);
+  const int most = std::max(least, input_.picture.height_px / kLeastRows);
+  double needed = MostBytes(least, bytes_per_pixel);
+  for (int count = least; count <= most; ++count) {
+    const double bytes = MostBytes(count, bytes_per_pixel);
+    if (bytes <= limit) return count;
+    needed = std::min(needed, bytes);
+  }
+  throw Error(fmt::format(
+      "memory limit {:.0f} MiB: even in bands of a few rows {:.0f} MiB are needed; the limit must "
+      "be at least that, or the views fewer, or the picture smaller",
+      *options_.memory_limit_mib, std::ceil(needed / kBytesPerMib)));
+}
+
+template <typename Real>
+typename SceneRadiance<Real>::Run SceneBandRun<Real>::RunFor(const SceneOptions& options) const {
+  typename Radiance::Run run{input_, options};
+  run.backend = backend_;
+  run.threads = summary_->threads;
+  run.noise_sigma = summary_->noise_sigma;
+  run.mean_slope = mean_slope_;
+  run.progress = progress_;
+  return run;
+}
+
+template <typename Real>
+double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const SceneBand& band,
+                                   Start start, Radiance* radiance) const {
+  const bool whole = band.rows() == photograph.height_px;
+  DisparityMap disparity = whole ? input_.disparity : CutRows(input_.disparity, band.from, band.to);
+  if (input_.grid) {
+    disparity = PhotographDisparity(disparity, LandingStepPx(*input_.camera, *input_.grid));
+  }
+  const std::optional<model::LinearPicture> cut =
+      whole ? std::nullopt : std::optional(CutRows(photograph, band.from, band.to));
+  const model::LinearPicture& rows = cut ? *cut : photograph;
+  const auto begin = Clock::now();
+  if (start == Start::kFound) {
+    radiance->FindStart(rows, disparity);
+    ReturnFreedMemory();
+  }
+  const double seconds = SecondsSince(begin);
+  radiance->Prepare(rows, std::move(disparity), band);
+  return seconds;
+}
+
+template <typename Real>
+const typename SceneBandRun<Real>::Sample& SceneBandRun<Real>::TakenSample(
+    const model::LinearPicture& photograph) {
+  if (sample_) return *sample_;
+  sample_.emplace();
+  const double pixels = static_cast<double>(photograph.width_px) * photograph.height_px;
+  const int stride = static_cast<int>(std::ceil(pixels / kSamplePixels));
+  double sampled = 0, bytes = 0;
+  for (const SceneBand& band :
+       SampleBands(photograph.height_px, kSampleRows, stride, SampleMarginPx(reach_px_))) {
+    Radiance radiance(RunFor(options_));
+    Prepare(photograph, band, Start::kNone, &radiance);
+    const SignalSum signal = radiance.Signal();
+    sample_->signal.squares += signal.squares;
+    sample_->signal.count += signal.count;
+    bytes += radiance.result_operator_bytes();
+    sampled += static_cast<double>(photograph.width_px) * (band.last - band.first);
+  }
+  sample_->bytes_per_pixel = bytes / sampled;
+  return *sample_;
+}
+
+// One for all bands, so that they fit together. Cross-validation looks at the band in the middle.
+template <typename Real>
+double SceneBandRun<Real>::StrengthFor(const model::LinearPicture& photograph,
+                                       const std::vector<SceneBand>& bands) {
+  switch (options_.strength_rule) {
+    case StrengthRule::kGiven:
+      break;
+    case StrengthRule::kAuto:
+      return StrengthForNoise(
+          options_.prior, std::max(summary_->noise_sigma, kLeastNoise),
+          options_.prior == Prior::kTotalVariation ? SignalSum() : TakenSample(photograph).signal);
+    case StrengthRule::kGcv:
+      Radiance radiance(RunFor(options_));
+      Prepare(photograph, bands[bands.size() / 2], Start::kFound, &radiance);
+      SceneSummary found;
+      radiance.Solve(&found);
+      search_iterations_ += found.iterations;
+      return found.strength;
+  }
+  return options_.strength;
+}
+
+template <typename Real>
+bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
+  const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes());
+  summary_->predicted_memory_mib = std::max(summary_->predicted_memory_mib, bytes / kBytesPerMib);
+  if (!options_.memory_limit_mib || bytes <= *options_.memory_limit_mib * kBytesPerMib) return true;
+  bytes_per_pixel_ =
+      std::max(bytes_per_pixel_, radiance.operator_bytes() /
+                                     static_cast<double>(input_.picture.width_px) / band.rows());
+  return false;
+}
+
+template <typename Real>
+std::optional<model::LinearPicture> SceneBandRun<Real>::SolveIn(
+    int count, const model::LinearPicture& photograph, SceneMaps* maps) {
+  auto lap = Clock::now();
+  const auto take_lap = [&lap] { return SecondsSince(std::exchange(lap, Clock::now())); };
+  const std::vector<SceneBand> bands =
+      BandsOf(photograph.height_px, count, BandMarginPx(reach_px_));
+  SceneOptions options = options_;
+  if (count > 1) {
+    options.strength = StrengthFor(photograph, bands);
+    options.strength_rule = StrengthRule::kGiven;
+  }
+  if (maps != nullptr) *maps = {};
+  summary_->predicted_memory_mib = 0;
+  JoinedSummary joined;
+  model::LinearPicture whole{photograph.width_px, 0, photograph.channels, {}};
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    const SceneBand& band = bands[i];
+    ReturnFreedMemory();  // of the band above
+    typename Radiance::Run run = RunFor(options);
+    run.last_iteration = static_cast<int>(iterations_ * (i + 1) / bands.size());
+    Radiance radiance(run);
+    const double coarse_seconds = Prepare(photograph, band, Start::kFound, &radiance);
+    summary_->solve_seconds += coarse_seconds;
+    summary_->setup_seconds += take_lap() - coarse_seconds;
+    if (!Fits(band, radiance)) return std::nullopt;
+    SceneSummary of_band;
+    model::LinearPicture solved = radiance.Solve(&of_band);
+    progress_->SkipTo(run.last_iteration);
+    joined.Add(of_band, band.last - band.first);
+    if (maps != nullptr) radiance.AddMaps(maps);
+    if (count == 1) {
+      whole = std::move(solved);
+    } else {
+      if (i == 0) whole.values.reserve(photograph.values.size());
+      AddRows(solved, band, &whole);
+    }
+    summary_->solve_seconds += take_lap();
+  }
+  joined.Fill(summary_);
+  summary_->iterations += search_iterations_;
+  summary_->bands = count;
+  return whole;
+}
+
+template class SceneBandRun<float>;
+template class SceneBandRun<double>;
+
+}  // namespace thicklens::estimator

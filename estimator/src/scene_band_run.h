@@ -1,0 +1,65 @@
+#ifndef THICKLENS_ESTIMATOR_SRC_SCENE_BAND_RUN_H_
+#define THICKLENS_ESTIMATOR_SRC_SCENE_BAND_RUN_H_
+
+#include <optional>
+#include <vector>
+
+#include "iteration_progress.h"
+#include "scene_bands.h"
+#include "scene_memory.h"
+#include "scene_radiance.h"
+#include "thicklens/estimator/scene_solver.h"
+
+namespace thicklens::estimator {
+
+// The radiance of a photograph, solved for in as few bands as the memory allows, one after the
+// other.
+template <typename Real>
+class SceneBandRun {
+ public:
+  // All is kept by reference. `iterations` of the progress are for the bands.
+  SceneBandRun(const EstimateInput& input, const SceneOptions& options, kernels::Backend* backend,
+               const SceneMemory& memory, int reach_px, int iterations, IterationProgress* progress,
+               SceneSummary* summary);
+
+  // Of the input's photograph without its fall-off. Sets of the summary what the solution tells,
+  // and adds the times. Throws Error if the memory limit is too low for the lowest bands.
+  model::LinearPicture Solve(const model::LinearPicture& photograph, SceneMaps* maps);
+
+ private:
+  using Radiance = SceneRadiance<Real>;
+  struct Sample {
+    SignalSum signal;
+    double bytes_per_pixel = 0;  // of H
+  };
+
+  int BandsFor(double bytes_per_pixel) const;
+  double MostBytes(int count, double bytes_per_pixel) const;
+  const Sample& TakenSample(const model::LinearPicture& photograph);
+  double StrengthFor(const model::LinearPicture& photograph, const std::vector<SceneBand>& bands);
+  typename Radiance::Run RunFor(const SceneOptions& options) const;
+  // Returns the seconds of the iterations at half the size, where they are asked for.
+  enum class Start { kNone, kFound };
+  double Prepare(const model::LinearPicture& photograph, const SceneBand& band, Start start,
+                 Radiance* radiance) const;
+  // Absent if one of them takes more memory than it may.
+  std::optional<model::LinearPicture> SolveIn(int count, const model::LinearPicture& photograph,
+                                              SceneMaps* maps);
+  bool Fits(const SceneBand& band, const Radiance& radiance);
+
+  const EstimateInput& input_;
+  const SceneOptions& options_;
+  kernels::Backend* backend_;
+  const SceneMemory& memory_;
+  const int reach_px_, iterations_;
+  IterationProgress* progress_;
+  SceneSummary* summary_;
+  double mean_slope_ = 0;
+  double bytes_per_pixel_ = 0;  // of H, the most that is known
+  std::optional<Sample> sample_;
+  int search_iterations_ = 0;
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SRC_SCENE_BAND_RUN_H_

@@ -1,0 +1,100 @@
+#include "scene_memory.h"
+
+#include <algorithm>
+#include <cstdint>
+
+#include "run_cost.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr double kFloat = sizeof(float);
+
+// Of a view in the making, for each pixel: its disparity and ways to the sources, what is hidden.
+constexpr double kRenderedBytes = 3 * kFloat + 1;
+// Code that is read in when it runs first, stacks, and all that is not as large as the picture.
+constexpr double kSmallBytes = 8 << 20;
+
+// Of all views in the making: the surfaces of the disparity.
+constexpr double kRendererBytes = 2;
+
+}  // namespace
+
+SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options,
+                         const Keeps& keeps, int reach_px)
+    : before_(ResidentBytes() + kSmallBytes),
+      width_px_(input.picture.width_px),
+      height_px_(input.picture.height_px),
+      channels_(input.picture.channels),
+      u_count_(static_cast<int>(input.weights.cols())),
+      v_count_(static_cast<int>(input.weights.rows())),
+      seen_views_(static_cast<int>((input.weights > 0).count())),
+      threads_(model::ResolveThreads(options.threads)),
+      reach_px_(reach_px),
+      real_(options.double_precision ? sizeof(double) : sizeof(float)),
+      keeps_(keeps) {}
+
+double SceneMemory::MostBytes(int rows, double operator_bytes) const {
+  const double all = static_cast<double>(width_px_) * height_px_;
+  double kept = 0;
+  if (keeps_.photograph) kept += kFloat * all * channels_;
+  if (keeps_.maps) kept += 3 * kFloat * all;
+  // Of a band: copies of its part of the input; and the rows that are done.
+  const double pixels = static_cast<double>(width_px_) * rows;
+  double band = kFloat * pixels;
+  if (rows < height_px_) {
+    kept += kFloat * all * channels_;
+    band += kFloat * pixels * channels_;
+  }
+  return before_ + kept +
+         std::max(band + operator_bytes + std::max(SetupBytes(pixels), SolveBytes(pixels)),
+                  ViewsBytes());
+}
+
+double SceneMemory::RowBytes() const {
+  constexpr double kTaps = 16, kForms = 2;  // of a ray; as rows, and transposed
+  const double around = 2.0 * reach_px_ + 1;
+  const double entries = std::min(kTaps * seen_views_, around * around);
+  return entries * (real_ + sizeof(std::int32_t)) * kForms;
+}
+
+double SceneMemory::LargestBytesPerPixel() const {
+  constexpr double kIndexBytes = 2 * (sizeof(std::int64_t) + sizeof(std::int32_t));
+  const double products = std::min(u_count_, v_count_);
+  return RowBytes() + kIndexBytes + products * 2 * real_ * (2.0 * reach_px_ + 3);
+}
+
+double SceneMemory::OperatorBytes(int rows, double bytes_per_pixel) const {
+  const int at_borders = rows < height_px_ ? std::min(2 * reach_px_, rows) : 0;
+  return static_cast<double>(width_px_) * (rows * bytes_per_pixel + at_borders * RowBytes());
+}
+
+// Beside H: the fan of all views, and of it the axes, or the places where rows are gathered.
+double SceneMemory::SetupBytes(double pixels) const {
+  constexpr double kHiddenBytes = sizeof(double) + kFloat;
+  const double axes = kFloat * (u_count_ + v_count_) + 2 + 2 * kFloat + 1;
+  return pixels * (kFloat * seen_views_ + kHiddenBytes + kRendererBytes + axes);
+}
+
+// Beside H: pictures are the data, H^T W I, the radiance, what CG holds and what H holds inside;
+// planes are weights, slopes, diagonals, the prior. A device has the same again, and its programs.
+double SceneMemory::SolveBytes(double pixels) const {
+  constexpr double kPictures = 12, kPlanes = 7, kProgramBytes = 16 << 20;
+  const double here = pixels * (real_ * (kPictures * channels_ + kPlanes) + kFloat);
+  return keeps_.device ? 2 * here + kProgramBytes : here;
+}
+
+double SceneMemory::ViewsBytes() const {
+  const double all = static_cast<double>(width_px_) * height_px_;
+  const double view = kFloat * channels_;
+  constexpr double kRanges = 2 * kFloat;
+  const double all_views = view + kRanges + kRendererBytes;
+  const int at_once = std::min(threads_, u_count_ * v_count_);
+  double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
+  bytes += at_once * keeps_.sink_bytes;
+  if (keeps_.light_field) bytes += all * view * u_count_ * v_count_;
+  return bytes;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,82 @@
+#ifndef THICKLENS_ESTIMATOR_SRC_SCENE_RADIANCE_H_
+#define THICKLENS_ESTIMATOR_SRC_SCENE_RADIANCE_H_
+
+#include <cstddef>
+#include <vector>
+
+#include "iteration_progress.h"
+#include "scene_bands.h"
+#include "scene_data.h"
+#include "scene_priors.h"
+#include "scene_projection.h"
+#include "scene_system.h"
+#include "thicklens/estimator/scene_solver.h"
+
+namespace thicklens::estimator {
+
+// What is assumed of the noise where the photograph does not tell it, in stored values.
+constexpr double kUsualNoise = 1.0 / 255;
+// Of a noiseless photograph: no model of its rays is better than the rounding of 8 bits.
+constexpr double kLeastNoise = 0.29 / 255;
+
+// Of the transfer curve at the smoothed intensity.
+double MeanSlope(const model::LinearPicture& photograph, const model::TransferCurve& transfer,
+                 const std::vector<SceneBand>& bands);
+
+// The radiance of one band of a photograph, in one precision.
+template <typename Real>
+class SceneRadiance {
+ public:
+  // What all bands have in common, kept by reference.
+  struct Run {
+    const EstimateInput& input;
+    const SceneOptions& options;
+    kernels::Backend* backend = nullptr;
+    int threads = 1;
+    double noise_sigma = 0;  // of stored values
+    double mean_slope = 0;   // over the whole photograph; for options without slope weights
+    int last_iteration = 0;  // for the progress: of this band and those before it
+    IterationProgress* progress = nullptr;
+  };
+  explicit SceneRadiance(const Run& run) : run_(run) {}
+
+  // Where the iteration starts: the estimate at half the size, but of small pictures. Before
+  // Prepare, so that H of both sizes is never held at once; without it the photograph is the start.
+  void FindStart(const model::LinearPicture& photograph, const DisparityMap& disparity);
+  // H, I and the weights, from the rows of the band: the photograph without fall-off, and the
+  // disparity of its pixels.
+  void Prepare(const model::LinearPicture& photograph, DisparityMap disparity,
+               const SceneBand& band);
+  double operator_bytes() const { return OperatorBytes(0, projection_.height_px); }
+  // Of the band's result.
+  double result_operator_bytes() const { return OperatorBytes(first_row(), last_row()); }
+  SignalSum Signal() const;
+
+  // Sets what the summary tells of the solution, and of the band's result.
+  model::LinearPicture Solve(SceneSummary* summary);
+  // Adds the rows of the band's result to those of the bands above.
+  void AddMaps(SceneMaps* maps) const;
+
+ private:
+  // The band's result in the rows that are solved for.
+  int first_row() const { return band_.first - band_.from; }
+  int last_row() const { return band_.last - band_.from; }
+  double OperatorBytes(int first, int last) const;
+  std::size_t PixelOfRow(int row) const;
+  void AddRows(const std::vector<float>& plane, std::vector<float>* to) const;
+  std::vector<Real> SlopeSquared(const model::LinearPicture& photograph) const;
+  void FillShares(SceneSummary* summary) const;
+
+  const Run run_;
+  SceneBand band_;
+  DisparityMap disparity_;
+  SceneProjection<Real> projection_;
+  DataTerm<Real> data_;
+  std::vector<Real> slope_squared_;
+  StoredResidual residual_;
+  model::LinearPicture start_;
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SRC_SCENE_RADIANCE_H_
