@@ -3,6 +3,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -22,6 +23,7 @@
 #include "interrupt.h"
 #include "light_field_io.h"
 #include "light_field_page.h"
+#include "memory_available.h"
 #include "progress_line.h"
 #include "report_folder.h"
 #include "thicklens/estimator/functional_solver.h"
@@ -52,19 +54,47 @@ struct Outputs {
   std::optional<model::OutputFile> report;
 };
 
+// No part of a picture that is solved for as a whole is larger: what that would take grows, and
+// nothing gets better by it.
+constexpr double kMostBandPixels = 3e6;
+
+estimator::SceneOptions SceneSettings(const EstimateOptions& options,
+                                      const estimator::EstimateInput& input,
+                                      const Progress& progress) {
+  estimator::SceneOptions settings = SceneOptionsOf(options, progress);
+  if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
+  const auto pixels = static_cast<double>(input.disparity.disparity.size());
+  settings.least_bands = std::max(1, static_cast<int>(std::ceil(pixels / kMostBandPixels)));
+  return settings;
+}
+
+// Views go to the writer as they are made, unless a page is to show them.
 void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& input,
-                const Progress& progress, EstimateOutcome* outcome) {
+                const Progress& progress, LightFieldWriter* writer, EstimateOutcome* outcome) {
   // A device is worth its start where it is asked for.
   const auto backend = kernels::OpenBackend(
       kernels::ParseDeviceRequest(options.device == "auto" ? "cpu" : options.device), nullptr,
       ThrowIfInterrupted);
   spdlog::debug("device: {}", backend->description());
+  const estimator::SceneOptions settings = SceneSettings(options, input, progress);
   estimator::SceneSummary scene;
-  outcome->light_field = estimator::EstimateScene(input, SceneOptionsOf(options, progress), &scene,
-                                                  &outcome->maps, backend.get());
+  if (!options.report_folder.empty()) {
+    outcome->light_field =
+        estimator::EstimateScene(input, settings, &scene, &outcome->maps, backend.get());
+  } else {
+    estimator::SceneViewSink sink;
+    sink.take = [writer](int k, int l, const model::LinearPicture& view) {
+      ThrowIfInterrupted();
+      writer->WriteView(k, l, view);
+    };
+    sink.bytes = writer->BytesForView(static_cast<double>(input.picture.values.size()));
+    outcome->light_field =
+        estimator::EstimateSceneViews(input, settings, sink, &scene, &outcome->maps, backend.get());
+  }
   outcome->seconds.setup += scene.setup_seconds;
   outcome->seconds.solve = scene.solve_seconds;
-  outcome->seconds.views = scene.views_seconds;
+  outcome->seconds.files = writer->seconds() / scene.threads;
+  outcome->seconds.views = std::max(0.0, scene.views_seconds - outcome->seconds.files);
   outcome->maps.radiance = {};  // the middle of the light field says it
   outcome->scene = std::move(scene);
 }
@@ -109,8 +139,8 @@ void CheckSettings(const EstimateOptions& options) {
 }
 
 void Solve(const EstimateOptions& options, const estimator::EstimateInput& input,
-           const Progress& progress, EstimateOutcome* outcome) {
-  if (options.solver == "scene") return SolveScene(options, input, progress, outcome);
+           const Progress& progress, LightFieldWriter* writer, EstimateOutcome* outcome) {
+  if (options.solver == "scene") return SolveScene(options, input, progress, writer, outcome);
   if (options.by_blocks()) return SolveBlocks(options, input, progress, outcome);
   SolveFunctional(options, input, progress, outcome);
 }
@@ -157,13 +187,17 @@ CommandResult Estimate(const EstimateOptions& options) {
     line.Show(done, total);
   };
   CheckSettings(options);  // before anything is read
+  if (options.memory_limit_mib) ReturnMemoryAtOnce();
   Outputs outputs(options);
   PreparedEstimate prepared = PrepareEstimate(options);
   ThrowIfInterrupted();
 
   EstimateOutcome outcome;
   outcome.seconds.setup = SecondsSince(start);
-  Solve(options, prepared.input, progress, &outcome);
+  LightFieldWriter writer(prepared.input.transfer,
+                          options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng,
+                          &outputs.light_field);
+  Solve(options, prepared.input, progress, &writer, &outcome);
   model::LightFieldOrigin& origin = outcome.light_field.origin;
   origin.seconds = outcome.seconds.setup + outcome.seconds.solve + outcome.seconds.views;
   origin.version = Version();
@@ -172,12 +206,12 @@ CommandResult Estimate(const EstimateOptions& options) {
   ThrowIfInterrupted();
 
   const auto files_start = Clock::now();
-  const std::size_t clipped = WriteLightField(
-      outcome.light_field, options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng,
-      &outputs.light_field);
+  if (!outcome.light_field.values.empty()) WriteViews(outcome.light_field, &writer);
+  const std::size_t clipped = writer.Finish(outcome.light_field);
   outcome.clipped_fraction =
-      static_cast<double>(clipped) / static_cast<double>(outcome.light_field.values.size());
-  outcome.seconds.files = SecondsSince(files_start);
+      static_cast<double>(clipped) /
+      static_cast<double>(outcome.light_field.ViewStart(outcome.light_field.channels, 0, 0));
+  outcome.seconds.files += SecondsSince(files_start);
   outcome.seconds.total = SecondsSince(start);
 
   CommandResult result;

@@ -109,7 +109,10 @@ void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
       ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
       ->capture_default_str()
       ->type_name("NAME");
-  command->add_option("--memory-limit", options->memory_limit_mib, "For the whole program")
+  command
+      ->add_option("--memory-limit", options->memory_limit_mib,
+                   "For the whole program; scene then solves the picture in bands. Default of "
+                   "scene: four fifths of what is available")
       ->check(Between(0, 1e9, "MiB"))
       ->type_name("MIB");
   AddDeviceOption(command, &options->device);

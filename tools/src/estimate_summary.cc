@@ -67,6 +67,7 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
                {"device", scene.device},
                {"threads", scene.threads},
                {"predicted_memory_mib", scene.predicted_memory_mib},
+               {"bands", scene.bands},
                {"iterations", scene.iterations},
                {"reweightings", scene.reweightings},
                {"converged", scene.converged},

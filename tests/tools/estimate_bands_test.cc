@@ -1,0 +1,126 @@
+// thicklens estimate with less memory than the picture as a whole takes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "child_process.h"
+#include "depth_io.h"
+#include "image_io.h"
+#include "light_field_io.h"
+#include "support/temporary_folder.h"
+#include "thicklens/model/light_field.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using thicklens::testing::ContentOf;
+using thicklens::testing::TemporaryFolder;
+using Arguments = std::vector<std::string>;
+
+constexpr int kW = 320, kH = 640;
+
+class EstimateBandsTest : public ::testing::Test {
+ protected:
+  EstimateBandsTest() {
+    model::StoredPicture picture{kW, kH, 3, 8, {}};
+    model::RawDepthMap map{kW, kH, {}, false};
+    std::mt19937 engine(7);
+    std::normal_distribution<double> noise(0, 1);
+    for (int y = 0; y < kH; ++y) {
+      for (int x = 0; x < kW; ++x) {
+        map.values.push_back(static_cast<float>(0.002 * x - 0.001 * y));
+        for (int c = 0; c < 3; ++c) {
+          const double value = 120 + 50 * std::sin(0.7 * x + c) * std::sin(0.5 * y) + noise(engine);
+          picture.values.push_back(static_cast<std::uint16_t>(std::lround(value)));
+        }
+      }
+    }
+    usual_ = {folder_.Put("picture.png", EncodePng(picture)),
+              folder_.Put("depth.pfm", EncodePfm(map)),
+              "--depth-kind",
+              "disparity",
+              "--views",
+              "3x3",
+              "--prior",
+              "ridge",
+              "--format",
+              "tiff",
+              "--tolerance",
+              "5e-5"};
+  }
+
+  ProgramResult Run(const std::string& output, const Arguments& more) const {
+    Arguments arguments = usual_;
+    arguments.insert(arguments.begin(), "estimate");
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    arguments.insert(arguments.end(), {"-o", folder_ / output, "--json", JsonPath()});
+    return ChildProgram(arguments, scratch_.path(), 0).Wait();
+  }
+  std::string JsonPath() const { return folder_ / "summary.json"; }
+  json Summary() const { return json::parse(ContentOf(JsonPath())); }
+
+  TemporaryFolder folder_, scratch_;
+  Arguments usual_;
+};
+
+TEST_F(EstimateBandsTest, GiveTheSameViewsInLessMemory) {
+  ProgramResult result = Run("whole", {});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json whole = Summary();
+  EXPECT_EQ(whole["bands"], 1);
+  EXPECT_THAT(result.out, Not(HasSubstr("bands")));
+
+  result = Run("none", {"--memory-limit", "5"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_FALSE(fs::exists(folder_ / "none"));
+  ASSERT_THAT(result.err, HasSubstr("memory limit 5 MiB: even in bands of a few rows "));
+  const double least = std::stod(result.err.substr(result.err.find("few rows ") + 9));
+  const double limit = (least + whole["predicted_memory_mib"].get<double>()) / 2;
+
+  result = Run("bands", {"--memory-limit", std::to_string(limit)});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json bands = Summary();
+  EXPECT_GT(bands["bands"].get<int>(), 1);
+  EXPECT_THAT(result.out, HasSubstr(std::to_string(bands["bands"].get<int>()) + " bands"));
+  EXPECT_LE(bands["predicted_memory_mib"].get<double>(), limit);
+#if !defined(__SANITIZE_ADDRESS__)  // which holds back what was freed
+  EXPECT_LE(bands["peak_rss_mib"].get<double>(), limit);
+#endif
+  EXPECT_EQ(bands["noise_sigma"], whole["noise_sigma"]);
+
+  const model::LightField expected = ReadLightField(folder_ / "whole", {});
+  const model::LightField found = ReadLightField(folder_ / "bands", {});
+  ASSERT_EQ(found.values.size(), expected.values.size());
+  EXPECT_EQ(found.origin.method, "scene");
+  EXPECT_GT(found.origin.seconds.value(), 0);
+  for (std::size_t i = 0; i < found.values.size(); ++i)
+    ASSERT_NEAR(found.values[i], expected.values[i], 1e-3) << i;
+}
+
+// A page shows all views, which are held for it; without one they never are.
+TEST_F(EstimateBandsTest, ViewsAreHeldForAPageOnly) {
+  ASSERT_EQ(Run("streamed", {}).exit_code, 0);
+  const double streamed_mib = Summary()["predicted_memory_mib"];
+  ASSERT_EQ(Run("held", {"--report", folder_ / "page"}).exit_code, 0);
+  EXPECT_GE(Summary()["predicted_memory_mib"].get<double>(), streamed_mib - 5);
+  EXPECT_TRUE(fs::exists(folder_ / "page/index.html"));
+  const model::LightField streamed = ReadLightField(folder_ / "streamed", {});
+  const model::LightField held = ReadLightField(folder_ / "held", {});
+  EXPECT_EQ(streamed.values, held.values);
+  EXPECT_EQ(streamed.weights.matrix(), held.weights.matrix());
+}
+
+}  // namespace
+}  // namespace thicklens::tools
