@@ -18,6 +18,7 @@
 #include <system_error>
 #include <utility>
 
+#include "float_tiff.h"
 #include "image_io.h"
 #include "interrupt.h"
 #include "svg_plot.h"
@@ -25,7 +26,6 @@
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "thicklens/model/parallel.h"
-#include "tiff_encoder.h"
 
 namespace thicklens::tools {
 
@@ -429,9 +429,8 @@ LightFieldWriter::LightFieldWriter(const model::TransferCurve& transfer, ViewFor
     : transfer_(transfer), format_(format), folder_(folder) {}
 
 double LightFieldWriter::BytesForView(double values) const {
-  constexpr double kTiffBytes = 4;  // the file
   constexpr double kPngBytes = 10;  // stored values, rows of them, and the file as it grows
-  return values * (format_ == ViewFormat::kTiff ? kTiffBytes : kPngBytes);
+  return format_ == ViewFormat::kTiff ? 0 : values * kPngBytes;
 }
 
 void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view) {
@@ -440,7 +439,12 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view)
   const std::string name = ViewFile(k, l, NameOf(format_));
   std::size_t clipped = 0;
   if (format_ == ViewFormat::kTiff) {
-    folder_->Write(name, EncodeFloatTiff(view));
+    const fs::path path = fs::path(folder_->staging_path()) / name;
+    const std::string shown = (fs::path(folder_->path()) / name).string();
+    std::error_code failure;
+    fs::create_directories(path.parent_path(), failure);
+    if (failure) throw Error(fmt::format("{}: cannot be written: {}", shown, failure.message()));
+    WriteFloatTiff(view, path.string(), shown);
   } else {
     constexpr int kBits = 16;
     folder_->Write(name, EncodePng(model::ToStored(view, transfer_, kBits)));

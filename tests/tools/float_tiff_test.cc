@@ -1,7 +1,8 @@
-#include "tiff_encoder.h"
+#include "float_tiff.h"
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <string>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
+#include "thicklens/error.h"
 
 namespace thicklens::tools {
 namespace {
@@ -25,14 +27,15 @@ model::LinearPicture Noise(int width, int height, int channels) {
 
 // By another library. Sizes of one pixel, one row, several strips, and strips that do not divide
 // the height.
-TEST(TiffEncoder, IsReadBackBitForBit) {
+TEST(FloatTiff, IsReadBackBitForBit) {
   TemporaryFolder folder;
   for (const int channels : {1, 3}) {
     for (const auto& [width, height] :
          std::vector<std::pair<int, int>>{{1, 1}, {5, 3}, {1, 70000}, {70000, 2}, {301, 407}}) {
       SCOPED_TRACE(std::to_string(width) + "x" + std::to_string(height));
       const model::LinearPicture picture = Noise(width, height, channels);
-      const std::string path = folder.Put("view.tiff", EncodeFloatTiff(picture));
+      const std::string path = folder.Put("view.tiff");
+      WriteFloatTiff(picture, path, "view.tiff");
       const cv::Mat read = cv::imread(path, cv::IMREAD_UNCHANGED);
       ASSERT_EQ(read.type(), CV_32FC(channels));
       ASSERT_EQ(read.cols, width);
@@ -48,10 +51,29 @@ TEST(TiffEncoder, IsReadBackBitForBit) {
   }
 }
 
-TEST(TiffEncoder, HoldsLittleBesidesTheValues) {
-  const std::string file = EncodeFloatTiff(Noise(301, 407, 3));
-  EXPECT_LT(file.size(), 4u * 3 * 301 * 407 + 1000);
-  EXPECT_GT(file.size(), 4u * 3 * 301 * 407);
+TEST(FloatTiff, HoldsLittleBesidesTheValues) {
+  TemporaryFolder folder;
+  const std::string path = folder.Put("view.tiff");
+  WriteFloatTiff(Noise(301, 407, 3), path, "view.tiff");
+  EXPECT_LT(std::filesystem::file_size(path), 4u * 3 * 301 * 407 + 1000);
+  EXPECT_GT(std::filesystem::file_size(path), 4u * 3 * 301 * 407);
+}
+
+TEST(FloatTiff, TellsWhatCannotBeWrittenByTheNameThatIsShown) {
+  TemporaryFolder folder;
+  const auto message = [&](const std::string& path) {
+    try {
+      WriteFloatTiff(Noise(301, 407, 3), path, "lf/view.tiff");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(message(folder.Put("view.tiff") + "/none"),
+            "lf/view.tiff: cannot be written: Not a directory");
+  if (std::filesystem::exists("/dev/full")) {
+    EXPECT_EQ(message("/dev/full"), "lf/view.tiff: cannot be written: No space left on device");
+  }
 }
 
 }  // namespace
