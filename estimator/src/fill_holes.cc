@@ -108,16 +108,16 @@ class SurfaceRelaxation {
 
 model::LinearPicture RootsOf(const model::LinearPicture& picture) {
   model::LinearPicture roots = picture;
-  for (float& value : roots.values) value = std::sqrt(std::max(value, 0.0F));
+  for (float& value : roots.values) value = value > 0 ? std::sqrt(value) : 0.0F;
   return roots;
 }
 
-// Planes that lead far beyond all that is known are not believed.
+// Planes that lead far beyond all that is known are not believed, and none leads beyond infinity.
 struct Range {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
 };
-Range BelievableRange(const DisparityMap& map) {
+Range BelievableRange(const DisparityMap& map, double at_infinity) {
   Range range;
   for (const float value : map.disparity) {
     if (std::isnan(value)) continue;
@@ -125,7 +125,7 @@ Range BelievableRange(const DisparityMap& map) {
     range.high = std::max(range.high, static_cast<double>(value));
   }
   const double beyond = range.high - range.low;
-  return {range.low - beyond, range.high + beyond};
+  return {std::max(range.low - beyond, std::min(at_infinity, range.low)), range.high + beyond};
 }
 
 void CheckSizes(const DisparityMap& map, const model::LinearPicture& picture) {
@@ -144,6 +144,13 @@ void CheckSizes(const DisparityMap& map, const model::LinearPicture& picture) {
         map.width_px, map.height_px, picture.width_px, picture.height_px, picture.channels,
         picture.values.size()));
   }
+  const auto bad = std::find_if_not(picture.values.begin(), picture.values.end(),
+                                    [](float value) { return std::isfinite(value); });
+  if (bad != picture.values.end()) {
+    const auto pixel = (bad - picture.values.begin()) / picture.channels;
+    throw Error(fmt::format("picture: a value of pixel ({}, {}) is {}: it must be finite",
+                            pixel % picture.width_px, pixel / picture.width_px, *bad));
+  }
 }
 
 double JumpOf(const DisparityMap& map) {
@@ -153,9 +160,9 @@ double JumpOf(const DisparityMap& map) {
 }
 
 void Fill(const DisparityMap& map, const model::LinearPicture& picture, std::size_t holes,
-          DisparityMap* full) {
+          double at_infinity, DisparityMap* full) {
   const double jump = JumpOf(map);
-  const Range range = BelievableRange(map);
+  const Range range = BelievableRange(map, at_infinity);
   const model::LinearPicture roots = RootsOf(picture);
   const double most_sweeps = kSweepsOfAll + kMostUpdates / static_cast<double>(holes);
   HoleFinder finder(map, jump);
@@ -185,7 +192,7 @@ void Fill(const DisparityMap& map, const model::LinearPicture& picture, std::siz
 }  // namespace
 
 DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
-                       std::size_t* filled) {
+                       std::size_t* filled, double at_infinity) {
   CheckSizes(map, picture);
   DisparityMap full = map;
   const auto holes = static_cast<std::size_t>(std::count_if(
@@ -197,7 +204,7 @@ DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& pict
                     "fill them from",
                     holes));
   }
-  if (holes > 0) Fill(map, picture, holes, &full);
+  if (holes > 0) Fill(map, picture, holes, at_infinity, &full);
   return full;
 }
 

@@ -42,6 +42,11 @@ class HoleFinder {
   bool IsHole(int index) const {
     return std::isnan(map_.disparity[static_cast<std::size_t>(index)]);
   }
+  // Whether it is one of the pixels of that region, which must be the last.
+  bool IsIn(const HoleRegion& region, int index) const {
+    const auto place = static_cast<std::size_t>(PlaceOf(index));  // of another region, if of any
+    return IsHole(index) && place < region.pixels.size() && region.pixels[place] == index;
+  }
   // Calls visit(neighbour, dx, dy) for the 4, or all 8, neighbours inside the picture.
   template <int kCount, typename Visit>
   void ForNeighbours(int index, const Visit& visit) const {

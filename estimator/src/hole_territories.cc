@@ -81,7 +81,8 @@ void HoleTerritories::Spread(const HoleRegion& region, const std::vector<int>& l
     if (region.rim[i].group < 0) continue;
     const int from = region.rim[i].index;
     finder_.ForNeighbours<8>(from, [&](int beside, int dx, int dy) {
-      if (finder_.IsHole(beside)) reach(from, 0, 0, static_cast<int>(i), beside, dx, dy);
+      // On its other side there may be another hole.
+      if (finder_.IsIn(region, beside)) reach(from, 0, 0, static_cast<int>(i), beside, dx, dy);
     });
   }
   for (std::size_t bucket = 0; bucket <= last_bucket; ++bucket) {

@@ -55,7 +55,6 @@ SurfacePlane FitSurfacePlane(const std::vector<SurfaceSample>& samples) {
   };
   set_slope();
   const double unexplained = SquaredResiduals(samples, plane);
-  plane.rms = std::sqrt(unexplained / count);
   const double variance = unexplained / std::max(1.0, count - unknowns);
   for (int i = 0; i < 2; ++i) {
     double& slope = along[static_cast<std::size_t>(i)];
@@ -64,6 +63,7 @@ SurfacePlane FitSurfacePlane(const std::vector<SurfaceSample>& samples) {
     slope *= std::max(0.0, 1 - variance / explained);
   }
   set_slope();
+  plane.rms = std::sqrt(SquaredResiduals(samples, plane) / count);
   return plane;
 }
 

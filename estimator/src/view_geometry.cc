@@ -57,6 +57,11 @@ DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vecto
   return map;
 }
 
+double DisparityAtInfinity(const model::LightFieldGrid& grid) {
+  constexpr float kVeryFarMm = 1e15F;  // the disparity tends to its limit with 1/z
+  return DisparityOnGrid(grid, {kVeryFarMm}, 1, 1).disparity.front();
+}
+
 DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, double offset_px) {
   CheckCount("disparity map", map.width_px, map.height_px, 1, map.values.size());
   if (!std::isfinite(scale) || scale == 0) {

@@ -291,5 +291,41 @@ TEST(FillHoles, DoesNotDependOnTheUnit) {
   }
 }
 
+// Known pixels one wide part two holes: what borders on one of them is not the other's.
+TEST(FillHoles, AHoleBehindAThinWallIsNotReachedThroughIt) {
+  const auto near_then_far = [](int x, int) { return x <= 10 ? 3.0 : 0.0; };
+  Case c{24, 12, near_then_far,
+         [](int x, int y) { return y >= 3 && y < 8 && x >= 5 && x < 16 && x != 10; }};
+  // The wall's edge is stronger than that at the far end of its hole.
+  c.light = [](int x, int) { return x <= 10 ? 0.2 : x < 16 ? 0.6 : 0.5; };
+  const DisparityMap full = c.Filled();
+  c.ForAll([&](int x, int y) {
+    EXPECT_NEAR(full.disparity[c.At(x, y)], near_then_far(x, y), 1e-5) << x << " " << y;
+  });
+}
+
+// A floor to the horizon with the sky above it: its plane leads beyond infinity.
+TEST(FillHoles, NothingIsBeyondInfinity) {
+  constexpr double kAtInfinity = -0.3;
+  const auto floor = [](int, int y) { return kAtInfinity + 0.02 * (y - 14); };
+  const Case c{40, 40, floor, [](int, int y) { return y < 16; }};
+  const DisparityMap full = FillHoles(c.Map(), c.Picture(), nullptr, kAtInfinity);
+  c.ForAll([&](int x, int y) {
+    EXPECT_NEAR(full.disparity[c.At(x, y)], std::max(kAtInfinity, floor(x, y)), 0.02)
+        << x << " " << y;
+    EXPECT_GE(full.disparity[c.At(x, y)], static_cast<float>(kAtInfinity));
+  });
+  // Where nobody says what infinity is, the plane goes on.
+  EXPECT_LT(c.Filled().disparity[c.At(20, 0)], kAtInfinity - 0.1);
+}
+
+TEST(FillHoles, APictureThatIsNotFiniteIsRefusedByItsPixel) {
+  const Case c{8, 6, Plane, [](int x, int y) { return x == 3 && y == 3; }};
+  model::LinearPicture picture = c.Picture();
+  picture.values[c.At(5, 2)] = kNan;
+  EXPECT_THAT(ErrorOf([&] { FillHoles(c.Map(), picture, nullptr); }),
+              AllOf(HasSubstr("pixel (5, 2) is nan"), HasSubstr("finite")));
+}
+
 }  // namespace
 }  // namespace thicklens::estimator

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "option_values.h"
@@ -23,9 +24,10 @@ double ApertureStepMm(const model::LightFieldGrid& grid) {
 }
 
 estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
-                                     const model::LinearPicture& picture, PreparedDepth* prepared) {
+                                     const model::LinearPicture& picture, double at_infinity,
+                                     PreparedDepth* prepared) {
   for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
-  return estimator::FillHoles(map, picture, &prepared->holes);
+  return estimator::FillHoles(map, picture, &prepared->holes, at_infinity);
 }
 
 void RequireSize(const model::RawDepthMap& map, const std::string& map_name,
@@ -61,7 +63,7 @@ PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& 
   prepared.disparity = NamingTheMap(map_name, [&] {
     return WithoutHoles(
         estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), picture,
-        &prepared);
+        estimator::DisparityAtInfinity(grid), &prepared);
   });
   return prepared;
 }
@@ -231,7 +233,7 @@ PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map
   prepared.disparity = NamingTheMap(map_name, [&] {
     return WithoutHoles(estimator::DisparityFromMap(map, convention.disparity_scale,
                                                     convention.disparity_offset_px),
-                        picture, &prepared);
+                        picture, -std::numeric_limits<double>::infinity(), &prepared);
   });
   return prepared;
 }

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "thicklens/model/light_field_grid.h"
@@ -36,12 +37,17 @@ DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, doubl
 // the known pixels around the hole, that to which the shortest way leads without crossing edges of
 // the picture; where the picture does not tell, with the farther surface, since depth sensors are
 // blind beside near things. Inside of one surface the plane through it, fitted with its noise in
-// mind, is bent to meet all its rims; neighbours belong to two surfaces where their disparities
-// differ by more than six times the map's noise, at least .2, at most 1 px per view step. `picture`
-// shows what the map is the depth of. `filled` (may be null) is told how many. Throws Error if all
+// mind, is bent to meet its rims (the more and the larger the holes are, the nearer to the rims
+// alone); neighbours belong to two surfaces where their disparities differ by more than six times
+// the map's noise, at least .2, at most 1 px per view step. `picture` shows what the map is the
+// depth of. `filled` (may be null) is told how many. No hole is filled with less than
+// `at_infinity`, the disparity of what is infinitely far, where that is known. Throws Error if all
 // are holes or the sizes differ.
 DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
-                       std::size_t* filled);
+                       std::size_t* filled,
+                       double at_infinity = -std::numeric_limits<double>::infinity());
+// The disparity on that grid of what is infinitely far, in the unit of DisparityOnGrid.
+double DisparityAtInfinity(const model::LightFieldGrid& grid);
 
 enum class Seen : std::uint8_t {
   kSeen,    // a point of the centre view
