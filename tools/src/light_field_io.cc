@@ -439,12 +439,9 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view)
   const std::string name = ViewFile(k, l, NameOf(format_));
   std::size_t clipped = 0;
   if (format_ == ViewFormat::kTiff) {
-    const fs::path path = fs::path(folder_->staging_path()) / name;
-    const std::string shown = (fs::path(folder_->path()) / name).string();
-    std::error_code failure;
-    fs::create_directories(path.parent_path(), failure);
-    if (failure) throw Error(fmt::format("{}: cannot be written: {}", shown, failure.message()));
-    WriteFloatTiff(view, path.string(), shown);
+    folder_->WriteWith(name, [&view](const std::string& path, const std::string& shown) {
+      WriteFloatTiff(view, path, shown);
+    });
   } else {
     constexpr int kBits = 16;
     folder_->Write(name, EncodePng(model::ToStored(view, transfer_, kBits)));

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_MODEL_OUTPUT_FILE_H_
 #define THICKLENS_MODEL_OUTPUT_FILE_H_
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -45,6 +46,11 @@ class OutputFolder {
   const std::string& staging_path() const;
   // Writes one file below the staging folder; `name` may have one folder in front. Throws Error.
   void Write(const std::string& name, const std::string& content);
+  // The same for who writes a file himself: calls write(path, name to be shown) and sees to it that
+  // what was written reaches the disk.
+  void WriteWith(
+      const std::string& name,
+      const std::function<void(const std::string& path, const std::string& shown)>& write);
   void Commit();
   const std::string& path() const;
 
