@@ -2,8 +2,11 @@
 
 #include <malloc.h>
 
+#include <algorithm>
 #include <fstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace thicklens::tools {
 namespace {
@@ -19,13 +22,47 @@ std::optional<double> Mebibytes(const std::string& path, const std::string& name
   return std::nullopt;
 }
 
+// A file that holds one number of bytes; absent where it says "max".
+std::optional<double> BytesIn(const std::string& path) {
+  std::ifstream file(path);
+  double bytes = 0;
+  if (file >> bytes) return bytes;
+  return std::nullopt;
+}
+
+// What the control group of the process leaves of its limit, MiB; version 2 or 1 of the interface.
+// A container sees its own group at the root.
+std::optional<double> LeftOfControlGroupMib(const std::string& root) {
+  const std::string base = root + "/sys/fs/cgroup";
+  std::vector<std::string> folders = {base, base + "/memory"};
+  std::ifstream groups(root + "/proc/self/cgroup");  // "0::/path", "7:memory:/path"
+  for (std::string line; std::getline(groups, line);) {
+    const std::string path = line.substr(std::min(line.rfind(':') + 1, line.size()));
+    folders.push_back(base + path);
+    folders.push_back(base + "/memory" + path);
+  }
+  std::optional<double> least;
+  for (const std::string& folder : folders) {
+    for (const auto& [limit, used] :
+         {std::pair{"/memory.max", "/memory.current"},
+          std::pair{"/memory.limit_in_bytes", "/memory.usage_in_bytes"}}) {
+      const std::optional<double> most = BytesIn(folder + limit), now = BytesIn(folder + used);
+      if (!most || !now) continue;
+      const double left_mib = std::max(0.0, *most - *now) / (1 << 20);
+      least = std::min(least.value_or(left_mib), left_mib);
+    }
+  }
+  return least;
+}
+
 }  // namespace
 
-std::optional<double> UsualMemoryLimitMib() {
+std::optional<double> UsualMemoryLimitMib(const std::string& root) {
   constexpr double kShare = 0.8;
-  const std::optional<double> available = Mebibytes("/proc/meminfo", "MemAvailable");
+  std::optional<double> available = Mebibytes(root + "/proc/meminfo", "MemAvailable");
   if (!available) return std::nullopt;
-  return kShare * *available + Mebibytes("/proc/self/status", "VmRSS").value_or(0);
+  if (const auto left = LeftOfControlGroupMib(root)) available = std::min(*available, *left);
+  return kShare * *available + Mebibytes(root + "/proc/self/status", "VmRSS").value_or(0);
 }
 
 void ReturnMemoryAtOnce() {

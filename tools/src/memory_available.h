@@ -2,12 +2,14 @@
 #define THICKLENS_TOOLS_MEMORY_AVAILABLE_H_
 
 #include <optional>
+#include <string>
 
 namespace thicklens::tools {
 
 // What the program may hold in all without making the machine swap: what it holds, and four fifths
-// of what the system says is available. Absent where the system does not say it.
-std::optional<double> UsualMemoryLimitMib();
+// of what the system says is available to it, or its control group (a container). Absent where the
+// system does not say it. `root`: where /proc and /sys are, for tests.
+std::optional<double> UsualMemoryLimitMib(const std::string& root = "");
 
 // From now on what is freed goes back to the system, though that takes longer: what the program
 // holds is what it uses.
