@@ -16,7 +16,8 @@ namespace {
 
 // Lower bands would be little but margin.
 constexpr int kLeastRows = 16;
-// Of a large photograph, bands of so many rows and pixels in all tell what the whole is like.
+// Of a large photograph, bands of so many pixels in all tell what the whole is like; of at least so
+// many rows, and of no more margin than that.
 constexpr int kSampleRows = 16;
 constexpr double kSamplePixels = 1 << 18;
 
@@ -126,8 +127,8 @@ int SceneBandRun<Real>::BandsFor(double bytes_per_pixel) const {
     needed = std::min(needed, bytes);
   }
   throw Error(fmt::format(
-      "memory limit {:.0f} MiB: even in bands of a few rows {:.0f} MiB are needed; the limit must "
-      "be at least that, or the views fewer, or the picture smaller",
+      "memory limit {:.0f} MiB: in any number of bands {:.0f} MiB are needed; the limit must be at "
+      "least that, or the views or threads fewer, or the picture smaller",
       *options_.memory_limit_mib, std::ceil(needed / kBytesPerMib)));
 }
 
@@ -171,8 +172,9 @@ const typename SceneBandRun<Real>::Sample& SceneBandRun<Real>::TakenSample(
   const double pixels = static_cast<double>(photograph.width_px) * photograph.height_px;
   const int stride = static_cast<int>(std::ceil(pixels / kSamplePixels));
   double sampled = 0, bytes = 0;
-  for (const SceneBand& band :
-       SampleBands(photograph.height_px, kSampleRows, stride, SampleMarginPx(reach_px_))) {
+  const int margin_px = SampleMarginPx(reach_px_);
+  const int rows = std::max(kSampleRows, 2 * margin_px);
+  for (const SceneBand& band : SampleBands(photograph.height_px, rows, stride, margin_px)) {
     Radiance radiance(RunFor(options_));
     Prepare(photograph, band, Start::kNone, &radiance);
     const SignalSum signal = radiance.Signal();
@@ -228,6 +230,8 @@ std::optional<model::LinearPicture> SceneBandRun<Real>::SolveIn(
   SceneOptions options = options_;
   if (count > 1) {
     options.strength = StrengthFor(photograph, bands);
+    (options_.strength_rule == StrengthRule::kGcv ? summary_->solve_seconds
+                                                  : summary_->setup_seconds) += take_lap();
     options.strength_rule = StrengthRule::kGiven;
   }
   if (maps != nullptr) *maps = {};

@@ -38,8 +38,8 @@ class SceneBandRun {
   const Sample& TakenSample(const model::LinearPicture& photograph);
   double StrengthFor(const model::LinearPicture& photograph, const std::vector<SceneBand>& bands);
   typename Radiance::Run RunFor(const SceneOptions& options) const;
-  // Returns the seconds of the iterations at half the size, where they are asked for.
   enum class Start { kNone, kFound };
+  // Returns the seconds of the iterations at half the size, where they are asked for.
   double Prepare(const model::LinearPicture& photograph, const SceneBand& band, Start start,
                  Radiance* radiance) const;
   // Absent if one of them takes more memory than it may.

@@ -108,13 +108,6 @@ double SceneProjection<Real>::row_share() const {
   return static_cast<double>(rows.pixel.size()) / static_cast<double>(pixels());
 }
 
-template <typename Real>
-double SceneProjection<Real>::memory_mib() const {
-  double sum = MebibytesOf(rows) + MebibytesOf(rows_transposed);
-  for (const Term& term : terms) sum += MebibytesOf(term.across) + MebibytesOf(term.down);
-  return sum;
-}
-
 // Indices into `rows`.
 template <typename Real>
 std::pair<std::size_t, std::size_t> SceneProjection<Real>::RowsOfOwn(int first_row,

@@ -48,7 +48,6 @@ class SceneProjection {
   }
   // Of the photograph's pixels, those with a row of their own.
   double row_share() const;
-  double memory_mib() const;
   // Of the rows [first, last) of the photograph alone.
   std::size_t pixels_with_row(int first_row, int last_row) const;
   double bytes(int first_row, int last_row) const;

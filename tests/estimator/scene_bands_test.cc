@@ -210,9 +210,9 @@ TEST(SceneBands, AreAsManyAsTheMemoryAsksFor) {
   options.memory_limit_mib = 1;
   const std::string refusal =
       ErrorOf([&] { EstimateSceneViews(input, options, sink, &bands, nullptr); });
-  ASSERT_THAT(refusal, HasSubstr("memory limit 1 MiB: even in bands of a few rows "));
+  ASSERT_THAT(refusal, HasSubstr("memory limit 1 MiB: in any number of bands "));
   ASSERT_THAT(refusal, HasSubstr("must be at least that"));
-  const double least = std::stod(refusal.substr(refusal.find("rows ") + 5));
+  const double least = std::stod(refusal.substr(refusal.find("of bands ") + 9));
   ASSERT_LT(least + 5, whole.predicted_memory_mib);
   options.memory_limit_mib = (least + whole.predicted_memory_mib) / 2;
   EstimateSceneViews(input, options, sink, &bands, nullptr);
