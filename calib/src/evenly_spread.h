@@ -6,7 +6,7 @@
 
 namespace thicklens::calib {
 
-// At most `most` of the indices below `count`, in order, every so manieth counted from `kept`,
+// At most `most` of the indices below `count`, in order, every n-th counted from `kept`,
 // which is always among them (`kept` < `count`).
 inline std::vector<std::size_t> EvenlySpread(std::size_t count, std::size_t kept,
                                              std::size_t most) {
