@@ -34,8 +34,8 @@ const std::vector<Room>& Rooms() {
       {"tools",
        {"model", "kernels", "calib", "estimator"},
        {},
-       {"Eigen/", "fmt/", "CLI/", "nlohmann/", "spdlog/", "exiv2/", "openssl/", "glog/", "cairo.h", "tiffio.h",
-        "cairo-pdf.h", "opencv2/core", "opencv2/imgcodecs", "opencv2/imgproc"}},
+       {"Eigen/", "fmt/", "CLI/", "nlohmann/", "spdlog/", "exiv2/", "openssl/", "glog/", "cairo.h",
+        "tiffio.h", "cairo-pdf.h", "opencv2/core", "opencv2/imgcodecs", "opencv2/imgproc"}},
   };
   return rooms;
 }
