@@ -294,9 +294,10 @@ TEST(FillHoles, DoesNotDependOnTheUnit) {
 // Known pixels one wide part two holes: what borders on one of them is not the other's.
 TEST(FillHoles, AHoleBehindAThinWallIsNotReachedThroughIt) {
   const auto near_then_far = [](int x, int) { return x <= 10 ? 3.0 : 0.0; };
-  Case c{24, 12, near_then_far,
-         [](int x, int y) { return y >= 3 && y < 8 && x >= 5 && x < 16 && x != 10; }};
-  // The wall's edge is stronger than that at the far end of its hole.
+  Case c{24, 40, near_then_far,
+         [](int x, int y) { return y >= 3 && y < 37 && x >= 5 && x < 16 && x != 10; }};
+  // The wall's edge is stronger than that at the far end of its hole, which is too high for what is
+  // known above and below it to decide.
   c.light = [](int x, int) { return x <= 10 ? 0.2 : x < 16 ? 0.6 : 0.5; };
   const DisparityMap full = c.Filled();
   c.ForAll([&](int x, int y) {
