@@ -37,6 +37,15 @@ TEST_F(MemoryAvailable, AContainerHasLess) {
   EXPECT_DOUBLE_EQ(LimitMib(), 0.8 * 100 + 10);
 }
 
+// Else a container that has read much would seem to be full.
+TEST_F(MemoryAvailable, FilesThatWereReadMakeRoom) {
+  Put("sys/fs/cgroup/memory.max", "209715200\n");
+  Put("sys/fs/cgroup/memory.current", "209715200\n");
+  Put("sys/fs/cgroup/memory.stat",
+      "anon 52428800\nfile 157286400\ninactive_file 104857600\nactive_file 52428800\n");
+  EXPECT_DOUBLE_EQ(LimitMib(), 0.8 * 150 + 10);
+}
+
 TEST_F(MemoryAvailable, AGroupWithoutALimitHasWhatTheMachineHas) {
   Put("sys/fs/cgroup/memory.max", "max\n");
   Put("sys/fs/cgroup/memory.current", "104857600\n");

@@ -11,15 +11,22 @@
 namespace thicklens::tools {
 namespace {
 
-// A line "NAME:  1234 kB" of one of Linux's files.
-std::optional<double> Mebibytes(const std::string& path, const std::string& name) {
+// The number behind a name in one of Linux's files.
+std::optional<double> NumberBehind(const std::string& name, const std::string& path) {
   std::ifstream file(path);
   std::string word;
   while (file >> word) {
-    double kib = 0;
-    if (word == name + ":" && file >> kib) return kib / 1024;
+    double number = 0;
+    if (word == name && file >> number) return number;
   }
   return std::nullopt;
+}
+
+// Of a line "NAME:  1234 kB".
+std::optional<double> Mebibytes(const std::string& path, const std::string& name) {
+  const std::optional<double> kib = NumberBehind(name + ":", path);
+  if (!kib) return std::nullopt;
+  return *kib / 1024;
 }
 
 // A file that holds one number of bytes; absent where it says "max".
@@ -31,7 +38,8 @@ std::optional<double> BytesIn(const std::string& path) {
 }
 
 // What the control group of the process leaves of its limit, MiB; version 2 or 1 of the interface.
-// A container sees its own group at the root.
+// A container sees its own group at the root. Files that are kept from reading count as used, but
+// make room where it is needed.
 std::optional<double> LeftOfControlGroupMib(const std::string& root) {
   const std::string base = root + "/sys/fs/cgroup";
   std::vector<std::string> folders = {base, base + "/memory"};
@@ -48,7 +56,10 @@ std::optional<double> LeftOfControlGroupMib(const std::string& root) {
           std::pair{"/memory.limit_in_bytes", "/memory.usage_in_bytes"}}) {
       const std::optional<double> most = BytesIn(folder + limit), now = BytesIn(folder + used);
       if (!most || !now) continue;
-      const double left_mib = std::max(0.0, *most - *now) / (1 << 20);
+      double files = 0;
+      for (const char* name : {"active_file", "inactive_file"})
+        files += NumberBehind(name, folder + "/memory.stat").value_or(0);
+      const double left_mib = std::max(0.0, *most - std::max(0.0, *now - files)) / (1 << 20);
       least = std::min(least.value_or(left_mib), left_mib);
     }
   }
