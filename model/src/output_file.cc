@@ -206,6 +206,18 @@ struct OutputFolder::Impl {
   std::vector<std::string> own_entries;
   int fd = -1;
 
+  // The name of a file as it will be.
+  std::string Shown(const std::string& name) const { return (fs::path(path) / name).string(); }
+  // Where it is written, in a folder that is there.
+  std::string Place(const std::string& name) const {
+    const fs::path file = fs::path(part) / name;
+    std::error_code failure;
+    fs::create_directories(file.parent_path(), failure);
+    if (failure)
+      throw Error(fmt::format("{}: cannot be written: {}", Shown(name), failure.message()));
+    return file.string();
+  }
+
   ~Impl() {
     if (fd < 0) return;
     std::error_code ignored;
@@ -243,29 +255,26 @@ const std::string& OutputFolder::staging_path() const { return impl_->part; }
 const std::string& OutputFolder::path() const { return impl_->path; }
 
 void OutputFolder::Write(const std::string& name, const std::string& content) {
-  WriteWith(name, [&content](const std::string& path, const std::string& shown) {
-    const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (fd < 0) throw CannotBeWritten(shown, errno);
-    try {
-      WriteAll(fd, content, shown);
-    } catch (...) {
-      ::close(fd);
-      throw;
-    }
-    if (::close(fd) != 0) throw CannotBeWritten(shown, errno);
-  });
+  const std::string shown = impl_->Shown(name);
+  const std::string path = impl_->Place(name);
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (fd < 0) throw CannotBeWritten(shown, errno);
+  try {
+    WriteAll(fd, content, shown);
+  } catch (...) {
+    ::close(fd);
+    throw;
+  }
+  if (::close(fd) != 0) throw CannotBeWritten(shown, errno);
 }
 
 void OutputFolder::WriteWith(
     const std::string& name,
     const std::function<void(const std::string& path, const std::string& shown)>& write) {
-  const fs::path file = fs::path(impl_->part) / name;
-  const std::string shown = (fs::path(impl_->path) / name).string();
-  std::error_code failure;
-  fs::create_directories(file.parent_path(), failure);
-  if (failure) throw Error(fmt::format("{}: cannot be written: {}", shown, failure.message()));
-  write(file.string(), shown);
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const std::string shown = impl_->Shown(name);
+  const std::string path = impl_->Place(name);
+  write(path, shown);
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) throw CannotBeWritten(shown, errno);
   const int error = ::fsync(fd) != 0 ? errno : 0;
   ::close(fd);
