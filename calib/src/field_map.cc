@@ -25,8 +25,8 @@ constexpr double kSpreadOverErrors = 4;  // squares; below, the tiles agree
 constexpr double kApart = 6;             // standard deviations between depths of a target
 constexpr double kRoughSurface = 4;  // chi^2 per dof of a smooth field above which depths differ
 constexpr double kColourDifference = 0.01;  // of the mean: below, the channels are copies
-// Of a longer sweep so many frames are mapped, evenly spread: the fit of one part takes time with
-// the square of its frames, and all parts' spectra are held at once.
+// Of a longer sweep at most so many frames are mapped, evenly spread: the fit of one part takes
+// time with the square of its frames, and all parts' spectra are held at once.
 constexpr std::size_t kMostFrames = 128;
 
 class Field {
@@ -78,14 +78,13 @@ class Field {
 
   void ThinOut() {
     std::vector<MeterFrame> kept;
-    for (const std::size_t f : EvenlySpread(setup_.frames.size(), setup_.reference, kMostFrames))
+    std::size_t reference = 0;
+    for (const std::size_t f : EvenlySpread(setup_.frames.size(), setup_.reference, kMostFrames)) {
+      if (f == setup_.reference) reference = kept.size();
       kept.push_back(setup_.frames[f]);
-    const std::size_t reference = setup_.frames[setup_.reference].frame;
+    }
     setup_.frames = std::move(kept);
-    setup_.reference = static_cast<std::size_t>(
-        std::find_if(setup_.frames.begin(), setup_.frames.end(),
-                     [reference](const MeterFrame& f) { return f.frame == reference; }) -
-        setup_.frames.begin());
+    setup_.reference = reference;
   }
 
   double BelievedReading(std::size_t frame) const {

@@ -136,6 +136,19 @@ TEST(DisparityOnGrid, KeepsHolesAndRefusesDepthsThatAreNotBeyondTheUvPlane) {
               AllOf(HasSubstr("2 values"), HasSubstr("3x1")));
 }
 
+// By similar triangles a disparity is a straight line over 1/(depth beyond the UV plane): infinity
+// is where two depths lead.
+TEST(DisparityOnGrid, TendsToThatOfInfinity) {
+  const model::LightFieldGrid grid = model::GridOnPlanes(BenchCamera(), {120, 300}, 3, 3);
+  const DisparityMap map = DisparityOnGrid(grid, {500, 1000, 1e7F}, 3, 1);
+  const double near = 1.0 / (500 - 120), far = 1.0 / (1000 - 120);
+  const double d_near = map.disparity[0], d_far = map.disparity[1];
+  const double at_infinity = d_far - (d_near - d_far) / (near - far) * far;
+  EXPECT_NEAR(DisparityAtInfinity(grid), at_infinity, 1e-5 * std::abs(d_near - d_far));
+  EXPECT_GT(map.disparity[2], DisparityAtInfinity(grid) - 1e-6);
+  EXPECT_GT(d_far, DisparityAtInfinity(grid));
+}
+
 TEST(DisparityFromMap, ScalesMovesAndMarksHoles) {
   const DisparityMap map =
       DisparityFromMap({4, 1, {1, 0, kNan, kInfinity}, /*integer=*/false}, -2, 0.5);
