@@ -163,13 +163,22 @@ TextureOptions ReadTexture(const YamlNode& node) {
   return texture;
 }
 
+GlossOptions ReadGloss(const YamlNode& node) {
+  node.RequireKeys({"depth_mm", "centre_px", "sigma_px", "strength"});
+  return {node.At("depth_mm").PositiveNumber(), ReadPair(node.At("centre_px")),
+          node.At("sigma_px").PositiveNumber(), node.At("strength").NonNegativeNumber()};
+}
+
 SceneLayer ReadLayer(const YamlNode& node) {
-  node.RequireKeys({"name", "plane", "outline", "texture"});
+  node.RequireKeys({"name", "plane", "outline", "texture", "gloss"});
   SceneLayer layer;
   if (const auto name = node.Find("name")) layer.name = name->Text();
   layer.plane = ReadPlane(node.At("plane"));
   if (const auto outline = node.Find("outline")) layer.outline = ReadOutline(*outline);
   layer.texture = ReadTexture(node.At("texture"));
+  if (const auto gloss = node.Find("gloss")) {
+    for (const YamlNode& image : gloss->Elements()) layer.gloss.push_back(ReadGloss(image));
+  }
   return layer;
 }
 

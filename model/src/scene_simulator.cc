@@ -79,6 +79,23 @@ std::string OutlineComplaint(const OutlineOptions& outline) {
   return "";
 }
 
+std::string GlossComplaint(const GlossOptions& gloss) {
+  if (!(gloss.depth_mm > 0) || !std::isfinite(gloss.depth_mm)) {
+    return fmt::format("gloss: depth_mm is {}: it must be finite and > 0", gloss.depth_mm);
+  }
+  if (!gloss.centre_px.allFinite()) {
+    return fmt::format("gloss: centre_px is [{}, {}]: it must be finite", gloss.centre_px.x(),
+                       gloss.centre_px.y());
+  }
+  if (!(gloss.sigma_px > 0) || !std::isfinite(gloss.sigma_px)) {
+    return fmt::format("gloss: sigma_px is {}: it must be finite and > 0", gloss.sigma_px);
+  }
+  if (!(gloss.strength >= 0) || !std::isfinite(gloss.strength)) {
+    return fmt::format("gloss: strength is {}: it must be finite and >= 0", gloss.strength);
+  }
+  return "";
+}
+
 std::string LayerComplaint(const SceneLayer& layer) {
   if (!(layer.plane.depth_mm > 0) || !std::isfinite(layer.plane.depth_mm)) {
     return fmt::format("plane.depth_mm is {}: it must be finite and > 0", layer.plane.depth_mm);
@@ -86,6 +103,10 @@ std::string LayerComplaint(const SceneLayer& layer) {
   if (!layer.plane.slope.allFinite()) {
     return fmt::format("plane.slope is [{}, {}]: it must be finite", layer.plane.slope.x(),
                        layer.plane.slope.y());
+  }
+  for (const GlossOptions& gloss : layer.gloss) {
+    const std::string complaint = GlossComplaint(gloss);
+    if (!complaint.empty()) return complaint;
   }
   const std::string outline = OutlineComplaint(layer.outline);
   return outline.empty() ? TextureComplaint(layer.texture) : outline;
@@ -123,7 +144,7 @@ double HitDepthMm(const PlaneOptions& plane, const SceneRay& ray) {
 }
 
 struct Hit {
-  const SceneTexture* texture = nullptr;
+  std::size_t layer = 0;
   double depth_mm = std::numeric_limits<double>::infinity();
   Eigen::Vector2d position_mm{0, 0};
 };
@@ -229,9 +250,23 @@ struct SceneSimulator::Impl {
       if (!(depth_mm < nearest.depth_mm)) continue;
       const Eigen::Vector2d position_mm = ray.PositionMm(depth_mm);
       if (!IsInside(layer.outline, position_mm, depth_mm)) continue;
-      nearest = {&textures[i], depth_mm, position_mm};
+      nearest = {i, depth_mm, position_mm};
     }
     return nearest;
+  }
+
+  // RGB; the fourth number means nothing.
+  Eigen::Array4d LightAlong(const SceneRay& ray) const {
+    const Hit hit = Trace(ray);
+    Eigen::Array4d light =
+        textures[hit.layer].At(hit.position_mm.x(), hit.position_mm.y()).cast<double>();
+    for (const GlossOptions& gloss : options.layers[hit.layer].gloss) {
+      const Eigen::Vector2d from_centre_px =
+          ChiefPositionPx(ray.PositionMm(gloss.depth_mm), gloss.depth_mm) - gloss.centre_px;
+      light += gloss.strength *
+               std::exp(-from_centre_px.squaredNorm() / (2 * gloss.sigma_px * gloss.sigma_px));
+    }
+    return light;
   }
 
   // cos(alpha) cos^3(beta) of (12): alpha in front of the lens; beta behind it, where the ray runs
@@ -262,9 +297,7 @@ struct SceneSimulator::Impl {
     for (const PixelRay& sample : photograph_rays) {
       const Eigen::Vector2d position_px = Eigen::Vector2d(x, y) + sample.offset_px;
       const SceneRay ray = RayAt(position_px, aperture_sigma_mm * sample.aperture);
-      const Hit hit = Trace(ray);
-      const Eigen::Array4d light =
-          hit.texture->At(hit.position_mm.x(), hit.position_mm.y()).cast<double>();
+      const Eigen::Array4d light = LightAlong(ray);
       sum += options.falloff ? (exposure * RelativeIrradiance(position_px, ray) * light).eval()
                              : light;
     }
@@ -274,8 +307,7 @@ struct SceneSimulator::Impl {
   Eigen::Array3d ViewAt(int x, int y, const Eigen::Vector2d& aperture_mm) const {
     Eigen::Array4d sum(0, 0, 0, 0);
     for (const PixelRay& sample : view_rays) {
-      const Hit hit = Trace(RayAt(Eigen::Vector2d(x, y) + sample.offset_px, aperture_mm));
-      sum += hit.texture->At(hit.position_mm.x(), hit.position_mm.y()).cast<double>();
+      sum += LightAlong(RayAt(Eigen::Vector2d(x, y) + sample.offset_px, aperture_mm));
     }
     return sum.head<3>() / static_cast<double>(view_rays.size());
   }

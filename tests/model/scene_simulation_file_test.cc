@@ -73,6 +73,7 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
            "- plane: {depth_mm: 293}\n"
            "  outline: {centre_mm: [1, 2], size_mm: [3, 4]}\n"
            "  texture: {kind: noise, saturation: 0}\n"
+           "  gloss: [{depth_mm: 320, centre_px: [5, 6.5], sigma_px: 2.5, strength: 0.75}]\n"
            "falloff: false\n"
            "rays_per_pixel: 100\n"
            "noise_sigma_grey_levels: 1.5\n"
@@ -127,6 +128,13 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.layers[4].outline.unit, Unit::kMm);
   EXPECT_EQ(options.layers[4].outline.size, Eigen::Vector2d(3, 4));
   EXPECT_EQ(options.layers[4].texture.kind, TextureKind::kNoise);
+  EXPECT_TRUE(wall.gloss.empty());
+  ASSERT_EQ(options.layers[4].gloss.size(), 1u);
+  const GlossOptions& gloss = options.layers[4].gloss[0];
+  EXPECT_EQ(gloss.depth_mm, 320);
+  EXPECT_EQ(gloss.centre_px, Eigen::Vector2d(5, 6.5));
+  EXPECT_EQ(gloss.sigma_px, 2.5);
+  EXPECT_EQ(gloss.strength, 0.75);
 }
 
 TEST_F(SceneSimulationFileTest, WhatIsLeftOutHasTheDefaultsOfTheOptions) {
@@ -216,6 +224,11 @@ TEST_F(SceneSimulationFileTest, TellsWhatIsWrongAndWhere) {
        "unknown key 'colour'"},
       {layer(plane + "texture: {kind: noise, colour: [1, 1]}"), "a list of 3"},
       {layer(plane + "texture: {kind: noise, contrast: 2}"), "texture.contrast is 2"},
+      {layer(plane + "gloss: [{centre_px: [1, 1], sigma_px: 2, strength: 1}]" + leaves),
+       "layers[0].gloss[0]: 'depth_mm' is missing"},
+      {layer(plane + "gloss: [{depth_mm: 320, centre_px: [1, 1], sigma_px: 0, strength: 1}]" +
+             leaves),
+       "layers[0].gloss[0].sigma_px"},
       {layer(plane + "outline: {size_px: [3, 4]}" + leaves), "'centre_px' is missing"},
       {layer(plane + "outline: {centre_px: [3, 4]}" + leaves),
        "one of size_px (a rectangle) and radius_px (a disc) is needed, found none"},

@@ -556,6 +556,51 @@ TEST(SceneSimulatorTest, WholeShiftsRepeatTheCentreViewOfATexture) {
   EXPECT_GT(change / (22 * 27), 0.02);
 }
 
+// A lamp in the gloss of a plane in focus moves as what stands at the depth of its mirror image, is
+// blurred as that, and is seen in the layer alone.
+TEST(SceneSimulatorTest, GlossShowsItsLampAtTheDepthOfTheMirrorImage) {
+  const double image_depth_mm = DepthOfShift(-1.5);
+  SceneLayer glossy = WithRectangle(Uniform(kFocusMm, 0.25), 19.5, 19.5, 34, 34);
+  glossy.gloss.push_back({image_depth_mm, {20, 19}, 2, 0.5});
+  const Camera camera = MacroCamera(40, 40, Psf::kGaussian, 0);
+  const SceneSimulator simulator(SceneOf(camera, {glossy, Uniform(kFocusMm + 1, 0.1)}), {});
+  struct Spot {
+    double sum = 0, x = 0, y = 0, variance_x = 0;
+  };
+  const auto spot_of = [](const LinearPicture& picture) {
+    Spot spot;
+    for (int y = 4; y < 36; ++y) {
+      for (int x = 4; x < 36; ++x) {
+        const double light = static_cast<double>(picture.at(x, y, 1)) - 0.25;
+        spot.sum += light;
+        spot.x += light * x;
+        spot.y += light * y;
+        spot.variance_x += light * x * x;
+      }
+    }
+    spot.x /= spot.sum;
+    spot.y /= spot.sum;
+    spot.variance_x = spot.variance_x / spot.sum - spot.x * spot.x;
+    return spot;
+  };
+  const double kWhole = 0.5 * 2 * kPi * 2 * 2, kPixel = 1 / 12.0;
+  const Eigen::Vector2d aperture_mm(4, -3);
+  const Eigen::Vector2d shift_px = ShiftPxPerMm(image_depth_mm) * aperture_mm;
+  const LinearPicture view = simulator.RenderView(aperture_mm, {1, {}});
+  const Spot seen = spot_of(view);
+  EXPECT_NEAR(seen.sum, kWhole, 0.01 * kWhole);
+  EXPECT_NEAR(seen.x, 20 - shift_px.x(), 0.02);
+  EXPECT_NEAR(seen.y, 19 - shift_px.y(), 0.02);
+  EXPECT_NEAR(seen.variance_x, 4 + kPixel, 0.05);
+  EXPECT_NEAR(view.at(0, 0, 1), 0.1, 1e-6);
+
+  const double blur_px = DefocusPx(image_depth_mm);
+  const Spot photographed = spot_of(simulator.RenderNoiseless({1, {}}));
+  EXPECT_NEAR(photographed.x, 20, 0.05);
+  EXPECT_NEAR(photographed.variance_x, 4 + kPixel + blur_px * blur_px,
+              0.05 * (4 + blur_px * blur_px));
+}
+
 // The whole chain once more, by the light-field grid's own rays and a search along each of them.
 TEST(SceneSimulatorTest, SlantedPlaneIsMetWhereTheGridsRaysMeetIt) {
   SceneSimulationOptions options =

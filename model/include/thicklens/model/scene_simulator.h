@@ -63,11 +63,23 @@ struct OutlineOptions {
   double radius = 0;             // kDisc
 };
 
+// The mirror image of a lamp in the gloss of a layer: light added to the layer's own, which differs
+// from view to view, since the image lies behind the layer. Its radiance is
+// strength exp(-|x - centre|^2/(2 sigma^2)) at the position x where chief rays show the point in
+// which a ray meets the plane of the image.
+struct GlossOptions {
+  double depth_mm = 0;              // of the image, > 0; a flat mirror has it behind itself
+  Eigen::Vector2d centre_px{0, 0};  // in the picture
+  double sigma_px = 0;              // > 0
+  double strength = 0;              // radiance of its middle, the same in all channels; >= 0
+};
+
 struct SceneLayer {
   std::string name;  // for messages; may be empty
   PlaneOptions plane;
   OutlineOptions outline;
   TextureOptions texture;
+  std::vector<GlossOptions> gloss;
 };
 
 struct SceneSimulationOptions {
