@@ -178,7 +178,8 @@ Worst Compare(Backend* backend, Kernels<Real>* device) {
 
 AgreementCheck CheckAgreement(Backend* backend) {
   AgreementCheck check;
-  const Worst in_float = Compare(backend, backend->NewFloat().get());
+  Worst in_float = Compare(backend, backend->NewFloat().get());
+  CompareWarp(backend, &in_float);
   check.float_error = in_float.error;
   check.double_error = std::numeric_limits<double>::quiet_NaN();
   check.worst = in_float.error > 0 ? in_float.what + " in float" : in_float.what;

@@ -66,6 +66,9 @@ class Numbers {
 template <typename Real>
 void CompareSteps(Backend* device, Worst* worst);
 
+// A view of a device against the twin's.
+void CompareWarp(Backend* device, Worst* worst);
+
 }  // namespace thicklens::kernels
 
 #endif  // THICKLENS_KERNELS_SRC_AGREEMENT_H_

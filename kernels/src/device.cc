@@ -30,6 +30,9 @@ class TwinBackend : public Backend {
   std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
     return NewNativeSteps(data);
   }
+  std::unique_ptr<ViewWarp> NewWarp(const SurfacePicture& picture) override {
+    return NewReferenceWarp(picture);
+  }
 };
 
 class OpenClBackend : public Backend {
@@ -51,6 +54,9 @@ class OpenClBackend : public Backend {
   }
   std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
     return NewOpenClSteps(device_, Built("double", &double_program_), data);
+  }
+  std::unique_ptr<ViewWarp> NewWarp(const SurfacePicture& picture) override {
+    return NewOpenClWarp(device_, Built("float", &float_program_), picture);
   }
 
  private:

@@ -19,6 +19,7 @@
 
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/kernels/radiance_steps.h"
+#include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 
@@ -60,6 +61,8 @@ template <typename Real>
 std::unique_ptr<RadianceSteps<Real>> NewOpenClSteps(std::shared_ptr<const OpenClDevice> device,
                                                     const cl::Program& program,
                                                     const DataTerm<Real>& data);
+std::unique_ptr<ViewWarp> NewOpenClWarp(std::shared_ptr<const OpenClDevice> device,
+                                        const cl::Program& program, const SurfacePicture& picture);
 
 }  // namespace thicklens::kernels
 

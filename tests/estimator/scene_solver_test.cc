@@ -223,6 +223,9 @@ class FloatOnly : public kernels::Backend {
       const kernels::DataTerm<double>& data) override {
     return kernels::NewNativeSteps(data);
   }
+  std::unique_ptr<kernels::ViewWarp> NewWarp(const kernels::SurfacePicture&) override {
+    return nullptr;
+  }
 };
 
 TEST(SceneSolver, ADeviceWithoutDoubleIsRefusedForDoublePrecision) {

@@ -140,6 +140,21 @@ class FaultySteps : public RadianceSteps<Real> {
   std::unique_ptr<RadianceSteps<Real>> native_;
 };
 
+class FaultyWarp : public ViewWarp {
+ public:
+  FaultyWarp(Fault fault, const SurfacePicture& picture)
+      : fault_(std::move(fault)), native_(NewReferenceWarp(picture)) {}
+  std::vector<float> Warp(const ViewSources& view) override {
+    std::vector<float> values = native_->Warp(view);
+    if (fault_.method == "WarpView") values[7] += static_cast<float>(fault_.amount);
+    return values;
+  }
+
+ private:
+  Fault fault_;
+  std::unique_ptr<ViewWarp> native_;
+};
+
 class FaultyBackend : public Backend {
  public:
   FaultyBackend(Fault in_float, Fault in_double)
@@ -159,6 +174,9 @@ class FaultyBackend : public Backend {
   }
   std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) override {
     return std::make_unique<FaultySteps<double>>(in_double_, data);
+  }
+  std::unique_ptr<ViewWarp> NewWarp(const SurfacePicture& picture) override {
+    return std::make_unique<FaultyWarp>(in_float_, picture);
   }
 
  private:
@@ -196,6 +214,14 @@ TEST(Agreement, SeesAFaultOfEveryMethod) {
     EXPECT_GT(in_double.double_error, 1e-10) << method;
     EXPECT_EQ(in_double.worst, name + " in double");
   }
+}
+
+// Views are made in float alone.
+TEST(Agreement, SeesAFaultyView) {
+  const AgreementCheck check = Check({"WarpView", 0.01}, {});
+  EXPECT_FALSE(check.agrees);
+  EXPECT_GT(check.float_error, 1e-4);
+  EXPECT_EQ(check.worst, "WarpView in float");
 }
 
 TEST(Agreement, HasItsLimits) {

@@ -9,6 +9,7 @@
 
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/kernels/radiance_steps.h"
+#include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 
@@ -68,6 +69,8 @@ class Backend {
   virtual std::unique_ptr<Kernels<double>> NewDouble() = 0;
   virtual std::unique_ptr<RadianceSteps<float>> NewSteps(const DataTerm<float>& data) = 0;
   virtual std::unique_ptr<RadianceSteps<double>> NewSteps(const DataTerm<double>& data) = 0;
+  // Keeps the picture by reference.
+  virtual std::unique_ptr<ViewWarp> NewWarp(const SurfacePicture& picture) = 0;
 };
 
 // Opens what is asked for. kAuto falls back to the twin and says in `notice` (one line; may be

@@ -1,0 +1,43 @@
+#ifndef THICKLENS_KERNELS_VIEW_WARP_H_
+#define THICKLENS_KERNELS_VIEW_WARP_H_
+
+#include <memory>
+#include <vector>
+
+namespace thicklens::kernels {
+
+// A picture of surfaces: pixels whose disparities differ by at most `tolerance` (in the unit of the
+// disparity) are of one.
+struct SurfacePicture {
+  int width_px = 0, height_px = 0, channels = 0;
+  const std::vector<float>* values = nullptr;     // row by row, the channels of a pixel together
+  const std::vector<float>* disparity = nullptr;  // one a pixel, finite
+  float tolerance = 0;
+};
+
+// Where the samples of a view read the picture: sample (x, y) at (x + source_x, y + source_y), cut
+// to the picture, on the surface of `disparity`. One number a sample, as many as the picture has
+// pixels.
+struct ViewSources {
+  const std::vector<float>* disparity = nullptr;
+  const std::vector<float>*source_x = nullptr, *source_y = nullptr;
+};
+
+// Reads one picture for many views. Bicubic (Catmull-Rom, the borders repeated) where all 16 pixels
+// around are of the sample's surface, else the mean of those of the four around that are, weighted
+// as bilinearly; where none is, the one of the four that is nearest to it in disparity. An object
+// is used by one thread at a time.
+class ViewWarp {
+ public:
+  virtual ~ViewWarp() = default;
+  // As SurfacePicture::values. Throws Error for sizes that do not fit, and what a device reports.
+  virtual std::vector<float> Warp(const ViewSources& view) = 0;
+};
+
+// In C++, plainly: the specification of a device's. Keeps the picture by reference. Throws Error
+// for sizes that do not fit.
+std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfacePicture& picture);
+
+}  // namespace thicklens::kernels
+
+#endif  // THICKLENS_KERNELS_VIEW_WARP_H_

@@ -1,0 +1,47 @@
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "agreement.h"
+
+namespace thicklens::kernels {
+namespace {
+
+constexpr int kWidth = 29, kHeight = 13;
+
+// Surfaces that are flat, rough and steep, one beside the other.
+std::vector<float> Surfaces(Numbers* numbers) {
+  std::vector<float> disparity;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double rough = x > 18 ? numbers->Between(-0.4, 0.4) : 0;
+      disparity.push_back(static_cast<float>((x > 9 ? 1 : -0.5) + 0.05 * y + rough));
+    }
+  }
+  return disparity;
+}
+
+}  // namespace
+
+void CompareWarp(Backend* device, Worst* worst) {
+  Numbers numbers;
+  const std::vector<float> disparity = Surfaces(&numbers);
+  for (const int channels : {1, 3}) {
+    const auto values = numbers.Vector<float>(kWidth * kHeight * channels, 0, 1);
+    const SurfacePicture picture{kWidth, kHeight, channels, &values, &disparity, 0.3F};
+    const std::unique_ptr<ViewWarp> found = device->NewWarp(picture);
+    const std::unique_ptr<ViewWarp> right = NewReferenceWarp(picture);
+    for (const double reach : {0.0, 2.5, 500.0}) {
+      auto source_x = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
+      auto source_y = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
+      for (std::size_t i = 0; i < source_x.size(); i += 3) source_x[i] = 1;
+      const auto of_view = numbers.Vector<float>(kWidth * kHeight, -0.6, 1.7);
+      for (const std::vector<float>* surface : {&disparity, &of_view}) {
+        const ViewSources view{surface, &source_x, &source_y};
+        worst->Add("WarpView", Difference(found->Warp(view), right->Warp(view)));
+      }
+    }
+  }
+}
+
+}  // namespace thicklens::kernels

@@ -1,0 +1,174 @@
+// A picture read for a view, plainly; warp.cl does the same.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "thicklens/error.h"
+#include "thicklens/kernels/view_warp.h"
+#include "warp_arguments.h"
+
+namespace thicklens::kernels {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+std::size_t PixelsOf(const SurfacePicture& picture) {
+  return Index(picture.width_px) * Index(picture.height_px);
+}
+
+// A place on a line of pixels: the pixel before it, and the rest of the way to the next, < 1.
+struct Place {
+  int pixel = 0;
+  float rest = 0;
+};
+// `limit_px`: more than the line is long.
+Place PlaceAt(int sample, float source, int count, float limit_px) {
+  const float way = std::clamp(source, -limit_px, limit_px);
+  const float below = std::floor(way);
+  const int at = sample + static_cast<int>(below);
+  const int pixel = std::clamp(at, 0, count - 1);
+  return {pixel, at == pixel && at < count - 1 ? way - below : 0.0F};
+}
+
+// Of the pixels at -1, 0, 1 and 2; of Catmull and Rom.
+std::array<float, 4> CatmullRom(float t) {
+  return {((-0.5F * t + 1) * t - 0.5F) * t, (1.5F * t - 2.5F) * t * t + 1,
+          ((-1.5F * t + 2) * t + 0.5F) * t, (0.5F * t - 0.5F) * t * t};
+}
+
+class ReferenceWarp : public ViewWarp {
+ public:
+  explicit ReferenceWarp(const SurfacePicture& picture)
+      : picture_(picture), ranges_(TapRangesOf(picture)) {}
+
+  std::vector<float> Warp(const ViewSources& view) override {
+    CheckView(picture_, view);
+    const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
+    std::vector<float> values;
+    values.reserve(picture_.values->size());
+    for (int y = 0; y < picture_.height_px; ++y) {
+      for (int x = 0; x < picture_.width_px; ++x) {
+        const std::size_t i = At(x, y);
+        const Place across = PlaceAt(x, (*view.source_x)[i], picture_.width_px, limit_px);
+        const Place down = PlaceAt(y, (*view.source_y)[i], picture_.height_px, limit_px);
+        const float disparity = (*view.disparity)[i];
+        const std::size_t there = At(across.pixel, down.pixel);
+        const bool cubic =
+            IsOnSurface(ranges_.lowest[there], disparity) &&
+            IsOnSurface(ranges_.highest[there], disparity);
+        for (int channel = 0; channel < picture_.channels; ++channel) {
+          values.push_back(cubic ? Cubic(across, down, channel)
+                                 : Linear(across, down, disparity, channel));
+        }
+      }
+    }
+    return values;
+  }
+
+ private:
+  std::size_t At(int x, int y) const {
+    return Index(std::clamp(y, 0, picture_.height_px - 1)) * Index(picture_.width_px) +
+           Index(std::clamp(x, 0, picture_.width_px - 1));
+  }
+  float ValueAt(int x, int y, int channel) const {
+    return (*picture_.values)[At(x, y) * Index(picture_.channels) + Index(channel)];
+  }
+  bool IsOnSurface(float there, float disparity) const {
+    return std::abs(there - disparity) <= picture_.tolerance;
+  }
+
+  float Cubic(const Place& across, const Place& down, int channel) const {
+    const std::array<float, 4> weight_x = CatmullRom(across.rest);
+    const std::array<float, 4> weight_y = CatmullRom(down.rest);
+    float sum = 0;
+    for (int j = 0; j < 4; ++j) {
+      float row = 0;
+      for (int i = 0; i < 4; ++i) {
+        row += weight_x[Index(i)] * ValueAt(across.pixel - 1 + i, down.pixel - 1 + j, channel);
+      }
+      sum += weight_y[Index(j)] * row;
+    }
+    return sum;
+  }
+
+  float Linear(const Place& across, const Place& down, float disparity, int channel) const {
+    float sum = 0, sum_of_weights = 0, closest_value = 0;
+    float closest = std::numeric_limits<float>::infinity();
+    for (int j = 0; j < 2; ++j) {
+      for (int i = 0; i < 2; ++i) {
+        const float weight =
+            (i == 0 ? 1 - across.rest : across.rest) * (j == 0 ? 1 - down.rest : down.rest);
+        if (weight == 0) continue;  // perhaps outside of the picture
+        const int x = across.pixel + i, y = down.pixel + j;
+        const float there = (*picture_.disparity)[At(x, y)];
+        if (std::abs(there - disparity) < closest) {
+          closest = std::abs(there - disparity);
+          closest_value = ValueAt(x, y, channel);
+        }
+        if (!IsOnSurface(there, disparity)) continue;
+        sum_of_weights += weight;
+        sum += weight * ValueAt(x, y, channel);
+      }
+    }
+    return sum_of_weights > 0 ? sum / sum_of_weights : closest_value;
+  }
+
+  const SurfacePicture picture_;
+  const TapRanges ranges_;
+};
+
+void CheckCount(const char* what, const std::vector<float>* numbers, std::size_t count) {
+  if (numbers != nullptr && numbers->size() == count) return;
+  throw Error(fmt::format("{}: {} numbers: there must be {}", what,
+                          numbers == nullptr ? 0 : numbers->size(), count));
+}
+
+}  // namespace
+
+void CheckPicture(const SurfacePicture& picture) {
+  if (picture.width_px < 1 || picture.height_px < 1 || picture.channels < 1) {
+    throw Error(fmt::format("picture of surfaces: {}x{} px in {} channels: each must be >= 1",
+                            picture.width_px, picture.height_px, picture.channels));
+  }
+  CheckCount("picture of surfaces", picture.values, PixelsOf(picture) * Index(picture.channels));
+  CheckCount("disparity of a picture", picture.disparity, PixelsOf(picture));
+  if (!(picture.tolerance >= 0)) {
+    throw Error(fmt::format("tolerance of a surface is {}: it must be >= 0", picture.tolerance));
+  }
+}
+
+void CheckView(const SurfacePicture& picture, const ViewSources& view) {
+  CheckCount("disparity of a view", view.disparity, PixelsOf(picture));
+  CheckCount("sources of a view across", view.source_x, PixelsOf(picture));
+  CheckCount("sources of a view down", view.source_y, PixelsOf(picture));
+}
+
+TapRanges TapRangesOf(const SurfacePicture& picture) {
+  CheckPicture(picture);
+  TapRanges ranges;
+  for (int y = 0; y < picture.height_px; ++y) {
+    for (int x = 0; x < picture.width_px; ++x) {
+      float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
+      for (int j = std::max(y - 1, 0); j <= std::min(y + 2, picture.height_px - 1); ++j) {
+        for (int i = std::max(x - 1, 0); i <= std::min(x + 2, picture.width_px - 1); ++i) {
+          const float there = (*picture.disparity)[Index(j) * Index(picture.width_px) + Index(i)];
+          lowest = std::min(lowest, there);
+          highest = std::max(highest, there);
+        }
+      }
+      ranges.lowest.push_back(lowest);
+      ranges.highest.push_back(highest);
+    }
+  }
+  return ranges;
+}
+
+std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfacePicture& picture) {
+  return std::make_unique<ReferenceWarp>(picture);
+}
+
+}  // namespace thicklens::kernels
