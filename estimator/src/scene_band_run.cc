@@ -81,8 +81,7 @@ SceneBandRun<Real>::SceneBandRun(const EstimateInput& input, const SceneOptions&
       summary_(summary) {}
 
 template <typename Real>
-model::LinearPicture SceneBandRun<Real>::Solve(const model::LinearPicture& photograph,
-                                               SceneMaps* maps) {
+SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, SceneMaps* maps) {
   const auto start = Clock::now();
   const int height_px = photograph.height_px;
   if (!options_.slope_weights) {
@@ -99,8 +98,8 @@ model::LinearPicture SceneBandRun<Real>::Solve(const model::LinearPicture& photo
   }
   summary_->setup_seconds += SecondsSince(start);
   for (;;) {
-    std::optional<model::LinearPicture> radiance = SolveIn(count, photograph, maps);
-    if (radiance) return std::move(*radiance);
+    std::optional<SolvedScene> solved = SolveIn(count, photograph, maps);
+    if (solved) return std::move(*solved);
     count = std::max(count + 1, BandsFor(bytes_per_pixel_));
   }
 }
@@ -221,8 +220,9 @@ bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
 }
 
 template <typename Real>
-std::optional<model::LinearPicture> SceneBandRun<Real>::SolveIn(
-    int count, const model::LinearPicture& photograph, SceneMaps* maps) {
+std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
+                                                       const model::LinearPicture& photograph,
+                                                       SceneMaps* maps) {
   auto lap = Clock::now();
   const auto take_lap = [&lap] { return SecondsSince(std::exchange(lap, Clock::now())); };
   const std::vector<SceneBand> bands =
@@ -237,7 +237,9 @@ std::optional<model::LinearPicture> SceneBandRun<Real>::SolveIn(
   if (maps != nullptr) *maps = {};
   summary_->predicted_memory_mib = 0;
   JoinedSummary joined;
-  model::LinearPicture whole{photograph.width_px, 0, photograph.channels, {}};
+  SolvedScene whole;
+  whole.radiance = {photograph.width_px, 0, photograph.channels, {}};
+  whole.of_points.reserve(input_.disparity.disparity.size());
   for (std::size_t i = 0; i < bands.size(); ++i) {
     const SceneBand& band = bands[i];
     ReturnFreedMemory();  // of the band above
@@ -253,11 +255,12 @@ std::optional<model::LinearPicture> SceneBandRun<Real>::SolveIn(
     progress_->SkipTo(run.last_iteration);
     joined.Add(of_band, band.last - band.first);
     if (maps != nullptr) radiance.AddMaps(maps);
+    radiance.AddConfidence(&whole.of_points);
     if (count == 1) {
-      whole = std::move(solved);
+      whole.radiance = std::move(solved);
     } else {
-      if (i == 0) whole.values.reserve(photograph.values.size());
-      AddRows(solved, band, &whole);
+      if (i == 0) whole.radiance.values.reserve(photograph.values.size());
+      AddRows(solved, band, &whole.radiance);
     }
     summary_->solve_seconds += take_lap();
   }

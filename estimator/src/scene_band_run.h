@@ -12,6 +12,11 @@
 
 namespace thicklens::estimator {
 
+struct SolvedScene {
+  model::LinearPicture radiance;
+  std::vector<Confidence> of_points;  // of the centre view
+};
+
 // The radiance of a photograph, solved for in as few bands as the memory allows, one after the
 // other.
 template <typename Real>
@@ -24,7 +29,7 @@ class SceneBandRun {
 
   // Of the input's photograph without its fall-off. Sets of the summary what the solution tells,
   // and adds the times. Throws Error if the memory limit is too low for the lowest bands.
-  model::LinearPicture Solve(const model::LinearPicture& photograph, SceneMaps* maps);
+  SolvedScene Solve(const model::LinearPicture& photograph, SceneMaps* maps);
 
  private:
   using Radiance = SceneRadiance<Real>;
@@ -43,8 +48,8 @@ class SceneBandRun {
   double Prepare(const model::LinearPicture& photograph, const SceneBand& band, Start start,
                  Radiance* radiance) const;
   // Absent if one of them takes more memory than it may.
-  std::optional<model::LinearPicture> SolveIn(int count, const model::LinearPicture& photograph,
-                                              SceneMaps* maps);
+  std::optional<SolvedScene> SolveIn(int count, const model::LinearPicture& photograph,
+                                     SceneMaps* maps);
   bool Fits(const SceneBand& band, const Radiance& radiance);
 
   const EstimateInput& input_;

@@ -12,7 +12,8 @@ namespace {
 constexpr double kFloat = sizeof(float);
 
 // Of a view in the making, for each pixel: its disparity and ways to the sources, what is hidden.
-constexpr double kRenderedBytes = 3 * kFloat + 1;
+// And its confidence.
+constexpr double kRenderedBytes = 3 * kFloat + 1 + 1;
 // Code that is read in when it runs first, stacks, and all that is not as large as the picture.
 constexpr double kSmallBytes = 8 << 20;
 
@@ -37,7 +38,7 @@ SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options
 
 double SceneMemory::MostBytes(int rows, double operator_bytes) const {
   const double all = static_cast<double>(width_px_) * height_px_;
-  double kept = 0;
+  double kept = all;  // the confidence of its points
   if (keeps_.photograph) kept += kFloat * all * channels_;
   if (keeps_.maps) kept += 3 * kFloat * all;
   // Of a band: copies of its part of the input; and the rows that are done.
@@ -70,18 +71,20 @@ double SceneMemory::OperatorBytes(int rows, double bytes_per_pixel) const {
   return static_cast<double>(width_px_) * (rows * bytes_per_pixel + at_borders * RowBytes());
 }
 
-// Beside H: the fan of all views, and of it the axes, or the places where rows are gathered.
+// Beside H: the fan of all views, and of it the axes, or the places where rows are gathered; and
+// which share of the aperture sees what.
 double SceneMemory::SetupBytes(double pixels) const {
   constexpr double kHiddenBytes = sizeof(double) + kFloat;
   const double axes = kFloat * (u_count_ + v_count_) + 2 + 2 * kFloat + 1;
-  return pixels * (kFloat * seen_views_ + kHiddenBytes + kRendererBytes + axes);
+  return pixels * (kFloat * seen_views_ + kHiddenBytes + kFloat + kRendererBytes + axes);
 }
 
 // Beside H: pictures are the data, H^T W I, the radiance, what CG holds and what H holds inside;
 // planes are weights, slopes, diagonals, the prior. A device has the same again, and its programs.
 double SceneMemory::SolveBytes(double pixels) const {
   constexpr double kPictures = 12, kPlanes = 7, kProgramBytes = 16 << 20;
-  const double here = pixels * (real_ * (kPictures * channels_ + kPlanes) + kFloat);
+  constexpr double kSharesBytes = 2 * kFloat;  // hidden, seen
+  const double here = pixels * (real_ * (kPictures * channels_ + kPlanes) + kSharesBytes);
   return keeps_.device ? 2 * here + kProgramBytes : here;
 }
 
@@ -93,7 +96,11 @@ double SceneMemory::ViewsBytes() const {
   const int at_once = std::min(threads_, u_count_ * v_count_);
   double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
   bytes += at_once * keeps_.sink_bytes;
-  if (keeps_.light_field) bytes += all * view * u_count_ * v_count_;
+  if (keeps_.device) bytes += all * (2 * view + 6 * kFloat);  // the picture, one view, its sources
+  if (keeps_.light_field) {
+    const double ray = view + (keeps_.maps ? 1 : 0);
+    bytes += all * ray * u_count_ * v_count_;
+  }
   return bytes;
 }
 

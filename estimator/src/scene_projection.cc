@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "seen_share.h"
 #include "thicklens/error.h"
 
 namespace thicklens::estimator {
@@ -155,6 +156,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
   projection.height_px = disparity.height_px;
   projection.threads = options.threads;
   projection.hidden_share = HiddenShare(fan, projection.pixels());
+  if (options.seen_share) projection.seen_share = SeenShare(fan, disparity, options.threads);
 
   std::vector<unsigned char> is_product(projection.pixels(), 0);
   const std::vector<Product> products = ProductsOf(weights);

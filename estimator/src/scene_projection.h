@@ -38,6 +38,8 @@ class SceneProjection {
   kernels::PixelRows<Real> rows, rows_transposed;
   // Share of the aperture that sees each pixel through samples hidden from the centre view, 0 to 1.
   std::vector<float> hidden_share;
+  // Share of the aperture that sees each point of the centre view; only where it was asked for.
+  std::vector<float> seen_share;
 
   // Both set their results.
   void Apply(const Real* x, int channels, Real* y) const;
@@ -61,6 +63,7 @@ class SceneProjection {
 struct ProjectionOptions {
   double tolerance_px = 0.2;          // of a ray's place, where the fan is taken for a product
   Between between = Between::kCubic;  // of the products; rows are linear
+  bool seen_share = false;            // is found, too
   int threads = 1;
   std::function<void()> progress;  // called now and then, from any thread; may throw to stop
 };

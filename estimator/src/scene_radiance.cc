@@ -92,6 +92,7 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph, Dispar
   ProjectionOptions projection;
   projection.threads = run_.threads;
   projection.between = run_.options.cubic ? Between::kCubic : Between::kLinear;
+  projection.seen_share = true;
   projection.progress = [this] { run_.progress->Tell(); };
   projection_ = MakeSceneProjection<Real>(disparity_, run_.input.weights, projection);
   ReturnFreedMemory();
@@ -167,6 +168,15 @@ void SceneRadiance<Real>::AddMaps(SceneMaps* maps) const {
   AddRows(residual_.mean, &maps->residual);
   AddRows(projection_.hidden_share, &maps->hidden_share);
   AddRows(BlurSigmaPx(disparity_, run_.input.weights), &maps->blur_sigma_px);
+}
+
+template <typename Real>
+void SceneRadiance<Real>::AddConfidence(std::vector<Confidence>* of_points) const {
+  const std::vector<float> sigma_px = BlurSigmaPx(disparity_, run_.input.weights);
+  for (std::size_t i = PixelOfRow(first_row()); i < PixelOfRow(last_row()); ++i) {
+    of_points->push_back(ConfidenceOfPoint(static_cast<double>(projection_.seen_share[i]),
+                                           static_cast<double>(sigma_px[i])));
+  }
 }
 
 template <typename Real>

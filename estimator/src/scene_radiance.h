@@ -56,6 +56,7 @@ class SceneRadiance {
   model::LinearPicture Solve(SceneSummary* summary);
   // Adds the rows of the band's result to those of the bands above.
   void AddMaps(SceneMaps* maps) const;
+  void AddConfidence(std::vector<Confidence>* of_points) const;
 
  private:
   // The band's result in the rows that are solved for.

@@ -14,6 +14,7 @@
 #include "scene_band_run.h"
 #include "scene_bands.h"
 #include "scene_memory.h"
+#include "scene_views.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
 
@@ -22,21 +23,6 @@ namespace {
 
 // Of conjugate gradients, for the progress only.
 constexpr int kUsualIterations = 60;
-
-// All views of one radiance.
-void ShowInAllViews(const EstimateInput& input, const model::LinearPicture& radiance, int threads,
-                    IterationProgress* progress, const SceneViewSink& sink) {
-  const auto u_count = static_cast<int>(input.weights.cols());
-  const auto v_count = static_cast<int>(input.weights.rows());
-  const DisparityRenderer renderer(input.disparity);
-  const PictureWarper warper(radiance, input.disparity);
-  model::ParallelFor(u_count * v_count, threads, [&](int view) {
-    const int k = view % u_count, l = view / u_count;
-    const double a = k - (u_count - 1) / 2.0, b = l - (v_count - 1) / 2.0;
-    sink.take(k, l, warper.Warp(renderer.Render(a, b)));
-    progress->Count();
-  });
-}
 
 std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, bool noise_known) {
   std::string message = fmt::format("{} prior of strength {:.3g}, {} iterations",
@@ -99,25 +85,34 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
         WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, summary->threads);
   }
   summary->setup_seconds = SecondsSince(start);
-  model::LinearPicture radiance = run.Solve(falloff ? *without_falloff : input.picture, maps);
+  SolvedScene solved = run.Solve(falloff ? *without_falloff : input.picture, maps);
   without_falloff.reset();
   ReturnFreedMemory();
 
   const auto views_start = Clock::now();
   if (sink == nullptr) {
+    const auto views = static_cast<std::size_t>(input.weights.size());
     light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
-    ShowInAllViews(input, radiance, summary->threads, &progress,
-                   {[&](int k, int l, const model::LinearPicture& view) {
+    if (maps != nullptr) maps->confidence.resize(input.disparity.disparity.size() * views);
+    ShowInAllViews(input, solved, summary->threads, backend, &progress,
+                   {[&](int k, int l, const model::LinearPicture& view,
+                        const std::vector<Confidence>& confidence) {
                       model::SetView(&light_field, k, l, view);
+                      if (maps != nullptr) {
+                        const int index = l * light_field.u_count + k;
+                        std::copy(confidence.begin(), confidence.end(),
+                                  maps->confidence.begin() +
+                                      index * static_cast<std::ptrdiff_t>(confidence.size()));
+                      }
                     },
                     0});
   } else {
-    ShowInAllViews(input, radiance, summary->threads, &progress, *sink);
+    ShowInAllViews(input, solved, summary->threads, backend, &progress, *sink);
   }
   summary->views_seconds = SecondsSince(views_start);
   summary->message = MessageOf(options, *summary, noise.has_value());
   FillOrigin(options, *summary, falloff, &light_field.origin);
-  if (maps != nullptr) maps->radiance = std::move(radiance);
+  if (maps != nullptr) maps->radiance = std::move(solved.radiance);
   return light_field;
 }
 

@@ -15,6 +15,7 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kSchema[] = "thicklens/light-field/1";
+constexpr char kConfidenceFormat[] = "png";
 constexpr char kDisparityIs[] = "px per view step, near positive";
 constexpr int kMaxImageSizePx = 100000;
 constexpr int kMaxViews = 1000;  // along u, and along v
@@ -159,6 +160,7 @@ class Writer {
     List("size", {std::to_string(light_field_.s_count), std::to_string(light_field_.t_count)});
     Text("channels", std::to_string(light_field_.channels));
     Text("view_format", description_.view_format);
+    if (description_.has_confidence) Text("confidence_format", kConfidenceFormat);
     Text("transfer", light_field_.transfer.Name());
     Text("disparity", kDisparityIs);
     Point("landing_step_px", light_field_.landing_step_px);
@@ -270,13 +272,17 @@ LightFieldDescription ParseLightFieldDescription(const std::string& text,
                                                  const std::string& source_name) {
   const YamlNode root = YamlNode::Parse(text, source_name);
   root.RequireSchema(kSchema);
-  root.RequireKeys({"schema", "views", "size", "channels", "view_format", "transfer", "disparity",
-                    "landing_step_px", "weights", "missing_views", "camera", "planes", "steps",
-                    "st_origin_index", "origin"});
+  root.RequireKeys({"schema", "views", "size", "channels", "view_format", "confidence_format",
+                    "transfer", "disparity", "landing_step_px", "weights", "missing_views",
+                    "camera", "planes", "steps", "st_origin_index", "origin"});
   LightFieldDescription description;
   LightField& light_field = description.light_field;
   ReadSizes(root, &light_field);
   description.view_format = root.At("view_format").OneOf({"png", "tiff"});
+  if (const auto format = root.Find("confidence_format")) {
+    format->OneOf({kConfidenceFormat});
+    description.has_confidence = true;
+  }
   const YamlNode transfer = root.At("transfer");
   try {
     light_field.transfer = TransferCurve::FromName(transfer.Text());

@@ -99,6 +99,8 @@ void ExpectSame(const Solved& bands, const Solved& whole, int count) {
   EXPECT_TRUE(bands.summary.converged);
   EXPECT_GT(bands.summary.iterations, 0);
   EXPECT_EQ(bands.maps.blur_sigma_px, whole.maps.blur_sigma_px);
+  EXPECT_FALSE(whole.maps.confidence.empty());
+  EXPECT_EQ(bands.maps.confidence, whole.maps.confidence);
   ASSERT_EQ(bands.maps.residual.size(), whole.maps.residual.size());
   ASSERT_EQ(bands.maps.hidden_share.size(), whole.maps.hidden_share.size());
   ASSERT_EQ(bands.maps.radiance.values.size(), whole.maps.radiance.values.size());
@@ -204,7 +206,7 @@ TEST(SceneBands, AreAsManyAsTheMemoryAsksFor) {
   options.threads = 1;
   std::vector<float> middle;
   SceneViewSink sink;
-  sink.take = [&](int k, int l, const model::LinearPicture& view) {
+  sink.take = [&](int k, int l, const model::LinearPicture& view, const std::vector<Confidence>&) {
     if (k == 1 && l == 1) middle = view.values;
   };
   SceneSummary whole, bands;
@@ -230,13 +232,18 @@ TEST(SceneViews, ComeOneByOneAndAreTheLightField) {
   SceneOptions options;
   options.threads = 3;
   SceneSummary summary, of_all;
-  const model::LightField all = EstimateScene(input, options, &of_all, nullptr);
+  SceneMaps maps;
+  const model::LightField all = EstimateScene(input, options, &of_all, &maps);
   std::mutex mutex;
   std::map<std::pair<int, int>, std::vector<model::LinearPicture>> views;
   SceneViewSink sink;
-  sink.take = [&](int k, int l, const model::LinearPicture& view) {
+  sink.take = [&](int k, int l, const model::LinearPicture& view,
+                  const std::vector<Confidence>& confidence) {
     const std::lock_guard<std::mutex> lock(mutex);
     views[{k, l}].push_back(view);
+    EXPECT_TRUE(std::equal(confidence.begin(), confidence.end(),
+                           maps.confidence.begin() + (l * 3 + k) * 40 * 36));
+    EXPECT_EQ(confidence.size(), 40 * 36u);
   };
   const model::LightField described = EstimateSceneViews(input, options, sink, &summary, nullptr);
   EXPECT_TRUE(described.values.empty());
@@ -252,7 +259,9 @@ TEST(SceneViews, ComeOneByOneAndAreTheLightField) {
     ASSERT_EQ(taken.size(), 1u);
     EXPECT_EQ(taken[0].values, model::ViewPicture(all, place.first, place.second).values);
   }
-  sink.take = [](int, int, const model::LinearPicture&) { throw Interrupted(); };
+  sink.take = [](int, int, const model::LinearPicture&, const std::vector<Confidence>&) {
+    throw Interrupted();
+  };
   EXPECT_THROW(EstimateSceneViews(input, options, sink, &summary, nullptr), Interrupted);
 }
 

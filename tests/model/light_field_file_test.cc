@@ -77,6 +77,7 @@ TEST(LightFieldFile, ReadsWhatIsThere) {
   EXPECT_THAT(light_field.values, IsEmpty());
   EXPECT_THAT(light_field.present, IsEmpty());
   EXPECT_EQ(relative.view_format, "png");
+  EXPECT_FALSE(relative.has_confidence);
   EXPECT_THAT(relative.camera_file, IsEmpty());
 
   const LightFieldDescription described =
@@ -104,6 +105,7 @@ TEST(LightFieldFile, KnowsMissingViews) {
 }
 
 TEST(LightFieldFile, EveryErrorNamesItsPlace) {
+  EXPECT_THAT(ErrorWithMore("confidence_format: tiff\n"), HasSubstr("png"));
   EXPECT_THAT(ErrorWith("view_format", "view_fromat"),
               AllOf(StartsWith("l.yaml:5:1"), HasSubstr("did you mean 'view_format'")));
   EXPECT_THAT(ErrorWith("light-field/1", "light-field/2"), StartsWith("l.yaml:1:9"));
@@ -191,6 +193,7 @@ LightFieldDescription Everything() {
                         "tv",         1.7e-3 / 7,
                         1.0 / 255,    57};
   description.view_format = "tiff";
+  description.has_confidence = true;
   description.camera_file = "a camera: #1.yaml";
   return description;
 }
@@ -244,6 +247,7 @@ TEST(LightFieldFile, RoundTripKeepsEveryBit) {
   EXPECT_EQ(b.origin.version, "0.2.0");
   EXPECT_EQ(b.origin.date, "2024-01-02T03:04:05Z");
   EXPECT_EQ(after.view_format, "tiff");
+  EXPECT_TRUE(after.has_confidence);
   EXPECT_EQ(after.camera_file, "a camera: #1.yaml");
 }
 

@@ -1,4 +1,5 @@
 // thicklens estimate with its default solver, as a person meets it.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -121,6 +122,57 @@ class EstimateSceneTest : public ::testing::Test {
   TemporaryFolder scratch_;
 };
 
+// A near strip before a far wall.
+double Strip(int x, int) { return x >= 40 && x < 60 ? 1 : -0.5; }
+
+model::StoredPicture ConfidenceFile(const std::string& folder, int k, int l) {
+  return ToStoredPicture(
+      ReadPictureFile(fmt::format("{}/confidence/view_{:02}_{:02}.png", folder, l, k)));
+}
+
+TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
+  const json summary = Summary(
+      {Picture(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3", "--threads", "2"});
+  std::size_t filled = 0, whole = 0;
+  for (int l = 0; l < 3; ++l) {
+    for (int k = 0; k < 3; ++k) {
+      const model::StoredPicture rays = ConfidenceFile(Output(), k, l);
+      ASSERT_EQ(rays.channels, 1);
+      ASSERT_EQ(rays.bits, 8);
+      ASSERT_EQ(rays.width_px, kW);
+      ASSERT_EQ(rays.height_px, kH);
+      filled += static_cast<std::size_t>(std::count(rays.values.begin(), rays.values.end(), 0));
+      whole += static_cast<std::size_t>(std::count(rays.values.begin(), rays.values.end(), 255));
+    }
+  }
+  EXPECT_GT(filled, 0u);
+  constexpr double kRays = 9.0 * kW * kH;
+  EXPECT_NEAR(summary["rays"]["filled_in_share"], static_cast<double>(filled) / kRays, 1e-9);
+  EXPECT_NEAR(summary["rays"]["seen_share"], static_cast<double>(whole) / kRays, 1e-9);
+  // One step to the right the strip stands one px to the left, the wall half a px to the right.
+  const model::StoredPicture right = ConfidenceFile(Output(), 2, 1);
+  const auto row = right.values.begin() + 32 * kW;
+  EXPECT_EQ(row[50], 255);
+  EXPECT_EQ(row[59], 0);
+  EXPECT_EQ(row[20], 255);
+  // The folder is read as before.
+  EXPECT_EQ(ReadLightField(Output(), {}).u_count, 3);
+}
+
+TEST_F(EstimateSceneTest, WritesTheSameConfidenceWithAPageAndByOtherSolvers) {
+  const Arguments usual = {Picture(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3"};
+  Summary(usual);
+  const model::StoredPicture streamed = ConfidenceFile(Output(), 0, 2);
+  for (const Arguments& more : {Arguments{"--report", Report()},
+                                {"--solver", "blocks"},
+                                {"--solver", "functional"},
+                                {"--solver", "grid"}}) {
+    fs::remove_all(Output());
+    Summary(With(usual, more));
+    EXPECT_EQ(ConfidenceFile(Output(), 0, 2).values, streamed.values) << more[1];
+  }
+}
+
 TEST_F(EstimateSceneTest, IsTheDefaultAndSaysWhatItDid) {
   ProgramResult result;
   const json summary = Summary(With(Usual(), {"--threads", "2"}), &result);
@@ -146,6 +198,12 @@ TEST_F(EstimateSceneTest, IsTheDefaultAndSaysWhatItDid) {
   EXPECT_GT(summary["iterations"].get<int>(), 0);
   EXPECT_LE(summary["relative_residual"].get<double>(), 1e-4);
   EXPECT_GT(summary["residual_rms"].get<double>(), 0);
+  double of_rays = 0;
+  for (const auto& [kind, share] : summary["rays"].items()) {
+    EXPECT_GE(share.get<double>(), 0) << kind;
+    of_rays += share.get<double>();
+  }
+  EXPECT_NEAR(of_rays, 1, 1e-9);
   for (const char* share : {"row_share", "hidden_share", "clipped_fraction"}) {
     EXPECT_GE(summary.at(share).get<double>(), 0) << share;
     EXPECT_LE(summary.at(share).get<double>(), 1) << share;

@@ -16,6 +16,7 @@
 
 #include "build_info.h"
 #include "commands.h"
+#include "confidence_files.h"
 #include "estimate_input.h"
 #include "estimate_options.h"
 #include "estimate_records.h"
@@ -83,9 +84,11 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
         estimator::EstimateScene(input, settings, &scene, &outcome->maps, backend.get());
   } else {
     estimator::SceneViewSink sink;
-    sink.take = [writer](int k, int l, const model::LinearPicture& view) {
+    sink.take = [writer](int k, int l, const model::LinearPicture& view,
+                         const std::vector<estimator::Confidence>& confidence) {
       ThrowIfInterrupted();
       writer->WriteView(k, l, view);
+      writer->WriteConfidence(k, l, confidence, view.width_px);
     };
     sink.bytes = writer->BytesForView(static_cast<double>(input.picture.values.size()));
     outcome->light_field =
@@ -143,6 +146,20 @@ void Solve(const EstimateOptions& options, const estimator::EstimateInput& input
   if (options.solver == "scene") return SolveScene(options, input, progress, writer, outcome);
   if (options.by_blocks()) return SolveBlocks(options, input, progress, outcome);
   SolveFunctional(options, input, progress, outcome);
+}
+
+// What was not written as it was made.
+void WriteRays(const EstimateOptions& options, const estimator::EstimateInput& input,
+               const EstimateOutcome& outcome, LightFieldWriter* writer) {
+  const model::LightField& light_field = outcome.light_field;
+  if (light_field.values.empty()) return;
+  WriteViews(light_field, writer);
+  if (outcome.scene) {
+    WriteConfidence(outcome.maps.confidence, light_field.u_count, light_field.s_count,
+                    light_field.t_count, writer);
+  } else {
+    WriteConfidence(input, options.common.threads, writer);
+  }
 }
 
 // The photograph's disparity as the page shows it, px per view step.
@@ -206,11 +223,12 @@ CommandResult Estimate(const EstimateOptions& options) {
   ThrowIfInterrupted();
 
   const auto files_start = Clock::now();
-  if (!outcome.light_field.values.empty()) WriteViews(outcome.light_field, &writer);
+  WriteRays(options, prepared.input, outcome, &writer);
   const std::size_t clipped = writer.Finish(outcome.light_field);
   outcome.clipped_fraction =
       static_cast<double>(clipped) /
       static_cast<double>(outcome.light_field.ViewStart(outcome.light_field.channels, 0, 0));
+  outcome.confidence = estimator::SharesOf(writer.confidence_counts());
   outcome.seconds.files += SecondsSince(files_start);
   outcome.seconds.total = SecondsSince(start);
 

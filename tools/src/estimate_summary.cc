@@ -158,9 +158,7 @@ std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
   const estimator::SceneSummary& scene = *outcome.scene;
   return fmt::format("solver       scene: {}\n", scene.message) +
          fmt::format("picture      noise {:.2f} grey levels, explained to {:.2f} (rms)\n",
-                     kGreyLevels * scene.noise_sigma, kGreyLevels * scene.residual_rms) +
-         fmt::format("occlusions   {:.1f} % of the rays are not seen from the centre\n",
-                     100 * scene.hidden_share);
+                     kGreyLevels * scene.noise_sigma, kGreyLevels * scene.residual_rms);
 }
 
 std::string AccuracyText(const EstimateOutcome& outcome) {
@@ -172,6 +170,15 @@ std::string AccuracyText(const EstimateOutcome& outcome) {
   return fmt::format("accuracy     relative residual {:.1e} after {} iterations{}\n",
                      iterations.relative_residual, iterations.count,
                      iterations.converged ? "" : ", not converged");
+}
+
+std::string ConfidenceText(const estimator::ConfidenceShares& of_rays) {
+  return fmt::format(
+      "rays         {:.1f} % seen, {:.1f} % seen in part, {:.1f} % blurred too strongly for "
+      "details, "
+      "{:.1f} % filled in\n",
+      100 * of_rays.seen, 100 * of_rays.partly_seen, 100 * of_rays.blurred,
+      100 * of_rays.filled_in);
 }
 
 std::string DepthText(const PreparedEstimate& prepared) {
@@ -263,6 +270,11 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
               {"holes_filled", prepared.depth.holes},
               {"holes_share", HoleShare(prepared)},
               {"clipped_fraction", outcome.clipped_fraction},
+              {"rays",
+               {{"seen_share", outcome.confidence.seen},
+                {"partly_seen_share", outcome.confidence.partly_seen},
+                {"blurred_share", outcome.confidence.blurred},
+                {"filled_in_share", outcome.confidence.filled_in}}},
               {"disparity",
                {{"min_px", least_px},
                 {"max_px", most_px},
@@ -294,6 +306,7 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
   text += fmt::format("device       {}, {} thread(s)\n", summary["device"].get<std::string>(),
                       summary["threads"].get<int>());
   text += AccuracyText(outcome);
+  text += ConfidenceText(outcome.confidence);
   text += fmt::format(
       "time         {:.2f} s: set-up {:.2f}, solve {:.2f}, views {:.2f}, files {:.2f}\n",
       seconds.total, seconds.setup, seconds.solve, seconds.views, seconds.files);

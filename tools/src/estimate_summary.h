@@ -11,6 +11,7 @@
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/ray_confidence.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field.h"
 
@@ -32,7 +33,8 @@ struct EstimateOutcome {
   std::optional<estimator::EstimateSummary> blocks;
   std::optional<estimator::FunctionalSummary> functional;  // `grid`, too
   EstimateSeconds seconds;
-  double clipped_fraction = 0;  // of the values, by the views' files
+  double clipped_fraction = 0;             // of the values, by the views' files
+  estimator::ConfidenceShares confidence;  // of all rays
 
   // What the estimate can know of itself.
   estimator::StepCheck steps;

@@ -32,6 +32,14 @@ void CopyValues(const cv::Mat& picture, std::vector<std::uint16_t>* values) {
   }
 }
 
+std::string PngFile(const cv::Mat& values, const std::vector<int>& settings) {
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".png", values, bytes, settings)) {
+    throw Error("a picture could not be encoded as PNG");
+  }
+  return {bytes.begin(), bytes.end()};
+}
+
 }  // namespace
 
 cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
@@ -96,11 +104,18 @@ std::string EncodePng(const model::StoredPicture& picture) {
   // and make pictures of 16 bits no larger; those of 8 bits have repetitions, which they miss.
   std::vector<int> settings;
   if (picture.bits == 8) settings = {cv::IMWRITE_PNG_COMPRESSION, 1};
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", SwapRedAndBlue(values), bytes, settings)) {
-    throw Error("a picture could not be encoded as PNG");
+  return PngFile(SwapRedAndBlue(values), settings);
+}
+
+std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px) {
+  const auto width = static_cast<std::size_t>(width_px);
+  if (width_px < 1 || bytes.empty() || bytes.size() % width != 0) {
+    throw Error(
+        fmt::format("a picture of bytes: {} bytes are not rows of {} px", bytes.size(), width_px));
   }
-  return {bytes.begin(), bytes.end()};
+  const cv::Mat values(static_cast<int>(bytes.size() / width), width_px, CV_8U,
+                       const_cast<std::uint8_t*>(bytes.data()));  // NOLINT: only read
+  return PngFile(values, {});
 }
 
 }  // namespace thicklens::tools

@@ -38,6 +38,7 @@ namespace fs = std::filesystem;
 
 constexpr char kCameraFile[] = "camera.yaml";
 constexpr char kViewsFolder[] = "views";
+constexpr char kConfidenceFolder[] = "confidence";
 constexpr char kHciStem[] = "input_Cam";
 constexpr int kMaxHciNumber = 999999;
 constexpr char kHciSignature[] = "# Written by thicklens.\n";
@@ -419,6 +420,7 @@ std::vector<std::string> LightFieldEntries() {
     for (const char* u : {"[0-9][0-9]", "[0-9][0-9][0-9]"}) {
       for (const char* format : {"png", "tiff"})
         entries.push_back(fmt::format("{}/view_{}_{}.{}", kViewsFolder, v, u, format));
+      entries.push_back(fmt::format("{}/view_{}_{}.png", kConfidenceFolder, v, u));
     }
   }
   return entries;
@@ -452,9 +454,23 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view)
   seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+void LightFieldWriter::WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
+                                       int width_px) {
+  const auto start = std::chrono::steady_clock::now();
+  folder_->Write(fmt::format("{}/{}.png", kConfidenceFolder, model::ViewFileStem(k, l)),
+                 EncodeBytesPng(confidence, width_px));
+  std::array<std::size_t, 256> counts{};
+  for (const std::uint8_t value : confidence) ++counts[value];
+  const std::lock_guard<std::mutex> lock(mutex_);
+  has_confidence_ = true;
+  for (std::size_t i = 0; i < counts.size(); ++i) confidence_counts_[i] += counts[i];
+  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 std::size_t LightFieldWriter::Finish(const model::LightField& light_field) {
   model::LightFieldDescription description;
   description.view_format = NameOf(format_);
+  description.has_confidence = has_confidence_;
   if (light_field.camera) {
     description.camera_file = kCameraFile;
     folder_->Write(kCameraFile, model::CameraToYaml(*light_field.camera));

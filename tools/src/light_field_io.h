@@ -1,7 +1,9 @@
 #ifndef THICKLENS_TOOLS_LIGHT_FIELD_IO_H_
 #define THICKLENS_TOOLS_LIGHT_FIELD_IO_H_
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -45,12 +47,16 @@ class LightFieldWriter {
                    model::OutputFolder* folder);
 
   void WriteView(int k, int l, const model::LinearPicture& view);
+  // One byte a ray, row by row (docs/file-formats.md); of all views or of none.
+  void WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence, int width_px);
   // After the last view. The light field's values are not looked at. Returns how many values were
   // clipped.
   std::size_t Finish(const model::LightField& light_field);
 
   // What it holds besides a view of so many values while it writes it.
   double BytesForView(double values) const;
+  // How many rays have each confidence.
+  const std::array<std::size_t, 256>& confidence_counts() const { return confidence_counts_; }
   double seconds() const { return seconds_; }  // spent on views, of all threads together
 
  private:
@@ -59,6 +65,8 @@ class LightFieldWriter {
   model::OutputFolder* folder_;
   std::mutex mutex_;
   std::size_t clipped_ = 0;
+  std::array<std::size_t, 256> confidence_counts_{};
+  bool has_confidence_ = false;
   double seconds_ = 0;
 };
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/ray_confidence.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
@@ -82,12 +83,14 @@ struct SceneSummary {
   int bands = 1;
 };
 
-// What the estimate knows of itself, picture-sized.
+// What the estimate knows of itself; picture-sized but for the last.
 struct SceneMaps {
   model::LinearPicture radiance;     // of the scene's points, as the centre view shows them
   std::vector<float> residual;       // H r - I in stored values, the channels' mean
   std::vector<float> hidden_share;   // of the aperture, that sees a pixel past an edge
   std::vector<float> blur_sigma_px;  // of the photograph, by the depth
+  // Of all rays, view by view, row by row; only of EstimateScene.
+  std::vector<Confidence> confidence;
 };
 
 // The light field of one picture as a whole: the radiance r of the points that the centre view
@@ -120,7 +123,9 @@ model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& 
 // Takes the views one by one as they are made: each once, in any order, from several threads at the
 // same time. May throw to stop.
 struct SceneViewSink {
-  std::function<void(int k, int l, const model::LinearPicture& view)> take;
+  std::function<void(int k, int l, const model::LinearPicture& view,
+                     const std::vector<Confidence>& confidence)>
+      take;
   double bytes = 0;  // that it needs for one view while it has it
 };
 // EstimateScene without ever holding all views; what comes back has none.

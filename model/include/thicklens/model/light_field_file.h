@@ -10,9 +10,10 @@ namespace thicklens::model {
 // lightfield.yaml, schema thicklens/light-field/1 (docs/file-formats.md): all of a light field but
 // its values. The camera is a file of its own beside it.
 struct LightFieldDescription {
-  LightField light_field;   // without values; `camera` is left out
-  std::string view_format;  // "png" (16 bit, stored values) or "tiff" (float, linear light)
-  std::string camera_file;  // relative to the description; empty: none
+  LightField light_field;       // without values; `camera` is left out
+  std::string view_format;      // "png" (16 bit, stored values) or "tiff" (float, linear light)
+  bool has_confidence = false;  // of each ray: confidence/view_VV_UU.png
+  std::string camera_file;      // relative to the description; empty: none
 };
 
 // "view_VV_UU" without the ending: two digits each, more where needed.

@@ -1,0 +1,95 @@
+#include "thicklens/estimator/ray_confidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+
+#include "estimate_input.h"
+#include "ray_landing.h"
+#include "scene_data.h"
+#include "scene_projection.h"
+#include "seen_share.h"
+#include "thicklens/estimator/estimate_checks.h"
+#include "thicklens/model/parallel.h"
+#include "view_fan.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr Confidence kLeastUnresolved = 1, kLeastResolved = 129;
+constexpr int kShares = 126;  // steps from the least to the most of either kind
+
+}  // namespace
+
+Confidence ConfidenceOfPoint(double seen_share, double blur_sigma_px) {
+  const int least = blur_sigma_px > kUnresolvedBlurSigmaPx ? kLeastUnresolved : kLeastResolved;
+  return static_cast<Confidence>(least + std::lround(std::clamp(seen_share, 0.0, 1.0) * kShares));
+}
+
+double SeenShareOf(Confidence confidence) {
+  if (confidence == kFilledIn) return 0;
+  const int least = IsResolved(confidence) ? kLeastResolved : kLeastUnresolved;
+  return (confidence - least) / static_cast<double>(kShares);
+}
+
+bool IsResolved(Confidence confidence) { return confidence >= kLeastResolved; }
+
+ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts) {
+  constexpr double kSeenWhole = 0.99;
+  ConfidenceShares shares;
+  const double all = static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
+  for (std::size_t value = 0; value < counts.size(); ++value) {
+    if (counts[value] == 0) continue;
+    const auto confidence = static_cast<Confidence>(value);
+    double* share = &shares.partly_seen;
+    if (confidence == kFilledIn) {
+      share = &shares.filled_in;
+    } else if (!IsResolved(confidence)) {
+      share = &shares.blurred;
+    } else if (SeenShareOf(confidence) > kSeenWhole) {
+      share = &shares.seen;
+    }
+    *share += static_cast<double>(counts[value]) / all;
+  }
+  return shares;
+}
+
+std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads) {
+  CheckInput(input);
+  DisparityMap disparity = input.disparity;
+  if (input.grid) {
+    disparity = PhotographDisparity(disparity, LandingStepPx(*input.camera, *input.grid));
+  }
+  threads = model::ResolveThreads(threads);
+  const ViewFan fan = RenderFan(disparity, input.weights, threads, nullptr);
+  const std::vector<float> seen = SeenShare(fan, disparity, threads);
+  const std::vector<float> blur_sigma_px = BlurSigmaPx(disparity, input.weights);
+  std::vector<Confidence> confidence(seen.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    confidence[i] = ConfidenceOfPoint(static_cast<double>(seen[i]),
+                                      static_cast<double>(blur_sigma_px[i]));
+  }
+  return confidence;
+}
+
+std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
+                                      const ViewDisparity& view) {
+  std::vector<Confidence> confidence(view.disparity.size(), kFilledIn);
+  const auto width = static_cast<std::size_t>(view.width_px);
+  for (int y = 0; y < view.height_px; ++y) {
+    for (int x = 0; x < view.width_px; ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+      if (view.seen[i] != Seen::kSeen) continue;
+      const auto nearest = [](int sample, float way, int count) {
+        const long at = std::lround(static_cast<float>(sample) + way);
+        return static_cast<std::size_t>(std::clamp(at, 0L, static_cast<long>(count) - 1));
+      };
+      confidence[i] = of_points[nearest(y, view.source_y[i], view.height_px) * width +
+                                nearest(x, view.source_x[i], view.width_px)];
+    }
+  }
+  return confidence;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,20 @@
+#ifndef THICKLENS_TOOLS_CONFIDENCE_FILES_H_
+#define THICKLENS_TOOLS_CONFIDENCE_FILES_H_
+
+#include <vector>
+
+#include "light_field_io.h"
+#include "thicklens/estimator/ray_confidence.h"
+
+namespace thicklens::tools {
+
+// The confidence of all rays, view by view.
+void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_count, int width_px,
+                     int height_px, LightFieldWriter* writer);
+
+// The same of an estimate whose solver does not tell it: by the depth alone.
+void WriteConfidence(const estimator::EstimateInput& input, int threads, LightFieldWriter* writer);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_CONFIDENCE_FILES_H_
