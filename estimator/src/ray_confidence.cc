@@ -38,7 +38,8 @@ bool IsResolved(Confidence confidence) { return confidence >= kLeastResolved; }
 ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts) {
   constexpr double kSeenWhole = 0.99;
   ConfidenceShares shares;
-  const double all = static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
+  const double all =
+      static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
   for (std::size_t value = 0; value < counts.size(); ++value) {
     if (counts[value] == 0) continue;
     const auto confidence = static_cast<Confidence>(value);
@@ -67,8 +68,8 @@ std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads)
   const std::vector<float> blur_sigma_px = BlurSigmaPx(disparity, input.weights);
   std::vector<Confidence> confidence(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    confidence[i] = ConfidenceOfPoint(static_cast<double>(seen[i]),
-                                      static_cast<double>(blur_sigma_px[i]));
+    confidence[i] =
+        ConfidenceOfPoint(static_cast<double>(seen[i]), static_cast<double>(blur_sigma_px[i]));
   }
   return confidence;
 }

@@ -13,23 +13,24 @@ namespace {
 // Views of one picture, on a device or on the processor; by many threads.
 class ViewMaker {
  public:
-  ViewMaker(const model::LinearPicture& picture, const DisparityMap& map,
-            kernels::Backend* backend)
+  ViewMaker(const model::LinearPicture& picture, const DisparityMap& map, kernels::Backend* backend)
       : picture_(picture) {
     if (backend == nullptr || !backend->is_opencl()) {
       native_.emplace(picture, map);
       return;
     }
-    on_device_ = backend->NewWarp({picture.width_px, picture.height_px, picture.channels,
-                                   &picture.values, &map.disparity,
-                                   static_cast<float>(SurfaceTolerance(map))});
+    on_device_ =
+        backend->NewWarp({picture.width_px, picture.height_px, picture.channels, &picture.values,
+                          &map.disparity, static_cast<float>(SurfaceTolerance(map))});
   }
 
   model::LinearPicture Make(const ViewDisparity& view) {
     if (native_) return native_->Warp(view);
+    model::LinearPicture made{picture_.width_px, picture_.height_px, picture_.channels, {}};
+    made.values.resize(picture_.values.size());
     const std::lock_guard<std::mutex> lock(mutex_);  // a device has one queue
-    return {picture_.width_px, picture_.height_px, picture_.channels,
-            on_device_->Warp({&view.disparity, &view.source_x, &view.source_y})};
+    on_device_->Warp({&view.disparity, &view.source_x, &view.source_y}, &made.values);
+    return made;
   }
 
  private:

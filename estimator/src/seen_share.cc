@@ -29,10 +29,10 @@ bool FindAround(float at, int count, Around* around) {
 bool ComesThrough(const FanView& view, const DisparityMap& map, float tolerance, int x, int y) {
   const float disparity = map.disparity[Index(y) * Index(map.width_px) + Index(x)];
   Around across, down;
-  if (!FindAround(static_cast<float>(x) - static_cast<float>(view.shift.x()) * disparity, map.width_px,
-              &across) ||
-      !FindAround(static_cast<float>(y) - static_cast<float>(view.shift.y()) * disparity, map.height_px,
-              &down)) {
+  if (!FindAround(static_cast<float>(x) - static_cast<float>(view.shift.x()) * disparity,
+                  map.width_px, &across) ||
+      !FindAround(static_cast<float>(y) - static_cast<float>(view.shift.y()) * disparity,
+                  map.height_px, &down)) {
     return false;
   }
   const auto agrees = [&](int tap_x, int tap_y) {  // a hidden sample is NaN

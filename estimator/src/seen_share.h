@@ -10,8 +10,8 @@ namespace thicklens::estimator {
 
 // The share of the aperture, by its weights, that sees each point p of the centre view through the
 // photograph. The ray of the view (a, b) meets it at p - D (a, b); it is the point's if the
-// disparity rendered into that view is the point's at one of the pixels around (a surface's edge may
-// run between them). Rays that miss the photograph by more than half a pixel see nothing.
+// disparity rendered into that view is the point's at one of the pixels around (a surface's edge
+// may run between them). Rays that miss the photograph by more than half a pixel see nothing.
 // `disparity` is the fan's.
 std::vector<float> SeenShare(const ViewFan& fan, const DisparityMap& disparity, int threads);
 

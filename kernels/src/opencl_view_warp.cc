@@ -48,20 +48,21 @@ DeviceMemory Copied(OpenClQueue* queue, const char* what, const std::vector<floa
 class OpenClWarp : public ViewWarp {
  public:
   OpenClWarp(std::unique_ptr<OpenClQueue> queue, const SurfacePicture& picture,
-             const TapRanges& ranges)
+             const TapRanges& ranges, int lanes)
       : queue_(std::move(queue)),
+        lanes_(lanes),
         picture_(picture),
         planes_(Copied(queue_.get(), "picture of surfaces", PlanesOf(picture))),
         disparity_(Copied(queue_.get(), "disparity of a picture", *picture.disparity)),
         lowest_(Copied(queue_.get(), "least disparities", ranges.lowest)),
         highest_(Copied(queue_.get(), "largest disparities", ranges.highest)) {}
 
-  std::vector<float> Warp(const ViewSources& view) override {
+  void Warp(const ViewSources& view, std::vector<float>* values) override {
     CheckView(picture_, view);
     const SurfacesArgument surfaces{picture_.width_px, picture_.height_px, picture_.channels,
                                     picture_.tolerance,
                                     static_cast<cl_float>(picture_.width_px + picture_.height_px)};
-    std::vector<float> values(picture_.values->size());
+    values->resize(picture_.values->size());
     OpenClCall(queue_.get(), "WarpView")
         .Value(surfaces)
         .OnDevice(planes_)
@@ -71,13 +72,13 @@ class OpenClWarp : public ViewWarp {
         .Input("disparity of a view", *view.disparity)
         .Input("sources of a view across", *view.source_x)
         .Input("sources of a view down", *view.source_y)
-        .Output("view", &values)
-        .Run(view.disparity->size());
-    return values;
+        .Output("view", values)
+        .Run(Index((picture_.width_px + lanes_ - 1) / lanes_) * Index(picture_.height_px));
   }
 
  private:
   const std::unique_ptr<OpenClQueue> queue_;
+  const int lanes_;  // samples of an item
   const SurfacePicture picture_;
   const DeviceMemory planes_, disparity_, lowest_, highest_;
 };
@@ -88,8 +89,9 @@ std::unique_ptr<ViewWarp> NewOpenClWarp(std::shared_ptr<const OpenClDevice> devi
                                         const cl::Program& program, const SurfacePicture& picture) {
   const TapRanges ranges = TapRangesOf(picture);
   const HostMemory memory = HostMemoryOf(*device);
+  const int lanes = FormOf(*device, sizeof(float)).lanes;
   return std::make_unique<OpenClWarp>(
-      std::make_unique<OpenClQueue>(std::move(device), program, memory), picture, ranges);
+      std::make_unique<OpenClQueue>(std::move(device), program, memory), picture, ranges, lanes);
 }
 
 }  // namespace thicklens::kernels

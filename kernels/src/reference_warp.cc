@@ -45,11 +45,11 @@ class ReferenceWarp : public ViewWarp {
   explicit ReferenceWarp(const SurfacePicture& picture)
       : picture_(picture), ranges_(TapRangesOf(picture)) {}
 
-  std::vector<float> Warp(const ViewSources& view) override {
+  void Warp(const ViewSources& view, std::vector<float>* values) override {
     CheckView(picture_, view);
     const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
-    std::vector<float> values;
-    values.reserve(picture_.values->size());
+    values->clear();
+    values->reserve(picture_.values->size());
     for (int y = 0; y < picture_.height_px; ++y) {
       for (int x = 0; x < picture_.width_px; ++x) {
         const std::size_t i = At(x, y);
@@ -57,16 +57,14 @@ class ReferenceWarp : public ViewWarp {
         const Place down = PlaceAt(y, (*view.source_y)[i], picture_.height_px, limit_px);
         const float disparity = (*view.disparity)[i];
         const std::size_t there = At(across.pixel, down.pixel);
-        const bool cubic =
-            IsOnSurface(ranges_.lowest[there], disparity) &&
-            IsOnSurface(ranges_.highest[there], disparity);
+        const bool cubic = IsOnSurface(ranges_.lowest[there], disparity) &&
+                           IsOnSurface(ranges_.highest[there], disparity);
         for (int channel = 0; channel < picture_.channels; ++channel) {
-          values.push_back(cubic ? Cubic(across, down, channel)
-                                 : Linear(across, down, disparity, channel));
+          values->push_back(cubic ? Cubic(across, down, channel)
+                                  : Linear(across, down, disparity, channel));
         }
       }
     }
-    return values;
   }
 
  private:

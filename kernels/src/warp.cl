@@ -25,34 +25,27 @@ float4 CatmullRom(float t) {
                   ((-1.5f * t + 2) * t + 0.5f) * t, (0.5f * t - 0.5f) * t * t);
 }
 
-// One item a sample, of all channels.
-kernel void WarpView(const Surfaces picture, global const float* planes,
-                     global const float* disparity, global const float* lowest,
-                     global const float* highest, global const float* view_disparity,
-                     global const float* source_x, global const float* source_y,
-                     global float* values) {
-  const int sample = (int)get_global_id(0);
-  if (sample >= picture.width_px * picture.height_px) return;
+// One sample, of all channels, at x, y of the view.
+void WarpSample(const Surfaces picture, global const float* planes, global const float* disparity,
+                global const float* lowest, global const float* highest, int sample_x, int sample_y,
+                float d, float source_x, float source_y, global float* values) {
   float rest_x, rest_y;
-  const int x = PixelBefore(sample % picture.width_px, source_x[sample], picture.width_px,
-                            picture.limit_px, &rest_x);
-  const int y = PixelBefore(sample / picture.width_px, source_y[sample], picture.height_px,
-                            picture.limit_px, &rest_y);
-  const float d = view_disparity[sample];
+  const int x = PixelBefore(sample_x, source_x, picture.width_px, picture.limit_px, &rest_x);
+  const int y = PixelBefore(sample_y, source_y, picture.height_px, picture.limit_px, &rest_y);
   const int there = y * picture.width_px + x;
   const int stride = picture.width_px + 3;
   const size_t plane = (size_t)stride * (picture.height_px + 3);
   global const float* tap = planes + (size_t)y * stride + x;  // at -1, -1
-  values += (size_t)sample * picture.channels;
 
   if (fabs(lowest[there] - d) <= picture.tolerance && fabs(highest[there] - d) <= picture.tolerance) {
     const float4 weight_x = CatmullRom(rest_x);
     const float4 weight_y = CatmullRom(rest_y);
     for (int channel = 0; channel < picture.channels; ++channel, tap += plane) {
-      const float4 down = weight_y.s0 * vload4(0, tap) + weight_y.s1 * vload4(0, tap + stride) +
-                          weight_y.s2 * vload4(0, tap + 2 * stride) +
-                          weight_y.s3 * vload4(0, tap + 3 * stride);
-      values[channel] = dot(weight_x, down);
+      float4 sum = weight_y.s0 * vload4(0, tap);
+      sum = mad(weight_y.s1, vload4(0, tap + stride), sum);
+      sum = mad(weight_y.s2, vload4(0, tap + 2 * stride), sum);
+      sum = weight_x * mad(weight_y.s3, vload4(0, tap + 3 * stride), sum);
+      values[channel] = (sum.s0 + sum.s1) + (sum.s2 + sum.s3);
     }
     return;
   }
@@ -82,5 +75,23 @@ kernel void WarpView(const Surfaces picture, global const float* planes,
   tap += stride + 1;
   for (int channel = 0; channel < picture.channels; ++channel, tap += plane) {
     values[channel] = dot(share, (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
+  }
+}
+
+// One item LANES samples of a row: see filter.cl.
+kernel void WarpView(const Surfaces picture, global const float* planes,
+                     global const float* disparity, global const float* lowest,
+                     global const float* highest, global const float* view_disparity,
+                     global const float* source_x, global const float* source_y,
+                     global float* values) {
+  const int items_in_row = (picture.width_px + LANES - 1) / LANES;
+  const int y = (int)get_global_id(0) / items_in_row;
+  if (y >= picture.height_px) return;
+  const int first = (int)get_global_id(0) % items_in_row * LANES;
+  const int last = min(first + LANES, picture.width_px);
+  for (int x = first; x < last; ++x) {
+    const int sample = y * picture.width_px + x;
+    WarpSample(picture, planes, disparity, lowest, highest, x, y, view_disparity[sample],
+               source_x[sample], source_y[sample], values + (size_t)sample * picture.channels);
   }
 }

@@ -55,9 +55,8 @@ struct Simulated {
   model::LightField truth;
 };
 Simulated Simulate(const std::string& scene, double noise_grey_levels, const Arguments& arguments) {
-  model::SceneSimulationOptions options =
-      model::ReadSceneSimulation(std::string(THICKLENS_SOURCE_DIR "/configs/scenes/") + scene +
-                                 ".yaml");
+  model::SceneSimulationOptions options = model::ReadSceneSimulation(
+      std::string(THICKLENS_SOURCE_DIR "/configs/scenes/") + scene + ".yaml");
   options.noise_sigma_grey_levels = noise_grey_levels;
   const model::SceneSimulator simulator(options, {});
   const model::SceneRun run{arguments.threads, {}};
@@ -82,8 +81,7 @@ Row Measure(const Simulated& simulated, const std::string& scene, double noise_g
   options.prior = estimator::PriorFromName(prior);
   options.threads = arguments.threads;
   estimator::SceneSummary summary;
-  const model::LightField estimate =
-      estimator::EstimateScene(input, options, &summary, nullptr);
+  const model::LightField estimate = estimator::EstimateScene(input, options, &summary, nullptr);
   const estimator::DibrInput dibr{
       estimator::WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights,
                                 arguments.threads),
@@ -105,11 +103,12 @@ Row Measure(const Simulated& simulated, const std::string& scene, double noise_g
 }
 
 void Print(const Row& row) {
-  std::cout << fmt::format("| {:<8} | {:>5.1f} | {:<8} | {:>8.2f} | {:>6.2f} | {:>+6.2f} | {:>+6.2f} "
-                           "| {:>3} of {:<3} | {:>5.2f} |\n",
-                           row.scene, row.noise_grey_levels, row.prior, row.psnr_db,
-                           row.dibr_psnr_db, row.psnr_db - row.dibr_psnr_db, row.worst_gain_db,
-                           row.views_above_dibr, row.views, row.seconds)
+  std::cout << fmt::format(
+                   "| {:<8} | {:>5.1f} | {:<8} | {:>8.2f} | {:>6.2f} | {:>+6.2f} | {:>+6.2f} "
+                   "| {:>3} of {:<3} | {:>5.2f} |\n",
+                   row.scene, row.noise_grey_levels, row.prior, row.psnr_db, row.dibr_psnr_db,
+                   row.psnr_db - row.dibr_psnr_db, row.worst_gain_db, row.views_above_dibr,
+                   row.views, row.seconds)
             << std::flush;
 }
 

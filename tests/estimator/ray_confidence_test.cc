@@ -15,8 +15,8 @@
 namespace thicklens::estimator {
 namespace {
 
-using testing::ErrorOf;
 using ::testing::Each;
+using testing::ErrorOf;
 using ::testing::HasSubstr;
 
 constexpr int kW = 30, kH = 24;
@@ -151,8 +151,8 @@ TEST(RayConfidence, ComesWithTheSceneSolver) {
   ASSERT_EQ(maps.confidence.size(), 9 * of_points.size());
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
-      const auto first = maps.confidence.begin() +
-                         (l * 3 + k) * static_cast<std::ptrdiff_t>(of_points.size());
+      const auto first =
+          maps.confidence.begin() + (l * 3 + k) * static_cast<std::ptrdiff_t>(of_points.size());
       EXPECT_EQ(std::vector<Confidence>(first, first + kW * kH),
                 RayConfidence(of_points, RenderDisparity(input.disparity, k - 1, l - 1)))
           << k << ", " << l;

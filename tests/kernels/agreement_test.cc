@@ -144,10 +144,9 @@ class FaultyWarp : public ViewWarp {
  public:
   FaultyWarp(Fault fault, const SurfacePicture& picture)
       : fault_(std::move(fault)), native_(NewReferenceWarp(picture)) {}
-  std::vector<float> Warp(const ViewSources& view) override {
-    std::vector<float> values = native_->Warp(view);
-    if (fault_.method == "WarpView") values[7] += static_cast<float>(fault_.amount);
-    return values;
+  void Warp(const ViewSources& view, std::vector<float>* values) override {
+    native_->Warp(view, values);
+    if (fault_.method == "WarpView") (*values)[7] += static_cast<float>(fault_.amount);
   }
 
  private:

@@ -30,11 +30,14 @@ class ViewWarpTest : public ::testing::TestWithParam<const char*> {
   std::vector<float> Warp(int channels = 1) {
     picture_ = {kW, kH, channels, &values_, &disparity_, 0.3F};
     const auto backend = OpenBackend(ParseDeviceRequest(GetParam()), nullptr);
-    return backend->NewWarp(picture_)->Warp({&of_view_, &source_x_, &source_y_});
+    std::vector<float> values;
+    backend->NewWarp(picture_)->Warp({&of_view_, &source_x_, &source_y_}, &values);
+    return values;
   }
   void FillPolynomial() {  // cubic interpolation is exact for squares
     for (int y = 0; y < kH; ++y) {
-      for (int x = 0; x < kW; ++x) values_[At(x, y)] = Polynomial(static_cast<float>(x), static_cast<float>(y));
+      for (int x = 0; x < kW; ++x)
+        values_[At(x, y)] = Polynomial(static_cast<float>(x), static_cast<float>(y));
     }
   }
   static float Polynomial(float x, float y) {

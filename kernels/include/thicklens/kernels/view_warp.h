@@ -30,8 +30,9 @@ struct ViewSources {
 class ViewWarp {
  public:
   virtual ~ViewWarp() = default;
-  // As SurfacePicture::values. Throws Error for sizes that do not fit, and what a device reports.
-  virtual std::vector<float> Warp(const ViewSources& view) = 0;
+  // Sets `values`, as SurfacePicture has them, in the memory that they have. Throws Error for sizes
+  // that do not fit, and what a device reports.
+  virtual void Warp(const ViewSources& view, std::vector<float>* values) = 0;
 };
 
 // In C++, plainly: the specification of a device's. Keeps the picture by reference. Throws Error
