@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
 
 #include "surface_taps.h"
 #include "thicklens/model/parallel.h"
@@ -12,41 +15,84 @@ namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Sums what falls on the same pixel, in the order of the first time.
+template <typename Real>
+struct Band {
+  std::vector<std::int32_t> pixel, runs;  // of each row, and how many runs it has
+  std::vector<std::int32_t> index;        // of each run
+  std::vector<Real> weight;
+};
+
+// Sums what falls on the same pixel.
+template <typename Real>
 class Gatherer {
  public:
-  explicit Gatherer(std::size_t pixels) : slot_(pixels, -1) {}
+  // Rows of the picture lie stride_px apart.
+  Gatherer(int stride_px, int height_px)
+      : sum_(Index(stride_px) * Index(height_px), Real{0}),
+        stride_(Index(stride_px)),
+        extent_(Index(height_px)),
+        first_row_(height_px) {}
 
-  void Add(std::size_t pixel, double weight) {
-    if (slot_[pixel] < 0) {
-      slot_[pixel] = static_cast<std::int32_t>(pixels_.size());
-      pixels_.push_back(static_cast<std::int32_t>(pixel));
-      weights_.push_back(0);
-    }
-    weights_[static_cast<std::size_t>(slot_[pixel])] += weight;
+  void Add(int row, int column, Real weight) {
+    const std::size_t at = PlaceOf(row, column);
+    sum_[at] += weight;
+    Extend(row, at, at + 1);
   }
 
-  template <typename Real>
-  void MoveTo(std::vector<std::int32_t>* index, std::vector<Real>* weight) {
-    for (std::size_t i = 0; i < pixels_.size(); ++i) {
-      index->push_back(pixels_[i]);
-      weight->push_back(static_cast<Real>(weights_[i]));
-      slot_[static_cast<std::size_t>(pixels_[i])] = -1;
+  // To the pixel and the one at its right.
+  void Add(int row, int column, Real weight, Real weight_right) {
+    const std::size_t at = PlaceOf(row, column);
+    sum_[at] += weight;
+    sum_[at + 1] += weight_right;
+    Extend(row, at, at + 2);
+  }
+
+  // All sums to the end of a band, as the runs of one row.
+  void MoveTo(Band<Real>* band) {
+    const std::size_t before = band->index.size();
+    for (int row = first_row_; row <= last_row_; ++row) {
+      MoveRuns(extent_[Index(row)], band);
+      extent_[Index(row)] = {};
     }
-    pixels_.clear();
-    weights_.clear();
+    band->runs.push_back(static_cast<std::int32_t>(band->index.size() - before));
+    first_row_ = static_cast<int>(extent_.size());
+    last_row_ = -1;
   }
 
  private:
-  std::vector<std::int32_t> slot_;  // of each pixel of the picture, or -1
-  std::vector<std::int32_t> pixels_;
-  std::vector<double> weights_;
-};
+  // The places of a row of the picture that have a sum lie in [first, end).
+  struct Extent {
+    std::size_t first = std::numeric_limits<std::size_t>::max(), end = 0;
+  };
 
-template <typename Real>
-struct Band {
-  std::vector<std::int32_t> pixel, length, index;
-  std::vector<Real> weight;
+  std::size_t PlaceOf(int row, int column) const { return Index(row) * stride_ + Index(column); }
+
+  void Extend(int row, std::size_t first, std::size_t end) {
+    Extent& extent = extent_[Index(row)];
+    extent.first = std::min(extent.first, first);
+    extent.end = std::max(extent.end, end);
+    first_row_ = std::min(first_row_, row);
+    last_row_ = std::max(last_row_, row);
+  }
+
+  // What is moved is 0 afterwards, so that runs need not end with the extent.
+  void MoveRuns(const Extent& extent, Band<Real>* band) {
+    constexpr std::size_t kPixels = kernels::kPixelsOfRun;
+    for (std::size_t at = extent.first; at < extent.end; ++at) {
+      if (sum_[at] == 0) continue;
+      const auto first = sum_.begin() + static_cast<std::ptrdiff_t>(at);
+      const auto last = first + static_cast<std::ptrdiff_t>(kPixels);
+      band->index.push_back(static_cast<std::int32_t>(at));
+      band->weight.insert(band->weight.end(), first, last);
+      std::fill(first, last, Real{0});
+      at += kPixels - 1;
+    }
+  }
+
+  std::vector<Real> sum_;  // of each pixel of the picture
+  std::size_t stride_;
+  std::vector<Extent> extent_;
+  int first_row_ = 0, last_row_ = -1;
 };
 
 const FanView::Hidden& HiddenAt(const FanView& view, std::size_t i) {
@@ -55,12 +101,46 @@ const FanView::Hidden& HiddenAt(const FanView& view, std::size_t i) {
       [](const FanView::Hidden& h, std::size_t at) { return Index(h.index) < at; });
 }
 
+// The taps of the ray with this source, as TapsAt has them.
+template <typename Real>
+void AddTaps(const DisparityMap& map, double tolerance, double x, double y, float disparity,
+             double weight, Gatherer<Real>* gatherer) {
+  const double inside_y = std::clamp(y, 0.0, map.height_px - 1.0);
+  const int row = static_cast<int>(inside_y);
+  const std::size_t below = Index(row + 1) * Index(map.width_px);
+  // Most rays read four pixels of one surface.
+  if (x >= 0 && x < map.width_px - 1 && y >= 0 && y < map.height_px - 1) {
+    const int column = static_cast<int>(x);
+    const std::size_t under = below + Index(column);
+    const std::size_t pixel = under - Index(map.width_px);
+    const auto is_near = [&](std::size_t p) {
+      return std::abs(static_cast<double>(map.disparity[p]) - disparity) <= tolerance;
+    };
+    if (is_near(pixel) && is_near(pixel + 1) && is_near(under) && is_near(under + 1)) {
+      const double right = x - column;
+      const double lower = weight * (y - row), upper = weight - lower;
+      gatherer->Add(row, column, static_cast<Real>(upper - upper * right),
+                    static_cast<Real>(upper * right));
+      gatherer->Add(row + 1, column, static_cast<Real>(lower - lower * right),
+                    static_cast<Real>(lower * right));
+      return;
+    }
+  }
+  const SurfaceTaps taps = TapsAt(map, tolerance, x, y, disparity);
+  for (std::size_t t = 0; t < Index(taps.count); ++t) {
+    const bool is_below = taps.pixel[t] >= below;
+    const std::size_t first = is_below ? below : below - Index(map.width_px);
+    gatherer->Add(is_below ? row + 1 : row, static_cast<int>(taps.pixel[t] - first),
+                  static_cast<Real>(weight * taps.weight[t]));
+  }
+}
+
 template <typename Real>
 void FillBand(const ViewFan& fan, const DisparityMap& map,
-              const std::vector<unsigned char>& is_product, int first_row, int last_row,
-              Band<Real>* band) {
+              const std::vector<unsigned char>& is_product, int stride_px, int first_row,
+              int last_row, Band<Real>* band) {
   const double tolerance = SurfaceTolerance(map);
-  Gatherer gatherer(map.disparity.size());
+  Gatherer<Real> gatherer(stride_px, map.height_px);
   for (int y = first_row; y < last_row; ++y) {
     for (int x = 0; x < fan.width_px; ++x) {
       const std::size_t i = Index(y) * Index(fan.width_px) + Index(x);
@@ -75,15 +155,11 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
           source_y = hidden.source_y;
           disparity = hidden.disparity;
         }
-        const SurfaceTaps taps = TapsAt(map, tolerance, x + static_cast<double>(source_x),
-                                        y + static_cast<double>(source_y), disparity);
-        for (int t = 0; t < taps.count; ++t)
-          gatherer.Add(taps.pixel[Index(t)], view.weight * taps.weight[Index(t)]);
+        AddTaps(map, tolerance, x + static_cast<double>(source_x),
+                y + static_cast<double>(source_y), disparity, view.weight, &gatherer);
       }
-      const std::size_t before = band->index.size();
-      gatherer.MoveTo(&band->index, &band->weight);
       band->pixel.push_back(static_cast<std::int32_t>(i));
-      band->length.push_back(static_cast<std::int32_t>(band->index.size() - before));
+      gatherer.MoveTo(band);
     }
   }
   // All bands are held at once, and half of what they reserved may be empty.
@@ -91,43 +167,52 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
   band->weight.shrink_to_fit();
 }
 
+template <typename T>
+void Append(std::vector<T>* from, std::vector<T>* to) {
+  to->insert(to->end(), from->begin(), from->end());
+  *from = {};
+}
+
 }  // namespace
 
 template <typename Real>
-kernels::PixelRows<Real> RowsOf(const ViewFan& fan, const DisparityMap& disparity,
+kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,
                                 const std::vector<unsigned char>& is_product, int threads) {
+  kernels::PixelRuns<Real> runs;
+  runs.width_px = fan.width_px;
+  runs.height_px = fan.height_px;
   constexpr int kBandRows = 32;
   const int bands = (fan.height_px + kBandRows - 1) / kBandRows;
   std::vector<Band<Real>> parts(Index(bands));
   model::ParallelFor(bands, threads, [&](int n) {
-    FillBand(fan, disparity, is_product, n * kBandRows,
+    FillBand(fan, disparity, is_product, runs.stride_px(), n * kBandRows,
              std::min((n + 1) * kBandRows, fan.height_px), &parts[Index(n)]);
   });
-  kernels::PixelRows<Real> rows;
-  rows.pixels = fan.width_px * fan.height_px;
-  rows.start.push_back(0);
-  std::size_t entries = 0, count = 0;
+  std::size_t weights = 0, count = 0, rows = 0;
   for (const Band<Real>& part : parts) {
-    entries += part.index.size();
-    count += part.pixel.size();
+    weights += part.weight.size();
+    count += part.index.size();
+    rows += part.pixel.size();
   }
-  rows.index.reserve(entries);
-  rows.weight.reserve(entries);
-  rows.pixel.reserve(count);
-  rows.start.reserve(count + 1);
+  runs.weight.reserve(weights);
+  runs.index.reserve(count);
+  runs.pixel.reserve(rows);
+  runs.run.reserve(rows + 1);
+  runs.run.push_back(0);
   for (Band<Real>& part : parts) {
-    rows.pixel.insert(rows.pixel.end(), part.pixel.begin(), part.pixel.end());
-    for (const std::int32_t length : part.length) rows.start.push_back(rows.start.back() + length);
-    rows.index.insert(rows.index.end(), part.index.begin(), part.index.end());
-    rows.weight.insert(rows.weight.end(), part.weight.begin(), part.weight.end());
+    for (const std::int32_t of_row : part.runs) runs.run.push_back(runs.run.back() + of_row);
+    Append(&part.pixel, &runs.pixel);
+    Append(&part.index, &runs.index);
+    Append(&part.weight, &runs.weight);
     part = {};
   }
-  return rows;
+  kernels::SetBands(&runs);
+  return runs;
 }
 
-template kernels::PixelRows<float> RowsOf(const ViewFan&, const DisparityMap&,
+template kernels::PixelRuns<float> RunsOf(const ViewFan&, const DisparityMap&,
                                           const std::vector<unsigned char>&, int);
-template kernels::PixelRows<double> RowsOf(const ViewFan&, const DisparityMap&,
+template kernels::PixelRuns<double> RunsOf(const ViewFan&, const DisparityMap&,
                                            const std::vector<unsigned char>&, int);
 
 }  // namespace thicklens::estimator

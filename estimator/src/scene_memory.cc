@@ -1,9 +1,11 @@
 #include "scene_memory.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "run_cost.h"
+#include "thicklens/kernels/picture_filter.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
@@ -54,14 +56,16 @@ double SceneMemory::MostBytes(int rows, double operator_bytes) const {
 }
 
 double SceneMemory::RowBytes() const {
-  constexpr double kTaps = 16, kForms = 2;  // of a ray; as rows, and transposed
+  // A ray reads two pixels of each of two rows; what the pixel's rays read in a row of the picture
+  // is held in runs.
+  constexpr double kRun = kernels::kPixelsOfRun;
   const double around = 2.0 * reach_px_ + 1;
-  const double entries = std::min(kTaps * seen_views_, around * around);
-  return entries * (real_ + sizeof(std::int32_t)) * kForms;
+  const double runs = std::min(2.0 * seen_views_, around * std::ceil(around / kRun));
+  return runs * (kRun * real_ + sizeof(std::int32_t));
 }
 
 double SceneMemory::LargestBytesPerPixel() const {
-  constexpr double kIndexBytes = 2 * (sizeof(std::int64_t) + sizeof(std::int32_t));
+  constexpr double kIndexBytes = sizeof(std::int64_t) + sizeof(std::int32_t);
   const double products = std::min(u_count_, v_count_);
   return RowBytes() + kIndexBytes + products * 2 * real_ * (2.0 * reach_px_ + 3);
 }

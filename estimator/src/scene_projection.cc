@@ -31,18 +31,6 @@ std::vector<Product> ProductsOf(const Eigen::ArrayXXd& weights) {
   return products;
 }
 
-template <typename Real>
-double MebibytesOf(const kernels::PixelFilter<Real>& filter) {
-  return static_cast<double>(filter.coefficients.size() * sizeof(Real)) / (1 << 20);
-}
-
-template <typename Real>
-double MebibytesOf(const kernels::PixelRows<Real>& rows) {
-  return static_cast<double>(rows.index.size() * (sizeof(Real) + sizeof(std::int32_t)) +
-                             rows.start.size() * sizeof(std::int64_t)) /
-         (1 << 20);
-}
-
 std::vector<float> HiddenShare(const ViewFan& fan, std::size_t pixels) {
   std::vector<double> share(pixels, 0.0);
   for (const FanView& view : fan.views) {
@@ -69,7 +57,7 @@ void SceneProjection<Real>::Apply(const Real* x, int channels, Real* y) const {
                    threads);
     for (std::size_t i = 0; t > 0 && i < size; ++i) y[i] += other_[i];
   }
-  kernels::ApplyRows(rows, in, out, threads);
+  kernels::ApplyRuns(rows, in, out, threads);
 }
 
 template <typename Real>
@@ -101,7 +89,7 @@ void SceneProjection<Real>::ApplyTransposed(const Real* y, int channels, Real* x
       for (std::size_t i = 0; i < size; ++i) x[i] += sum[i];
     }
   }
-  kernels::AddRows(rows_transposed, {y, stride, channels}, out, threads);
+  kernels::AddTransposed(rows, {y, stride, channels}, out, threads);
 }
 
 template <typename Real>
@@ -130,10 +118,11 @@ std::size_t SceneProjection<Real>::pixels_with_row(int first_row, int last_row) 
 template <typename Real>
 double SceneProjection<Real>::bytes(int first_row, int last_row) const {
   const auto [first, last] = RowsOfOwn(first_row, last_row);
-  constexpr std::size_t kForms = 2;  // as rows, and transposed
-  std::size_t sum = static_cast<std::size_t>(rows.start[last] - rows.start[first]) * kForms *
-                        (sizeof(Real) + sizeof(std::int32_t)) +
-                    (last - first) * kForms * (sizeof(std::int64_t) + sizeof(std::int32_t));
+  const auto first_run = static_cast<std::size_t>(rows.run[first]);
+  const auto last_run = static_cast<std::size_t>(rows.run[last]);
+  std::size_t sum =
+      (last_run - first_run) * (kernels::kPixelsOfRun * sizeof(Real) + sizeof(std::int32_t)) +
+      (last - first) * (sizeof(std::int64_t) + sizeof(std::int32_t));
   for (const Term& term : terms) {
     for (const kernels::PixelFilter<Real>* filter : {&term.across, &term.down}) {
       const auto start = [&](int row) {
@@ -171,8 +160,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                                  product.down, options.between, options.threads)});
     }
   }
-  projection.rows = RowsOf<Real>(fan, disparity, is_product, options.threads);
-  projection.rows_transposed = kernels::Transposed(projection.rows);
+  projection.rows = RunsOf<Real>(fan, disparity, is_product, options.threads);
   return projection;
 }
 

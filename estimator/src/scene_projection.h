@@ -35,7 +35,7 @@ class SceneProjection {
   int width_px = 0, height_px = 0;
   int threads = 1;
   std::vector<Term> terms;  // none: every pixel has a row
-  kernels::PixelRows<Real> rows, rows_transposed;
+  kernels::PixelRuns<Real> rows;
   // Share of the aperture that sees each pixel through samples hidden from the centre view, 0 to 1.
   std::vector<float> hidden_share;
   // Share of the aperture that sees each point of the centre view; only where it was asked for.

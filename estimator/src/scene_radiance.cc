@@ -111,7 +111,6 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph, Dispar
     data_.filters.products.push_back({&term.across, &term.down});
   }
   data_.filters.rows = &projection_.rows;
-  data_.filters.rows_transposed = &projection_.rows_transposed;
   data_.photograph = Planar<Real>(photograph);
   slope_squared_ = SlopeSquared(photograph);
   data_.weight = DataWeights(slope_squared_, projection_.hidden_share, run_.options.hidden_weights);

@@ -68,7 +68,7 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
 
 // The rows of the pixels that are no product, linear between the pixels of a ray's surface.
 template <typename Real>
-kernels::PixelRows<Real> RowsOf(const ViewFan& fan, const DisparityMap& disparity,
+kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,
                                 const std::vector<unsigned char>& is_product, int threads);
 
 }  // namespace thicklens::estimator

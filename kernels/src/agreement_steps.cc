@@ -61,12 +61,11 @@ class StepsComparison {
   StepsComparison()
       : across_(MakeFilter<Real>(Axis::kAcross, &numbers_)),
         down_(MakeFilter<Real>(Axis::kDown, &numbers_)),
-        rows_(MakeRows<Real>(&numbers_)),
-        rows_transposed_(Transposed(rows_)) {
+        rows_(RunsOf(MakeRows<Real>(&numbers_), kWidth)) {
     data_.width_px = kWidth;
     data_.height_px = kHeight;
     data_.channels = kChannels;
-    data_.filters = {{{&across_, &down_}}, &rows_, &rows_transposed_};
+    data_.filters = {{{&across_, &down_}}, &rows_};
     data_.projection.apply = [this](const Real* x, int channels, Real* y) {
       Project(x, channels, y);
     };
@@ -104,7 +103,7 @@ class StepsComparison {
     std::vector<Real> between(Index(channels) * kPixels);
     Apply(across_, {x, kPixels, channels}, {between.data(), kPixels, channels}, 1);
     Apply(down_, {between.data(), kPixels, channels}, {y, kPixels, channels}, 1);
-    ApplyRows(rows_, {x, kPixels, channels}, {y, kPixels, channels}, 1);
+    ApplyRuns(rows_, {x, kPixels, channels}, {y, kPixels, channels}, 1);
   }
 
   void ProjectTransposed(const Real* y, int channels, Real* x) {
@@ -118,7 +117,7 @@ class StepsComparison {
     ApplyTransposed(down_, {without_rows.data(), kPixels, channels},
                     {between.data(), kPixels, channels}, 1);
     ApplyTransposed(across_, {between.data(), kPixels, channels}, {x, kPixels, channels}, 1);
-    AddRows(rows_transposed_, {y, kPixels, channels}, {x, kPixels, channels}, 1);
+    AddTransposed(rows_, {y, kPixels, channels}, {x, kPixels, channels}, 1);
   }
 
   template <typename Work>
@@ -156,7 +155,7 @@ class StepsComparison {
 
   Numbers numbers_;
   const PixelFilter<Real> across_, down_;
-  const PixelRows<Real> rows_, rows_transposed_;
+  const PixelRuns<Real> rows_;
   DataTerm<Real> data_;
   std::unique_ptr<RadianceSteps<Real>> device_, native_;
   Worst* worst_ = nullptr;

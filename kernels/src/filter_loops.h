@@ -17,13 +17,13 @@ struct FilterTerm {
   const Real* x = nullptr;
 };
 
-// Rows [first, last) of a PixelRows.
+// Rows [first, last) of a PixelRuns.
 template <typename Real>
-struct RowRange {
+struct RunRange {
   const std::int32_t* pixel = nullptr;
-  const std::int64_t* start = nullptr;
-  const std::int32_t* index = nullptr;
-  const Real* weight = nullptr;
+  const std::int64_t* run = nullptr;    // of each row its first
+  const std::int32_t* index = nullptr;  // of each run
+  const Real* weight = nullptr;         // kPixelsOfRun of each run
   std::size_t first = 0, last = 0;
 };
 
@@ -37,14 +37,12 @@ struct FilterLoops {
   void (*sum_terms)(const FilterTerm<Real>* terms, int term_count, std::ptrdiff_t ahead,
                     std::ptrdiff_t x_stride, int channels, int count, Real* y,
                     std::ptrdiff_t y_stride);
-  // to[4 p + c] = x[c x_stride + p], p < count; 0 from `channels` (<= 4) on.
-  void (*interleave)(const Real* x, std::ptrdiff_t x_stride, int channels, std::size_t count,
-                     Real* to);
-  // y(pixel) = sum weight x(index), added to y(pixel) if `add`. One channel.
-  void (*sum_row_entries)(const RowRange<Real>& rows, const Real* x, bool add, Real* y);
-  // The same for up to 4 channels of y, x interleaved.
-  void (*sum_row_entries_of_4)(const RowRange<Real>& rows, const Real* x, bool add, int channels,
-                               Real* y, std::ptrdiff_t y_stride);
+  // y(pixel) = sum weight x of each row, for up to 4 channels.
+  void (*sum_runs)(const RunRange<Real>& rows, const Real* x, std::ptrdiff_t x_stride, int channels,
+                   Real* y, std::ptrdiff_t y_stride);
+  // The transposed: x += weight y(pixel).
+  void (*spread_runs)(const RunRange<Real>& rows, const Real* y, std::ptrdiff_t y_stride,
+                      int channels, Real* x, std::ptrdiff_t x_stride);
   // Sum of x y w (w may be null: 1).
   double (*dot)(const Real* x, const Real* y, const Real* w, std::size_t count);
 };

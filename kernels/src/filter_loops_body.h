@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "filter_loops.h"
+#include "thicklens/kernels/picture_filter.h"
 
 // The loops of filter_loops.h, for the processor that the including file is compiled for; each of
 // these has its own copy (hence the namespace without a name).
@@ -118,72 +119,105 @@ void SumTerms(const FilterTerm<Real>* terms, int term_count, std::ptrdiff_t ahea
 }
 
 template <typename Real, int kChannels>
-void InterleaveOf(const Real* x, std::ptrdiff_t x_stride, std::size_t count, Real* to) {
-  for (std::size_t p = 0; p < count; ++p) {
-    for (int c = 0; c < kMostChannels; ++c) {
-      to[kMostChannels * p + static_cast<std::size_t>(c)] =
-          c < kChannels ? x[c * x_stride + static_cast<std::ptrdiff_t>(p)] : Real{0};
-    }
-  }
-}
-
-template <typename Real>
-void Interleave(const Real* x, std::ptrdiff_t x_stride, int channels, std::size_t count, Real* to) {
-  switch (channels) {
-    case 1:
-      return InterleaveOf<Real, 1>(x, x_stride, count, to);
-    case 2:
-      return InterleaveOf<Real, 2>(x, x_stride, count, to);
-    case 3:
-      return InterleaveOf<Real, 3>(x, x_stride, count, to);
-    default:
-      return InterleaveOf<Real, 4>(x, x_stride, count, to);
-  }
-}
-
-// Entries are added in four sums, so that one need not wait for the one before.
-template <typename Real>
-void SumRowEntries(const RowRange<Real>& rows, const Real* x, bool add, Real* y) {
+void SumRunsOf(const RunRange<Real>& rows, const Real* x, std::ptrdiff_t x_stride, Real* y,
+               std::ptrdiff_t y_stride) {
+  using Vector = typename VectorOf<Real, kVectorBytes>::Type;
+  constexpr int kLanes = kVectorBytes / static_cast<int>(sizeof(Real));
   for (std::size_t r = rows.first; r < rows.last; ++r) {
-    const std::int64_t end = rows.start[r + 1];
-    Real sum[4] = {};
-    std::int64_t e = rows.start[r];
-    for (; e + 4 <= end; e += 4) {
-      for (int i = 0; i < 4; ++i) sum[i] += rows.weight[e + i] * x[rows.index[e + i]];
-    }
-    for (; e < end; ++e) sum[0] += rows.weight[e] * x[rows.index[e]];
-    const Real total = (sum[0] + sum[1]) + (sum[2] + sum[3]);
-    Real* to = y + rows.pixel[r];
-    *to = add ? *to + total : total;
-  }
-}
-
-template <typename Real>
-void SumRowEntriesOf4(const RowRange<Real>& rows, const Real* x, bool add, int channels, Real* y,
-                      std::ptrdiff_t y_stride) {
-  using Vector = typename VectorOf<Real, 4 * static_cast<int>(sizeof(Real))>::Type;
-  for (std::size_t r = rows.first; r < rows.last; ++r) {
-    const std::int64_t end = rows.start[r + 1];
-    Vector sum[4] = {};
-    std::int64_t e = rows.start[r];
-    for (; e + 4 <= end; e += 4) {
+    Vector sum[kChannels] = {};
+    const Real* weight = rows.weight + rows.run[r] * kPixelsOfRun;
+    for (std::int64_t n = rows.run[r]; n < rows.run[r + 1]; ++n) {
+      const Real* from = x + rows.index[n];
 #pragma GCC unroll 4
-      for (int i = 0; i < 4; ++i) {
-        Vector values;
-        Load(x + 4 * static_cast<std::ptrdiff_t>(rows.index[e + i]), &values);
-        sum[i] += rows.weight[e + i] * values;
+      for (int i = 0; i < kPixelsOfRun; i += kLanes, weight += kLanes, from += kLanes) {
+        Vector w;
+        Load(weight, &w);
+#pragma GCC unroll 4
+        for (int c = 0; c < kChannels; ++c) {
+          Vector values;
+          Load(from + c * x_stride, &values);
+          sum[c] += w * values;
+        }
       }
     }
-    for (; e < end; ++e) {
-      Vector values;
-      Load(x + 4 * static_cast<std::ptrdiff_t>(rows.index[e]), &values);
-      sum[0] += rows.weight[e] * values;
+    for (int c = 0; c < kChannels; ++c) {
+      Real total = 0;
+      for (int lane = 0; lane < kLanes; ++lane) total += sum[c][lane];
+      y[c * y_stride + rows.pixel[r]] = total;
     }
-    const Vector total = (sum[0] + sum[1]) + (sum[2] + sum[3]);
-    for (int c = 0; c < channels; ++c) {
-      Real* to = y + c * y_stride + rows.pixel[r];
-      *to = add ? *to + total[c] : total[c];
+  }
+}
+
+template <typename Real, int kChannels>
+inline __attribute__((always_inline)) void SpreadRow(const RunRange<Real>& rows, std::size_t r,
+                                                     const Real* y, std::ptrdiff_t y_stride,
+                                                     Real* x, std::ptrdiff_t x_stride) {
+  using Vector = typename VectorOf<Real, kVectorBytes>::Type;
+  constexpr int kLanes = kVectorBytes / static_cast<int>(sizeof(Real));
+  Real value[kChannels];
+  for (int c = 0; c < kChannels; ++c) value[c] = y[c * y_stride + rows.pixel[r]];
+  const Real* weight = rows.weight + rows.run[r] * kPixelsOfRun;
+  for (std::int64_t n = rows.run[r]; n < rows.run[r + 1]; ++n) {
+    Real* to = x + rows.index[n];
+#pragma GCC unroll 4
+    for (int i = 0; i < kPixelsOfRun; i += kLanes, weight += kLanes, to += kLanes) {
+      // Planes may lie a multiple of 4096 bytes apart, where a processor takes what is read for
+      // what was just written: all is read first.
+      Vector w, sum[kChannels];
+      Load(weight, &w);
+#pragma GCC unroll 4
+      for (int c = 0; c < kChannels; ++c) Load(to + c * x_stride, &sum[c]);
+#pragma GCC unroll 4
+      for (int c = 0; c < kChannels; ++c) {
+        sum[c] += w * value[c];
+        Store(sum[c], to + c * x_stride);
+      }
     }
+  }
+}
+
+// Neighbouring rows reach the same pixels, a little aside: a vector that was just written would be
+// read again in two parts, for which the processor waits. So rows take turns that are a quarter of
+// them apart.
+template <typename Real, int kChannels>
+void SpreadRunsOf(const RunRange<Real>& rows, const Real* y, std::ptrdiff_t y_stride, Real* x,
+                  std::ptrdiff_t x_stride) {
+  constexpr std::size_t kTurns = 4;
+  const std::size_t apart = (rows.last - rows.first + kTurns - 1) / kTurns;
+  for (std::size_t i = 0; i < apart; ++i) {
+    for (std::size_t r = rows.first + i; r < rows.last; r += apart) {
+      SpreadRow<Real, kChannels>(rows, r, y, y_stride, x, x_stride);
+    }
+  }
+}
+
+template <typename Real>
+void SumRuns(const RunRange<Real>& rows, const Real* x, std::ptrdiff_t x_stride, int channels,
+             Real* y, std::ptrdiff_t y_stride) {
+  switch (channels) {
+    case 1:
+      return SumRunsOf<Real, 1>(rows, x, x_stride, y, y_stride);
+    case 2:
+      return SumRunsOf<Real, 2>(rows, x, x_stride, y, y_stride);
+    case 3:
+      return SumRunsOf<Real, 3>(rows, x, x_stride, y, y_stride);
+    default:
+      return SumRunsOf<Real, 4>(rows, x, x_stride, y, y_stride);
+  }
+}
+
+template <typename Real>
+void SpreadRuns(const RunRange<Real>& rows, const Real* y, std::ptrdiff_t y_stride, int channels,
+                Real* x, std::ptrdiff_t x_stride) {
+  switch (channels) {
+    case 1:
+      return SpreadRunsOf<Real, 1>(rows, y, y_stride, x, x_stride);
+    case 2:
+      return SpreadRunsOf<Real, 2>(rows, y, y_stride, x, x_stride);
+    case 3:
+      return SpreadRunsOf<Real, 3>(rows, y, y_stride, x, x_stride);
+    default:
+      return SpreadRunsOf<Real, 4>(rows, y, y_stride, x, x_stride);
   }
 }
 
@@ -226,8 +260,7 @@ double DotLoop(const Real* x, const Real* y, const Real* w, std::size_t count) {
 
 template <typename Real>
 FilterLoops<Real> LoopsOfThisFile() {
-  return {SumTerms<Real>, Interleave<Real>, SumRowEntries<Real>, SumRowEntriesOf4<Real>,
-          DotLoop<Real>};
+  return {SumTerms<Real>, SumRuns<Real>, SpreadRuns<Real>, DotLoop<Real>};
 }
 
 }  // namespace

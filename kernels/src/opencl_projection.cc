@@ -60,7 +60,7 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
                                          const ItemForm& form)
     : queue_(queue), form_(form) {
   const PackedPlane plane = PackedPlaneOf(data.width_px, data.height_px, form.tile);
-  const PixelRows<Real>& rows = *data.filters.rows;
+  const PixelRows<Real> rows = RowsOf(*data.filters.rows);
   int reach = 0;
   const auto pack = [&](const PixelFilter<Real>& filter, bool transposed, bool leave_out) {
     const PackedFilter<Real> packed =
@@ -89,7 +89,7 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
     row_of[Index(rows.pixel[Index(packed.order[i])])] = static_cast<std::int32_t>(i);
   }
   rows_transposed_ = std::make_unique<Rows>(
-      ToDevice(Pack(*data.filters.rows_transposed, row_of, plane, form.slice, data.threads)));
+      ToDevice(Pack(Transposed(rows), row_of, plane, form.slice, data.threads)));
 
   between_ = std::make_unique<DevicePicture<Real>>(queue, "picture between two filters", layout_,
                                                    data.channels);

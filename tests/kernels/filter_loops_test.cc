@@ -62,36 +62,36 @@ TYPED_TEST(FilterLoopsTest, DotsAgree) {
   }
 }
 
-TYPED_TEST(FilterLoopsTest, SumsOfRowEntriesAgree) {
+TYPED_TEST(FilterLoopsTest, RunsAgree) {
   const auto plain = PlainFilterLoops<TypeParam>(), fast = Avx2FilterLoops<TypeParam>();
-  const auto x = RandomPlanes<TypeParam>(200, 1, 3, 1);
+  constexpr int kPixels = 200;
   std::vector<std::int32_t> pixels, indices;
-  std::vector<std::int64_t> start = {0};
+  std::vector<std::int64_t> run = {0};
   std::mt19937 random(4);
-  for (int p = 0; p < 200; ++p) {
+  for (int p = 0; p < kPixels; ++p) {
     pixels.push_back(p);
-    for (auto entries = random() % 14; entries > 0; --entries) {
-      indices.push_back(static_cast<std::int32_t>(random() % 200));
+    for (auto runs = random() % 4; runs > 0; --runs) {
+      indices.push_back(static_cast<std::int32_t>(random() % (kPixels - kPixelsOfRun + 1)));
     }
-    start.push_back(static_cast<std::int64_t>(indices.size()));
+    run.push_back(static_cast<std::int64_t>(indices.size()));
   }
-  const auto weights = RandomPlanes<TypeParam>(static_cast<int>(indices.size()), 1, 1, 5);
-  const RowRange<TypeParam> rows{
-      pixels.data(), start.data(), indices.data(), weights.values.data(), 0, pixels.size()};
-  std::vector<TypeParam> x_plain(800), x_fast(800);
-  plain.interleave(x.values.data(), x.stride, 3, 200, x_plain.data());
-  fast.interleave(x.values.data(), x.stride, 3, 200, x_fast.data());
-  EXPECT_EQ(x_plain, x_fast);
-  for (const bool add : {false, true}) {
-    Planes<TypeParam> y(200, 1, 3, 1), z = y, one_by_one = y;
-    plain.sum_row_entries_of_4(rows, x_plain.data(), add, 3, y.values.data(), y.stride);
-    fast.sum_row_entries_of_4(rows, x_fast.data(), add, 3, z.values.data(), z.stride);
-    plain.sum_row_entries(rows, x.values.data(), add, one_by_one.values.data());
-    fast.sum_row_entries(rows, x.values.data() + x.stride, add,
-                         one_by_one.values.data() + x.stride);
-    for (int p = 0; p < 200; ++p) {
-      for (int c = 0; c < 3; ++c) EXPECT_NEAR(y.at(c, p), z.at(c, p), this->kTolerance);
-      for (int c = 0; c < 2; ++c) EXPECT_NEAR(y.at(c, p), one_by_one.at(c, p), this->kTolerance);
+  const auto weights =
+      RandomPlanes<TypeParam>(kPixelsOfRun * static_cast<int>(indices.size()), 1, 1, 5);
+  const RunRange<TypeParam> rows{pixels.data(),         run.data(), indices.data(),
+                                 weights.values.data(), 0,          kPixels};
+  for (int channels = 1; channels <= 4; ++channels) {
+    const auto x = RandomPlanes<TypeParam>(kPixels, 1, channels, 1);
+    Planes<TypeParam> y(kPixels, 1, channels, kUntouched), z = y;
+    plain.sum_runs(rows, x.values.data(), x.stride, channels, y.values.data(), y.stride);
+    fast.sum_runs(rows, x.values.data(), x.stride, channels, z.values.data(), z.stride);
+    for (std::size_t i = 0; i < y.values.size(); ++i) {
+      ASSERT_NEAR(y.values[i], z.values[i], 4 * this->kTolerance) << i;
+    }
+    Planes<TypeParam> back(kPixels, 1, channels, 1), other = back;
+    plain.spread_runs(rows, x.values.data(), x.stride, channels, back.values.data(), back.stride);
+    fast.spread_runs(rows, x.values.data(), x.stride, channels, other.values.data(), other.stride);
+    for (std::size_t i = 0; i < back.values.size(); ++i) {
+      ASSERT_NEAR(back.values[i], other.values[i], 4 * this->kTolerance) << i;
     }
   }
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <random>
@@ -19,19 +18,12 @@ namespace thicklens::kernels {
 namespace {
 
 using ::thicklens::testing::ErrorOf;
-using ::thicklens::testing::ExpectOutsideUntouched;
-using ::thicklens::testing::kUntouched;
-using ::thicklens::testing::Planes;
 using ::thicklens::testing::RandomPlanes;
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
-class PixelRowsTest : public ::testing::Test {
- protected:
-  // Of sums of some ten numbers below 1.
-  static constexpr double kTolerance = sizeof(Real) == sizeof(float) ? 5e-6 : 1e-14;
-};
+class PixelRowsTest : public ::testing::Test {};
 using Reals = ::testing::Types<float, double>;
 TYPED_TEST_SUITE(PixelRowsTest, Reals);
 
@@ -53,42 +45,6 @@ PixelRows<Real> RandomRows(int pixels, std::uint32_t seed) {
     rows.start.push_back(static_cast<std::int64_t>(rows.index.size()));
   }
   return rows;
-}
-
-TYPED_TEST(PixelRowsTest, RowsAreThePlainSum) {
-  std::uint32_t seed = 100;
-  for (const int pixels : {1, 5, 63, 64, 650}) {
-    for (const int channels : {1, 2, 3, 4, 5, 7}) {
-      const auto rows = RandomRows<TypeParam>(pixels, ++seed);
-      Check(rows);
-      const auto x = RandomPlanes<TypeParam>(pixels, 1, channels, ++seed);
-      Planes<TypeParam> set(pixels, 1, channels, kUntouched);
-      Planes<TypeParam> added = set;
-      ApplyRows(rows, x.in(), set.out(), 2);
-      AddRows(rows, x.in(), added.out(), 2);
-      for (int c = 0; c < channels; ++c) {
-        std::vector<double> plain(Index(x.pixels()), kUntouched), plain_added = plain;
-        for (std::size_t r = 0; r < rows.pixel.size(); ++r) {
-          double sum = 0;
-          for (std::size_t e = Index(rows.start[r]); e < Index(rows.start[r + 1]); ++e) {
-            sum +=
-                static_cast<double>(rows.weight[e]) * static_cast<double>(x.at(c, rows.index[e]));
-          }
-          plain[Index(rows.pixel[r])] = sum;
-          plain_added[Index(rows.pixel[r])] += sum;
-        }
-        for (int p = 0; p < x.pixels(); ++p) {
-          ASSERT_NEAR(set.at(c, p), plain[Index(p)], this->kTolerance)
-              << pixels << " pixels"
-              << ", channel " << c << " of " << channels;
-          // Beside 1234 there are 4 digits less.
-          ASSERT_NEAR(added.at(c, p), plain_added[Index(p)], 100 * this->kTolerance);
-        }
-      }
-      ExpectOutsideUntouched(set);
-      ExpectOutsideUntouched(added);
-    }
-  }
 }
 
 // (row, column) -> values of that entry, in order.
@@ -129,7 +85,7 @@ TYPED_TEST(PixelRowsTest, TransposedRowsAreTheTransposedMatrix) {
   EXPECT_EQ(four_times.weight, twice.weight);
 }
 
-TYPED_TEST(PixelRowsTest, NoRowsDoNothing) {
+TYPED_TEST(PixelRowsTest, NoRowsAreNoneTransposed) {
   PixelRows<TypeParam> none;
   none.pixels = 65;
   none.start = {0};
@@ -137,11 +93,6 @@ TYPED_TEST(PixelRowsTest, NoRowsDoNothing) {
   const PixelRows<TypeParam> transposed = Transposed(none);
   Check(transposed);
   EXPECT_TRUE(transposed.pixel.empty());
-  const auto x = RandomPlanes<TypeParam>(65, 1, 3, 1);
-  Planes<TypeParam> y(65, 1, 3, kUntouched);
-  ApplyRows(none, x.in(), y.out(), 2);
-  AddRows(transposed, x.in(), y.out(), 2);
-  EXPECT_EQ(y.values, std::vector<TypeParam>(y.values.size(), kUntouched));
 }
 
 TYPED_TEST(PixelRowsTest, DotIsThePlainSum) {
@@ -166,34 +117,12 @@ TYPED_TEST(PixelRowsTest, DotIsThePlainSum) {
   }
 }
 
-template <typename Real>
-std::vector<Real> AllResults(int threads) {
-  constexpr int kPixels = 150000;
-  std::vector<Real> results;
-  const auto x = RandomPlanes<Real>(kPixels, 1, 3, 11);
-  const auto rows = RandomRows<Real>(kPixels, 13);
-  for (const int channels : {1, 3}) {
-    Planes<Real> y(kPixels, 1, channels, 1);
-    PictureIn<Real> in = x.in();
-    in.channels = channels;
-    ApplyRows(rows, in, y.out(), threads);
-    AddRows(rows, in, y.out(), threads);
-    results.insert(results.end(), y.values.begin(), y.values.end());
-  }
-  return results;
-}
-
-TYPED_TEST(PixelRowsTest, ThreadsDoNotChangeABit) {
-  const std::vector<TypeParam> one = AllResults<TypeParam>(1);
+TYPED_TEST(PixelRowsTest, ThreadsDoNotChangeADot) {
   const auto x = RandomPlanes<TypeParam>(300001, 1, 1, 3);
   const auto dot = [&](int threads) {
     return Dot(x.values.data(), x.values.data(), x.values.data(), 300001, threads);
   };
   for (const int threads : {2, 3, 7}) {
-    const std::vector<TypeParam> many = AllResults<TypeParam>(threads);
-    ASSERT_EQ(many.size(), one.size());
-    EXPECT_EQ(std::memcmp(many.data(), one.data(), one.size() * sizeof(TypeParam)), 0)
-        << threads << " threads";
     EXPECT_EQ(dot(threads), dot(1)) << threads << " threads";
   }
 }

@@ -101,15 +101,15 @@ class SampleProjection {
       filters_.push_back(SampleFilter<Real>(kernels::Axis::kDown, width, height, 5, ++seed));
       dense_ += DenseOf(filters_[filters_.size() - 1]) * DenseOf(filters_[filters_.size() - 2]);
     }
-    rows_ = SampleRows<Real>(pixels, every, ++seed);
-    rows_transposed_ = kernels::Transposed(rows_);
-    for (std::size_t r = 0; r < rows_.pixel.size(); ++r) {
-      dense_.row(rows_.pixel[r]).setZero();
-      for (auto e = static_cast<std::size_t>(rows_.start[r]);
-           e < static_cast<std::size_t>(rows_.start[r + 1]); ++e) {
-        dense_(rows_.pixel[r], rows_.index[e]) += static_cast<double>(rows_.weight[e]);
+    const kernels::PixelRows<Real> rows = SampleRows<Real>(pixels, every, ++seed);
+    for (std::size_t r = 0; r < rows.pixel.size(); ++r) {
+      dense_.row(rows.pixel[r]).setZero();
+      for (auto e = static_cast<std::size_t>(rows.start[r]);
+           e < static_cast<std::size_t>(rows.start[r + 1]); ++e) {
+        dense_(rows.pixel[r], rows.index[e]) += static_cast<double>(rows.weight[e]);
       }
     }
+    rows_ = kernels::RunsOf(rows, width);
   }
 
   const Eigen::MatrixXd& dense() const { return dense_; }
@@ -121,7 +121,6 @@ class SampleProjection {
       map.products.push_back({&filters_[i], &filters_[i + 1]});
     }
     map.rows = &rows_;
-    map.rows_transposed = &rows_transposed_;
     return map;
   }
 
@@ -172,7 +171,7 @@ class SampleProjection {
  private:
   int width_, height_;
   std::vector<kernels::PixelFilter<Real>> filters_;  // across, down, across, ...
-  kernels::PixelRows<Real> rows_, rows_transposed_;
+  kernels::PixelRuns<Real> rows_;
   Eigen::MatrixXd dense_;
 };
 

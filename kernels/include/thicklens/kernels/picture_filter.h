@@ -44,6 +44,35 @@ struct PixelRows {
 template <typename Real>
 PixelRows<Real> Transposed(const PixelRows<Real>& rows);
 
+// Pixels beside each other that are read together.
+constexpr int kPixelsOfRun = 8;
+
+// The same sums by runs of pixels that lie beside each other, which take less to hold and to read:
+// run n reads the pixels index_n to index_n + kPixelsOfRun - 1 of a copy of the picture whose rows
+// lie stride_px() apart, by weights that may be 0 (and are beyond the picture's row).
+template <typename Real>
+struct PixelRuns {
+  int width_px = 0, height_px = 0;
+  std::vector<std::int32_t> pixel;  // of each row: ascending, none twice
+  std::vector<std::int64_t> run;    // of each row its first; one more than there are rows
+  std::vector<std::int32_t> index;  // of each run
+  std::vector<Real> weight;         // kPixelsOfRun of each run
+  // First rows of bands, and the end: two bands that have one between them read different pixels.
+  std::vector<std::size_t> band;
+
+  // Every row has room behind it for a run that begins in it; and an odd number of parts of 64
+  // bytes (of floats), so that rows and planes do not meet in one place of a cache.
+  int stride_px() const { return ((width_px + kPixelsOfRun + 15) / 16 | 1) * 16; }
+};
+// From all but the bands, which it sets.
+template <typename Real>
+void SetBands(PixelRuns<Real>* runs);
+// One form from the other: entries that follow each other share a run; weights of 0 are left out.
+template <typename Real>
+PixelRuns<Real> RunsOf(const PixelRows<Real>& rows, int width_px);
+template <typename Real>
+PixelRows<Real> RowsOf(const PixelRuns<Real>& runs);
+
 // What a map is applied to: `channels` planes of as many pixels, `plane_stride` apart.
 template <typename Real>
 struct PictureIn {
@@ -58,10 +87,10 @@ struct PictureOut {
   int channels = 1;
 };
 
-// Every function below sets its whole result (ApplyRows: the pixels that have a row, the others
-// are left as they are; AddRows: adds to these), uses up to `threads` threads (>= 1), and gives the
-// same bits for any number of them. In and out are different memory. Sizes and order are taken as
-// right; Check tells them.
+// Every function below sets its whole result (ApplyRuns: the pixels that have a row, the others
+// are left as they are; AddTransposed: adds to it), uses up to `threads` threads (>= 1), and gives
+// the same bits for any number of them. In and out are different memory. Sizes and order are taken
+// as right; Check tells them.
 template <typename Real>
 void Apply(const PixelFilter<Real>& filter, const PictureIn<Real>& x, const PictureOut<Real>& y,
            int threads);
@@ -69,11 +98,12 @@ template <typename Real>
 void ApplyTransposed(const PixelFilter<Real>& filter, const PictureIn<Real>& x,
                      const PictureOut<Real>& y, int threads);
 template <typename Real>
-void ApplyRows(const PixelRows<Real>& rows, const PictureIn<Real>& x, const PictureOut<Real>& y,
+void ApplyRuns(const PixelRuns<Real>& runs, const PictureIn<Real>& x, const PictureOut<Real>& y,
                int threads);
+// x += R^T y.
 template <typename Real>
-void AddRows(const PixelRows<Real>& rows, const PictureIn<Real>& x, const PictureOut<Real>& y,
-             int threads);
+void AddTransposed(const PixelRuns<Real>& runs, const PictureIn<Real>& y, const PictureOut<Real>& x,
+                   int threads);
 
 // Throws Error that names the field if sizes or indices do not fit or a number is not finite.
 template <typename Real>

@@ -28,8 +28,7 @@ struct FilteredMap {
     const PixelFilter<Real>* down = nullptr;
   };
   std::vector<Product> products;  // none: every pixel has a row
-  const PixelRows<Real>* rows = nullptr;
-  const PixelRows<Real>* rows_transposed = nullptr;
+  const PixelRuns<Real>* rows = nullptr;
 };
 
 // What all systems of one photograph have in common: sum_x W(x) |H r - I|^2, all channels alike.
