@@ -1,14 +1,13 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <numeric>
 #include <vector>
 
 #include "bands.h"
 #include "prior_rows.h"
+#include "radiance_loops.h"
 #include "thicklens/kernels/radiance_steps.h"
 
 namespace thicklens::kernels {
@@ -17,39 +16,6 @@ namespace {
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBandRows = 16;  // of a sum, whatever the number of threads
-
-// Sum of x y in double. Eight sums side by side, which a compiler may keep in vectors.
-template <typename Real>
-double RowDot(const Real* x, const Real* y, int count) {
-  constexpr int kLanes = 8;
-  double lanes[kLanes] = {};
-  int i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      lanes[lane] += static_cast<double>(x[i + lane]) * static_cast<double>(y[i + lane]);
-    }
-  }
-  double sum = std::accumulate(lanes, lanes + kLanes, 0.0);
-  for (; i < count; ++i) sum += static_cast<double>(x[i]) * static_cast<double>(y[i]);
-  return sum;
-}
-
-// Sum of m x y.
-template <typename Real>
-double RowDot(const Real* x, const Real* y, const Real* m, int count) {
-  constexpr int kLanes = 8;
-  double lanes[kLanes] = {};
-  int i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      lanes[lane] +=
-          static_cast<double>(x[i + lane] * y[i + lane]) * static_cast<double>(m[i + lane]);
-    }
-  }
-  double sum = std::accumulate(lanes, lanes + kLanes, 0.0);
-  for (; i < count; ++i) sum += static_cast<double>(x[i] * y[i]) * static_cast<double>(m[i]);
-  return sum;
-}
 
 using Sums = std::array<double, 3>;
 
@@ -188,20 +154,11 @@ void NativeSteps<Real>::SetVariation(const TotalVariation<Real>& variation) {
 
 template <typename Real>
 void NativeSteps<Real>::SquaredDifferences(int y, std::vector<Real>* squares) const {
-  const int width = data_.width_px;
   std::fill(squares->begin(), squares->end(), Real(0));
   for (int channel = 0; channel < channels_; ++channel) {
-    const Real* r = x_.data() + Index(channel) * data_.pixels() + Index(y) * Index(width);
-    Real* out = squares->data();
-    for (int i = 0; i + 1 < width; ++i) {
-      const Real across = r[i + 1] - r[i];
-      out[i] += across * across;
-    }
-    if (y + 1 == data_.height_px) continue;
-    for (int i = 0; i < width; ++i) {
-      const Real down = r[i + width] - r[i];
-      out[i] += down * down;
-    }
+    const Real* r = x_.data() + Index(channel) * data_.pixels() + Index(y) * Index(data_.width_px);
+    AddSquaredDifferences(r, y + 1 < data_.height_px ? r + data_.width_px : nullptr, data_.width_px,
+                          squares->data());
   }
 }
 
@@ -217,10 +174,8 @@ void NativeSteps<Real>::TouchVariation() {
     for (int y = y0; y < y1; ++y) {
       const std::size_t row = Index(y) * Index(width);
       SquaredDifferences(y, &room->row);
-      for (int i = 0; i < width; ++i) {
-        const Real s2 = slope_squared_[row + Index(i)];
-        prior_.smoothness[row + Index(i)] = half * s2 / std::sqrt(s2 * room->row[Index(i)] + floor);
-      }
+      TouchRow(slope_squared_.data() + row, room->row.data(), half, floor, width,
+               prior_.smoothness.data() + row);
     }
     return Sums{};
   });
@@ -302,37 +257,29 @@ double NativeSteps<Real>::SquaredRightSide() {
 
 template <typename Real>
 ResidualSums NativeSteps<Real>::UpdateResidual() {
-  const int width = data_.width_px;
-  const PriorRows<Real> prior(prior_, width, data_.height_px);
   const Sums sums = SumRows([&](std::size_t first, std::size_t pixel, int y, Room* room) {
-    Real* row = room->row.data();
-    prior.Multiply(x_.data() + (first - pixel), y, room->across.data(), row);
-    const Real* from = data_residual_.data() + first;
-    for (int i = 0; i < width; ++i) row[i] = from[i] - row[i];
+    MultiplyPriorRow(prior_, data_.width_px, data_.height_px, x_.data() + (first - pixel), y,
+                     room->across.data(), room->row.data());
+    ResidualRow<Real> row;
+    row.data = data_residual_.data() + first;
+    row.prior = room->row.data();
     if (prior_.target_is_photograph) {
-      const Real* target = photograph_->data() + first;
-      const Real* pull = prior_.pull.data() + pixel;
-      for (int i = 0; i < width; ++i) row[i] += pull[i] * target[i];
+      row.pull = prior_.pull.data() + pixel;
+      row.target = photograph_->data() + first;
     }
-    Real* out = residual_.data() + first;
-    const Real* m = inverse_diagonal_.data() + pixel;
-    const Sums of_row{RowDot(row, row, width), RowDot(row, row, m, width),
-                      RowDot(row, out, m, width)};
-    std::copy(row, row + width, out);
-    return of_row;
+    row.inverse_diagonal = inverse_diagonal_.data() + pixel;
+    row.residual = residual_.data() + first;
+    const ResidualSums of_row = UpdateRow(row, data_.width_px);
+    return Sums{of_row.squared, of_row.preconditioned, of_row.with_former};
   });
   return {sums[0], sums[1], sums[2]};
 }
 
 template <typename Real>
 double NativeSteps<Real>::Turn(double beta) {
-  const int width = data_.width_px;
   return SumRows([&](std::size_t first, std::size_t pixel, int, Room*) {
-    Real* p = direction_.data() + first;
-    const Real* r = residual_.data() + first;
-    const Real* m = inverse_diagonal_.data() + pixel;
-    for (int i = 0; i < width; ++i) p[i] = m[i] * r[i] + static_cast<Real>(beta) * p[i];
-    return Sums{RowDot(p, r, width)};
+    return Sums{TurnRow(inverse_diagonal_.data() + pixel, residual_.data() + first,
+                        static_cast<Real>(beta), data_.width_px, direction_.data() + first)};
   })[0];
 }
 
@@ -340,26 +287,21 @@ template <typename Real>
 double NativeSteps<Real>::Curvature() {
   const int width = data_.width_px;
   MultiplyData(direction_, &product_);
-  const PriorRows<Real> prior(prior_, width, data_.height_px);
   const Sums sums = SumRows([&](std::size_t first, std::size_t pixel, int y, Room* room) {
     const Real* p = direction_.data() + first;
-    prior.Multiply(p - pixel, y, room->across.data(), room->row.data());
-    return Sums{RowDot(p, room->row.data(), width), RowDot(p, product_.data() + first, width)};
+    MultiplyPriorRow(prior_, width, data_.height_px, p - pixel, y, room->across.data(),
+                     room->row.data());
+    return Sums{DotRow(p, room->row.data(), width), DotRow(p, product_.data() + first, width)};
   });
   return sums[0] + sums[1];
 }
 
 template <typename Real>
 void NativeSteps<Real>::Advance(double step_along_direction) {
-  const int width = data_.width_px;
   const Real step = static_cast<Real>(step_along_direction);
   SumRows([&](std::size_t first, std::size_t, int, Room*) {
-    Real* to = x_.data() + first;
-    Real* r = data_residual_.data() + first;
-    const Real* p = direction_.data() + first;
-    const Real* take = product_.data() + first;
-    for (int i = 0; i < width; ++i) to[i] += step * p[i];
-    for (int i = 0; i < width; ++i) r[i] -= step * take[i];
+    AdvanceRow(step, direction_.data() + first, product_.data() + first, data_.width_px,
+               x_.data() + first, data_residual_.data() + first);
     return Sums{};
   });
 }
