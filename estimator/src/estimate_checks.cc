@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kPatchPx = 32;
 constexpr double kFarAbove = 4;
+constexpr double kAbove = 1.5;
 constexpr float kMostHidden = 0.01F;
 
 std::size_t Index(int width_px, int x, int y) {
@@ -55,6 +56,30 @@ Patch MeasurePatch(const std::vector<float>& residual, const std::vector<float>&
   return patch;
 }
 
+// The blocks of which enough is seen by the whole aperture.
+std::vector<ResidualPatch> MeasurePatches(const std::vector<float>& residual,
+                                          const std::vector<float>& hidden_share, int width_px,
+                                          int height_px) {
+  const std::size_t pixels =
+      static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  if (residual.size() != pixels || hidden_share.size() != pixels) {
+    throw Error(fmt::format(
+        "residual and hidden_share have {} and {} values: they must have {}, one a pixel",
+        residual.size(), hidden_share.size(), pixels));
+  }
+  std::vector<ResidualPatch> patches;
+  for (int y = 0; y < height_px; y += kPatchPx) {
+    for (int x = 0; x < width_px; x += kPatchPx) {
+      const Patch patch = MeasurePatch(
+          residual, hidden_share, width_px,
+          {x, y, std::min(kPatchPx, width_px - x), std::min(kPatchPx, height_px - y), 0});
+      if (4 * patch.counted < patch.place.width_px * patch.place.height_px) continue;
+      patches.push_back(patch.place);
+    }
+  }
+  return patches;
+}
+
 }  // namespace
 
 StepCheck CheckSteps(const DisparityMap& map, const Eigen::Vector2d& landing_step_px) {
@@ -95,25 +120,10 @@ std::optional<double> DepthNoisePx(const DisparityMap& map) {
 std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
                                            const std::vector<float>& hidden_share, int width_px,
                                            int height_px, double noise_sigma) {
-  const std::size_t pixels =
-      static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
-  if (residual.size() != pixels || hidden_share.size() != pixels) {
-    throw Error(fmt::format(
-        "residual and hidden_share have {} and {} values: they must have {}, one a pixel",
-        residual.size(), hidden_share.size(), pixels));
-  }
-  std::vector<ResidualPatch> patches;
+  std::vector<ResidualPatch> patches = MeasurePatches(residual, hidden_share, width_px, height_px);
   std::vector<double> all;
-  for (int y = 0; y < height_px; y += kPatchPx) {
-    for (int x = 0; x < width_px; x += kPatchPx) {
-      const Patch patch = MeasurePatch(
-          residual, hidden_share, width_px,
-          {x, y, std::min(kPatchPx, width_px - x), std::min(kPatchPx, height_px - y), 0});
-      if (4 * patch.counted < patch.place.width_px * patch.place.height_px) continue;
-      all.push_back(patch.place.rms);
-      patches.push_back(patch.place);
-    }
-  }
+  all.reserve(patches.size());
+  for (const ResidualPatch& patch : patches) all.push_back(patch.rms);
   if (all.empty()) return {};
   const double usual = kFarAbove * std::max(noise_sigma, Median(&all));
   patches.erase(
@@ -123,6 +133,19 @@ std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
   std::stable_sort(patches.begin(), patches.end(),
                    [](const ResidualPatch& a, const ResidualPatch& b) { return a.rms > b.rms; });
   return patches;
+}
+
+std::optional<double> UnexplainedShare(const std::vector<float>& residual,
+                                       const std::vector<float>& hidden_share, int width_px,
+                                       int height_px, double noise_sigma) {
+  const std::vector<ResidualPatch> patches =
+      MeasurePatches(residual, hidden_share, width_px, height_px);
+  if (patches.empty()) return std::nullopt;
+  const double usual = kAbove * noise_sigma;
+  const auto above =
+      std::count_if(patches.begin(), patches.end(),
+                    [usual](const ResidualPatch& patch) { return patch.rms > usual; });
+  return static_cast<double>(above) / static_cast<double>(patches.size());
 }
 
 }  // namespace thicklens::estimator

@@ -207,11 +207,34 @@ TEST_F(ResidualPatchesTest, DoNotCountWhatIsHidden) {
   EXPECT_THAT(Patches(), IsEmpty());
 }
 
+TEST_F(ResidualPatchesTest, UnexplainedShareCountsBlocksAboveTheNoise) {
+  // 7 x 4 blocks, one of them at the right border and four at the lower one.
+  EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 0);
+  // What every block has is no patch, but it is not explained.
+  for (float& value : residual_) value *= 2.5F;
+  EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 1);
+  EXPECT_THAT(Patches(), IsEmpty());
+  for (float& value : residual_) value /= 2.5F;
+  Fill(&residual_, 32, 0, 64, 96, 0.0061F);  // 6 blocks of 28
+  EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 6.0 / 28);
+  EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, 1.1 * kNoise), 0);
+}
+
+TEST_F(ResidualPatchesTest, UnexplainedShareLeavesOutWhatIsHidden) {
+  Fill(&residual_, 32, 0, 64, 96, 0.0061F);
+  Fill(&hidden_share_, 32, 0, 32, 96, 0.5F);  // 3 of the 6
+  EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 3.0 / 25);
+  hidden_share_.assign(kPixels, 1.0F);
+  EXPECT_FALSE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
+}
+
 TEST_F(ResidualPatchesTest, SizesThatDoNotFitAreNamed) {
   EXPECT_THAT(ErrorOf([&] { ResidualPatches(residual_, hidden_share_, kW, kH + 1, kNoise); }),
               AllOf(HasSubstr("20000"), HasSubstr("20200")));
   hidden_share_.pop_back();
   EXPECT_THAT(ErrorOf([&] { Patches(); }), HasSubstr("19999"));
+  EXPECT_THAT(ErrorOf([&] { UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise); }),
+              HasSubstr("19999"));
 }
 
 }  // namespace

@@ -356,21 +356,30 @@ TEST_F(EstimateSceneTest, SaysWhenItHasNotConverged) {
   EXPECT_THAT(result.out, HasSubstr("not converged"));
 }
 
-TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
-  // Sharp bars of many widths, all in focus; the map says that one patch is far out of focus.
+// Sharp bars of many widths, all in focus, 1 grey level of noise.
+model::StoredPicture Bars(int width_px, int height_px) {
   const std::bitset<64> is_dark(0x9d3a6c51b2e4f087ULL);
-  model::StoredPicture picture{256, 192, 1, 8, {}};
-  model::RawDepthMap map{256, 192, {}, false};
+  model::StoredPicture picture{width_px, height_px, 1, 8, {}};
   std::mt19937 engine(5);
   std::normal_distribution<double> noise(0, 1);
-  for (int y = 0; y < 192; ++y) {
-    for (int x = 0; x < 256; ++x) {
+  for (int y = 0; y < height_px; ++y) {
+    for (int x = 0; x < width_px; ++x) {
       const double value = (is_dark[static_cast<std::size_t>(x / 4)] ? 60 : 190) + noise(engine);
       picture.values.push_back(static_cast<std::uint16_t>(std::lround(value)));
+    }
+  }
+  return picture;
+}
+
+TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
+  // The map says that one patch is far out of focus.
+  model::RawDepthMap map{256, 192, {}, false};
+  for (int y = 0; y < 192; ++y) {
+    for (int x = 0; x < 256; ++x) {
       map.values.push_back(x >= 120 && x < 200 && y >= 56 && y < 136 ? -0.9F : 0.0F);
     }
   }
-  const Arguments arguments = {folder_.Put("bars.png", EncodePng(picture)),
+  const Arguments arguments = {folder_.Put("bars.png", EncodePng(Bars(256, 192))),
                                folder_.Put("bars.pfm", EncodePfm(map)),
                                "--depth-kind",
                                "disparity",
@@ -390,6 +399,25 @@ TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
   map.values.assign(map.values.size(), 0.0F);
   folder_.Put("bars.pfm", EncodePfm(map));
   EXPECT_THAT(Summary(arguments)["residual_patches"], IsEmpty());
+}
+
+TEST_F(EstimateSceneTest, TellsAPhotographThatIsSharperThanItsDepthSays) {
+  model::RawDepthMap map{128, 96, std::vector<float>(128 * 96, -0.9F), false};
+  Arguments arguments = {folder_.Put("bars.png", EncodePng(Bars(128, 96))),
+                         folder_.Put("bars.pfm", EncodePfm(map)),
+                         "--depth-kind",
+                         "disparity",
+                         "--views",
+                         "5x5"};
+  // Everywhere alike, so that no patch stands out.
+  const json summary = Summary(arguments);
+  EXPECT_GT(summary["unexplained_share"], 0.9);
+  EXPECT_THAT(summary["warnings"].dump(), AllOf(HasSubstr("of the photograph is not explained"),
+                                                HasSubstr("--disparity-scale")));
+  arguments.insert(arguments.end(), {"--disparity-scale", "0.01"});
+  const json right = Summary(arguments);
+  EXPECT_LT(right["unexplained_share"], 0.05);
+  EXPECT_THAT(right["warnings"], IsEmpty());
 }
 
 TEST_F(EstimateSceneTest, HolesAreToldWithTheirShare) {

@@ -76,7 +76,9 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
                {"row_share", scene.row_share},
                {"hidden_share", scene.hidden_share},
                {"residual_rms", scene.residual_rms},
-               {"residual_patches", PatchesJson(outcome.patches)}});
+               {"residual_patches", PatchesJson(outcome.patches)},
+               {"unexplained_share", nullptr}});
+  if (outcome.unexplained_share) (*out)["unexplained_share"] = *outcome.unexplained_share;
 }
 
 void AddBlocks(const EstimateOutcome& outcome, json* out) {
@@ -207,6 +209,9 @@ void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome) {
   outcome->patches = estimator::ResidualPatches(outcome->maps.residual, outcome->maps.hidden_share,
                                                 disparity.width_px, disparity.height_px,
                                                 outcome->scene->noise_sigma);
+  outcome->unexplained_share = estimator::UnexplainedShare(
+      outcome->maps.residual, outcome->maps.hidden_share, disparity.width_px, disparity.height_px,
+      outcome->scene->noise_sigma);
 }
 
 std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
@@ -241,6 +246,15 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
         outcome.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
         worst.y + worst.height_px - 1, kGreyLevels * worst.rms,
         kGreyLevels * outcome.scene->noise_sigma));
+  }
+  if (outcome.unexplained_share && *outcome.unexplained_share > estimator::kMostUnexplained) {
+    warnings.push_back(fmt::format(
+        "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
+        "likely it is sharper than this depth and aperture say; {}",
+        100 * *outcome.unexplained_share, kGreyLevels * outcome.scene->noise_sigma,
+        options.camera_path.empty() || options.depth.kind == "disparity"
+            ? "are --disparity-scale and --disparity-offset right?"
+            : "are the depth's unit, and the camera's aperture and focus, right?"));
   }
   return warnings;
 }

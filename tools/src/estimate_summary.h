@@ -40,8 +40,9 @@ struct EstimateOutcome {
   estimator::StepCheck steps;
   std::optional<double> depth_noise_px;
   std::vector<estimator::ResidualPatch> patches;
+  std::optional<double> unexplained_share;  // of `scene`
 };
-// Sets the last three from the others.
+// Sets the last four from the others.
 void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome);
 
 // What speaks against the result, one line each, with its number.

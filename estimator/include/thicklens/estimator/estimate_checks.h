@@ -49,6 +49,17 @@ std::vector<ResidualPatch> ResidualPatches(const std::vector<float>& residual,
                                            const std::vector<float>& hidden_share, int width_px,
                                            int height_px, double noise_sigma);
 
+// Share of such blocks above which the estimate as a whole does not explain the photograph.
+constexpr double kMostUnexplained = 0.2;
+// How much of the photograph the estimate leaves unexplained: the share of those blocks whose
+// residual has an rms of more than 1.5 times that of the noise, whatever the others have. The
+// residual of one channel has about the rms of the noise, the mean of three less. Where many
+// blocks have more, the photograph has details that the blur assumed would have left out. Absent
+// if no block counts. Throws Error for sizes that do not fit.
+std::optional<double> UnexplainedShare(const std::vector<float>& residual,
+                                       const std::vector<float>& hidden_share, int width_px,
+                                       int height_px, double noise_sigma);
+
 }  // namespace thicklens::estimator
 
 #endif  // THICKLENS_ESTIMATOR_ESTIMATE_CHECKS_H_
