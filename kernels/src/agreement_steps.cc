@@ -87,6 +87,12 @@ class StepsComparison {
       steps->Start(data_.photograph);
     });
     CompareIterations(false);
+    const auto target = numbers_.Vector<Real>(kChannels * kPixels, 0.1, 1);
+    ForBoth([&](RadianceSteps<Real>* steps) {
+      steps->SetPrior({{}, plane, false, target});
+      steps->Start(data_.photograph);
+    });
+    CompareIterations(false);
     ForBoth([&](RadianceSteps<Real>* steps) {
       steps->SetPrior({plane, plane, false});
       steps->SetVariation({&plane, 0.1, 0.05, 0.02});

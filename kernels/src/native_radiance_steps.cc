@@ -58,6 +58,12 @@ class NativeSteps : public RadianceSteps<Real> {
   // Sum over the channels of the squared forward differences of x at each pixel of a row.
   void SquaredDifferences(int y, std::vector<Real>* squares) const;
 
+  // Null: 0.
+  const Real* Target() const {
+    if (prior_.target_is_photograph) return photograph_->data();
+    return prior_.target.empty() ? nullptr : prior_.target.data();
+  }
+
   const DataTerm<Real>& data_;
   QuadraticPrior<Real> prior_;
   TotalVariation<Real> variation_;
@@ -165,6 +171,7 @@ void NativeSteps<Real>::SquaredDifferences(int y, std::vector<Real>* squares) co
 template <typename Real>
 void NativeSteps<Real>::TouchVariation() {
   prior_.target_is_photograph = false;
+  prior_.target.clear();
   prior_.pull.assign(data_.pixels(), static_cast<Real>(variation_.pull));
   prior_.smoothness.resize(data_.pixels());
   const int width = data_.width_px;
@@ -246,10 +253,11 @@ void NativeSteps<Real>::StartAt(const std::vector<Real>& x) {
 
 template <typename Real>
 double NativeSteps<Real>::SquaredRightSide() {
+  const Real* target = Target();
   double sum = 0;
   for (std::size_t i = 0; i < right_->size(); ++i) {
     Real b = (*right_)[i];
-    if (prior_.target_is_photograph) b += prior_.pull[i % data_.pixels()] * (*photograph_)[i];
+    if (target != nullptr) b += prior_.pull[i % data_.pixels()] * target[i];
     sum += static_cast<double>(b) * static_cast<double>(b);
   }
   return sum;
@@ -257,15 +265,16 @@ double NativeSteps<Real>::SquaredRightSide() {
 
 template <typename Real>
 ResidualSums NativeSteps<Real>::UpdateResidual() {
+  const Real* target = Target();
   const Sums sums = SumRows([&](std::size_t first, std::size_t pixel, int y, Room* room) {
     MultiplyPriorRow(prior_, data_.width_px, data_.height_px, x_.data() + (first - pixel), y,
                      room->across.data(), room->row.data());
     ResidualRow<Real> row;
     row.data = data_residual_.data() + first;
     row.prior = room->row.data();
-    if (prior_.target_is_photograph) {
+    if (target != nullptr) {
       row.pull = prior_.pull.data() + pixel;
-      row.target = photograph_->data() + first;
+      row.target = target + first;
     }
     row.inverse_diagonal = inverse_diagonal_.data() + pixel;
     row.residual = residual_.data() + first;

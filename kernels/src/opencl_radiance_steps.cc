@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -41,7 +42,13 @@ class OpenClSteps : public RadianceSteps<Real> {
   }
 
   void SetPrior(const QuadraticPrior<Real>& prior) override {
-    has_target_ = prior.target_is_photograph;
+    target_ = prior.target_is_photograph ? Target::kPhotograph
+              : prior.target.empty()     ? Target::kNone
+                                         : Target::kGiven;
+    if (target_ == Target::kGiven) {
+      if (!given_target_) given_target_.emplace(NewPicture("target", most_channels_));
+      given_target_->Write(prior.target);
+    }
     SetPull(prior.pull);
     if (prior.smoothness.empty()) {
       smoothness_.Clear();
@@ -57,7 +64,7 @@ class OpenClSteps : public RadianceSteps<Real> {
   }
 
   void TouchVariation() override {
-    has_target_ = false;
+    target_ = Target::kNone;
     if (pull_value_ != variation_.pull) {
       SetPull(std::vector<Real>(pixels_, static_cast<Real>(variation_.pull)));
       pull_value_ = variation_.pull;
@@ -93,8 +100,8 @@ class OpenClSteps : public RadianceSteps<Real> {
                        .Value(cl_int{channels_})
                        .OnDevice(pull_.memory())
                        .OnDevice(started_right_->memory())
-                       .Value(cl_int{has_target_})
-                       .OnDevice(started_photograph_->memory()))[0];
+                       .Value(cl_int{target_ != Target::kNone})
+                       .OnDevice(TargetPicture().memory()))[0];
   }
 
   ResidualSums UpdateResidual() override {
@@ -105,8 +112,8 @@ class OpenClSteps : public RadianceSteps<Real> {
                                   .OnDevice(smoothness_.memory())
                                   .OnDevice(x_.memory())
                                   .OnDevice(data_residual_.memory())
-                                  .Value(cl_int{has_target_})
-                                  .OnDevice(started_photograph_->memory())
+                                  .Value(cl_int{target_ != Target::kNone})
+                                  .OnDevice(TargetPicture().memory())
                                   .OnDevice(inverse_diagonal_.memory())
                                   .OnDevice(residual_.memory()));
     return {sums[0], sums[1], sums[2]};
@@ -155,6 +162,13 @@ class OpenClSteps : public RadianceSteps<Real> {
   }
 
  private:
+  enum class Target { kNone, kPhotograph, kGiven };
+
+  // Without one, any.
+  const DevicePicture<Real>& TargetPicture() const {
+    return target_ == Target::kGiven ? *given_target_ : *started_photograph_;
+  }
+
   std::size_t PlaneItems() const { return Index(layout_.plane / form_.lanes); }
   std::size_t SumItems() const { return (Index(layout_.plane) + kItemPixels - 1) / kItemPixels; }
   std::size_t SumGroups() { return OpenClCall(queue_.get(), "UpdateResidual").Groups(SumItems()); }
@@ -249,7 +263,8 @@ class OpenClSteps : public RadianceSteps<Real> {
 
   TotalVariation<Real> variation_;
   double pull_value_ = std::nan("");  // of all pixels alike; NaN: they are not
-  bool has_target_ = false;
+  Target target_ = Target::kNone;
+  std::optional<DevicePicture<Real>> given_target_;
   int channels_ = 1;
   const DevicePicture<Real>* started_photograph_ = nullptr;
   const DevicePicture<Real>* started_right_ = nullptr;

@@ -188,8 +188,11 @@ TYPED_TEST(RadianceStepsTest, StepsAreTheNativeOnes) {
     QuadraticPrior<Real> gradient;
     gradient.smoothness = plane;
     gradient.pull.assign(data.pixels(), static_cast<Real>(0.01));
-    for (const auto* prior : {&ridge, &gradient}) {
-      SCOPED_TRACE(prior == &ridge ? "ridge" : "gradient");
+    QuadraticPrior<Real> near_another = gradient;
+    near_another.pull = plane;
+    near_another.target = start;
+    for (const auto* prior : {&ridge, &near_another, &gradient}) {
+      SCOPED_TRACE(prior == &ridge ? "ridge" : prior == &gradient ? "gradient" : "target");
       for (auto* steps : {device.get(), native.get()}) {
         steps->SetPrior(*prior);
         steps->Start(start);

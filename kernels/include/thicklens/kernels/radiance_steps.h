@@ -51,9 +51,10 @@ struct DataTerm {
 // forward differences, of which those that leave the picture are 0; all channels alike.
 template <typename Real>
 struct QuadraticPrior {
-  std::vector<Real> smoothness;       // one plane; empty: 0
-  std::vector<Real> pull;             // one plane, > 0
-  bool target_is_photograph = false;  // else 0
+  std::vector<Real> smoothness;  // one plane; empty: 0
+  std::vector<Real> pull;        // one plane, > 0
+  bool target_is_photograph = false;
+  std::vector<Real> target = {};  // else; planar, as many channels as are solved for. Empty: 0
 };
 
 // strength sum_p (g + eps^2)^(1/2) + pull |r|^2, g = sum over channels and both differences of
