@@ -196,7 +196,7 @@ double SceneBandRun<Real>::StrengthFor(const model::LinearPicture& photograph,
     case StrengthRule::kAuto:
       return StrengthForNoise(
           options_.prior, std::max(summary_->noise_sigma, kLeastNoise),
-          options_.prior == Prior::kTotalVariation ? SignalSum() : TakenSample(photograph).signal);
+          NeedsSignal(options_.prior) ? TakenSample(photograph).signal : SignalSum());
     case StrengthRule::kGcv:
       Radiance radiance(RunFor(options_));
       Prepare(photograph, bands[bands.size() / 2], Start::kFound, &radiance);

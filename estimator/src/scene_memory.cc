@@ -36,6 +36,7 @@ SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options
       threads_(model::ResolveThreads(options.threads)),
       reach_px_(reach_px),
       real_(options.double_precision ? sizeof(double) : sizeof(float)),
+      patches_(options.prior == Prior::kPatches),
       keeps_(keeps) {}
 
 double SceneMemory::MostBytes(int rows, double operator_bytes) const {
@@ -87,8 +88,12 @@ double SceneMemory::SetupBytes(double pixels) const {
 // planes are weights, slopes, diagonals, the prior. A device has the same again, and its programs.
 double SceneMemory::SolveBytes(double pixels) const {
   constexpr double kPictures = 12, kPlanes = 7, kProgramBytes = 16 << 20;
+  // The target, here and in the system; the strengths, and weights in double.
+  constexpr double kPatchPictures = 2, kPatchPlanes = 4;
   constexpr double kSharesBytes = 2 * kFloat;  // hidden, seen
-  const double here = pixels * (real_ * (kPictures * channels_ + kPlanes) + kSharesBytes);
+  const double pictures = kPictures + (patches_ ? kPatchPictures : 0);
+  const double planes = kPlanes + (patches_ ? kPatchPlanes : 0);
+  const double here = pixels * (real_ * (pictures * channels_ + planes) + kSharesBytes);
   return keeps_.device ? 2 * here + kProgramBytes : here;
 }
 

@@ -40,6 +40,7 @@ class SceneMemory {
   int u_count_ = 0, v_count_ = 0, seen_views_ = 0;
   int threads_ = 1, reach_px_ = 0;
   double real_ = 0;  // bytes of a number of the solver
+  bool patches_ = false;
   Keeps keeps_;
 };
 

@@ -95,13 +95,14 @@ SignalSum SignalOf(Prior prior, const DataTerm<Real>& data, const std::vector<Re
     case Prior::kGradient:
       return {SumSquaredGradient(data, slope_squared, first_row, last_row), 2 * values};
     case Prior::kTotalVariation:
+    case Prior::kPatches:
       break;
   }
   return {};
 }
 
 double StrengthForNoise(Prior prior, double sigma, const SignalSum& signal) {
-  if (prior == Prior::kTotalVariation) return 1e-3 * std::pow(255 * sigma, 1.5);
+  if (!NeedsSignal(prior)) return 1e-3 * std::pow(255 * sigma, 1.5);
   const double noise = sigma * sigma;
   const double mean = signal.squares / signal.count;
   if (prior == Prior::kRidge) {

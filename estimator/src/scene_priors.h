@@ -20,7 +20,8 @@ constexpr double kVariationEps = 0.004;
 //   mu = sigma^2/var(s (r - I)), eta = sigma^2/var(s grad r),
 // where the variances come from those of s (I - H I) and s grad I, less their noise. So a picture
 // with little blur gets a strong ridge. That of total variation is an empirical law,
-// 1e-3 (255 sigma)^1.5: twice as much or half of it costs .2 dB.
+// 1e-3 (255 sigma)^1.5: twice as much or half of it costs .2 dB. That of patches is that of their
+// total variation.
 template <typename Real>
 double StrengthForNoise(Prior prior, double sigma, const DataTerm<Real>& data,
                         const std::vector<Real>& slope_squared);
@@ -31,6 +32,7 @@ double StrengthForNoise(Prior prior, double sigma, const DataTerm<Real>& data,
 struct SignalSum {
   double squares = 0, count = 0;
 };
+inline bool NeedsSignal(Prior prior) { return prior == Prior::kRidge || prior == Prior::kGradient; }
 template <typename Real>
 SignalSum SignalOf(Prior prior, const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
                    int first_row, int last_row);
@@ -55,7 +57,8 @@ struct RadianceOutcome {
   bool converged = false;  // of the last system, by its residual computed anew
   double relative_residual = 0;
 };
-// From `radiance` to the minimiser of data term and prior. The system keeps the last quadratic.
+// From `radiance` to the minimiser of data term and prior; not for patches (scene_patches.h). The
+// system keeps the last quadratic.
 template <typename Real>
 RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>& data,
                               const std::vector<Real>& slope_squared, const RadianceLimits& limits,

@@ -8,6 +8,7 @@
 
 #include "coarse_start.h"
 #include "run_cost.h"
+#include "scene_patches.h"
 #include "scene_strength.h"
 #include "stored_slope.h"
 
@@ -29,10 +30,14 @@ double CoarseStrength(Prior prior, double strength) {
     case Prior::kGradient:
       return strength / 4;
     case Prior::kTotalVariation:
+    case Prior::kPatches:
       break;
   }
   return strength / 2;
 }
+
+// Patches begin with total variation.
+Prior SolvedFirst(Prior prior) { return prior == Prior::kPatches ? Prior::kTotalVariation : prior; }
 
 // Of the Gaussian over which the intensity is smoothed that says the slope of the transfer curve.
 constexpr double kSlopeSmoothingPx = 2;
@@ -67,6 +72,7 @@ void SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
   SceneOptions options = run_.options;
   options.tolerance = std::max(options.tolerance_or_usual(), kCoarseTolerance);
   options.max_iterations = std::min(options.max_iterations, kCoarseIterations);
+  options.prior = SolvedFirst(options.prior);
   options.strength = CoarseStrength(options.prior, options.strength);
   if (options.strength_rule == StrengthRule::kGcv) options.strength_rule = StrengthRule::kAuto;
   const std::function<void(int, int)> tell = [this](int, int) { run_.progress->Tell(); };
@@ -140,18 +146,22 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   limits.max_iterations = options.max_iterations;
   limits.on_iteration = [this] { run_.progress->CountUpTo(run_.last_iteration); };
   summary->strength = options.strength;
+  const double sigma = std::max(run_.noise_sigma, kLeastNoise);
   if (options.strength_rule != StrengthRule::kGiven) {
-    summary->strength = StrengthForNoise(options.prior, std::max(run_.noise_sigma, kLeastNoise),
-                                         data_, slope_squared_);
+    summary->strength = StrengthForNoise(options.prior, sigma, data_, slope_squared_);
   }
   if (options.strength_rule == StrengthRule::kGcv) {
-    const StrengthSearch search = SearchStrength(options.prior, summary->strength, data_,
-                                                 slope_squared_, limits, &system, &radiance);
+    const StrengthSearch search = SearchStrength(SolvedFirst(options.prior), summary->strength,
+                                                 data_, slope_squared_, limits, &system, &radiance);
     summary->strength = search.strength;
     summary->iterations = search.iterations;
   }
-  const RadianceOutcome outcome = SolveRadiance(options.prior, summary->strength, data_,
-                                                slope_squared_, limits, &system, &radiance);
+  const RadianceOutcome outcome =
+      options.prior == Prior::kPatches
+          ? SolveWithPatches({summary->strength, sigma, run_.input.transfer}, data_, slope_squared_,
+                             limits, &system, &radiance)
+          : SolveRadiance(options.prior, summary->strength, data_, slope_squared_, limits, &system,
+                          &radiance);
   summary->iterations += outcome.iterations;
   summary->reweightings = outcome.reweightings;
   summary->converged = outcome.converged;

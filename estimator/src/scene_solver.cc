@@ -139,7 +139,9 @@ Prior PriorFromName(const std::string& name) {
   if (name == "ridge") return Prior::kRidge;
   if (name == "gradient") return Prior::kGradient;
   if (name == "tv") return Prior::kTotalVariation;
-  throw Error(fmt::format("prior \"{}\" is unknown: it must be ridge, gradient or tv", name));
+  if (name == "patches") return Prior::kPatches;
+  throw Error(
+      fmt::format("prior \"{}\" is unknown: it must be ridge, gradient, tv or patches", name));
 }
 
 std::string PriorName(Prior prior) {
@@ -148,13 +150,17 @@ std::string PriorName(Prior prior) {
       return "ridge";
     case Prior::kGradient:
       return "gradient";
+    case Prior::kPatches:
+      return "patches";
     case Prior::kTotalVariation:
       break;
   }
   return "tv";
 }
 
-double UsualTolerance(Prior prior) { return prior == Prior::kTotalVariation ? 5e-5 : 1e-3; }
+double UsualTolerance(Prior prior) {
+  return prior == Prior::kTotalVariation || prior == Prior::kPatches ? 5e-5 : 1e-3;
+}
 
 bool SceneOptions::IsValid(std::string* why) const {
   const auto fail = [why](std::string reason) {

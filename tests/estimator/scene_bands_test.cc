@@ -114,12 +114,13 @@ void ExpectSame(const Solved& bands, const Solved& whole, int count) {
 TEST(SceneBands, AreTheWholePictureForEveryPrior) {
   for (const int channels : {1, 3}) {
     const EstimateInput input = CardBeforeWall(48, 160, channels);
-    for (const Prior prior : {Prior::kRidge, Prior::kGradient, Prior::kTotalVariation}) {
+    for (const Prior prior :
+         {Prior::kRidge, Prior::kGradient, Prior::kTotalVariation, Prior::kPatches}) {
       SCOPED_TRACE(PriorName(prior) + ", channels " + std::to_string(channels));
       SceneOptions options;
       options.prior = prior;
       // What the usual tolerances leave is more than bands change.
-      options.tolerance = prior == Prior::kTotalVariation ? 5e-6 : 5e-5;
+      options.tolerance = prior == Prior::kTotalVariation || prior == Prior::kPatches ? 5e-6 : 5e-5;
       options.max_iterations = 600;
       ExpectSame(SolvedIn(input, options, 4), SolvedIn(input, options, 1), 4);
     }

@@ -104,6 +104,8 @@ TEST(SceneStrength, IsTheNoiseOverWhatThePriorSpeaksOf) {
   const double slope = 4 * 0.04 * (39.0 / 40) / 2;
   EXPECT_NEAR(StrengthForNoise(Prior::kGradient, kSigma, data, slope_squared),
               0.125 * kSigma * kSigma / (slope - 2 * kSigma * kSigma), 1e-9);
+  EXPECT_EQ(StrengthForNoise(Prior::kPatches, 4.0 / 255, data, slope_squared),
+            StrengthForNoise(Prior::kTotalVariation, 4.0 / 255, data, slope_squared));
   EXPECT_NEAR(StrengthForNoise(Prior::kTotalVariation, 4.0 / 255, data, slope_squared), 8e-3,
               1e-12);
 }

@@ -239,6 +239,12 @@ TEST_F(EstimateSceneTest, TakesItsSettings) {
   summary = Summary(With(Usual(), {"--prior", "gradient", "--strength", "gcv"}));
   EXPECT_EQ(summary["prior"], "gradient");
   EXPECT_EQ(summary["strength_rule"], "gcv");
+  summary = Summary(With(Usual(), {"--prior", "patches", "--report", Report()}));
+  EXPECT_EQ(summary["prior"], "patches");
+  EXPECT_EQ(summary["strength_rule"], "auto");
+  EXPECT_EQ(summary["converged"], true);
+  EXPECT_EQ(ReadLightField(Output(), {}).origin.prior, "patches");
+  EXPECT_THAT(ContentOf(Report() + "/index.html"), HasSubstr("<td>patches</td>"));
   // Below what numbers of 32 bit can reach.
   const Arguments exact = {"--prior", "gradient",         "--tolerance",
                            "1e-10",   "--max-iterations", "500"};

@@ -101,8 +101,8 @@ std::vector<Contender> Contenders(const BenchScene& whole, const BenchScene& sam
                           {},
                           0});
   }
-  for (const auto prior :
-       {estimator::Prior::kRidge, estimator::Prior::kGradient, estimator::Prior::kTotalVariation}) {
+  for (const auto prior : {estimator::Prior::kRidge, estimator::Prior::kGradient,
+                           estimator::Prior::kTotalVariation, estimator::Prior::kPatches}) {
     contenders.push_back({"scene",
                           "",
                           estimator::PriorName(prior),

@@ -17,11 +17,12 @@ enum class Prior {
   kRidge,           // it is near the photograph
   kGradient,        // it is smooth: squared differences of neighbours
   kTotalVariation,  // it is smooth between edges: absolute differences, colours together
+  kPatches,         // that, and its patches of 8 x 8 px are made of few waves
 };
-Prior PriorFromName(const std::string& name);  // "ridge", "gradient", "tv"; throws Error
+Prior PriorFromName(const std::string& name);  // "ridge", "gradient", "tv", "patches"; throws Error
 std::string PriorName(Prior prior);
 
-// Below which nothing is gained: 5e-5 for total variation, 1e-3 for the others.
+// Below which nothing is gained: 5e-5 for total variation and patches, 1e-3 for the others.
 double UsualTolerance(Prior prior);
 
 enum class StrengthRule {
@@ -104,6 +105,9 @@ struct SceneMaps {
 //   tv         lambda sum_p (sum over channels and both differences of s^2 |dr|^2 + eps^2)^(1/2)
 //              + 1e-6 |r|^2, eps = .004, by reweighted least squares, the weights renewed in
 //              every iteration (nonlinear conjugate gradients).
+//   patches    tv; then tv once more, up to half as strong where H r explains I; then
+//              .15 (255 sigma)^.8 sum s^2 |r - v|^2, v that r without the waves of its patches that
+//              noise can make (see SolveWithPatches). strength and kGcv speak of the tv.
 // Strengths for a noise of sigma in stored values (at least that of the rounding of 8 bits):
 //   kAuto      mu = .2 sigma^2/var(s (I - H I)), eta = .125 sigma^2/var(s grad I), both variances
 //              without their noise; lambda = 1e-3 (255 sigma)^1.5

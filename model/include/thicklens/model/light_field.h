@@ -24,7 +24,7 @@ struct LightFieldOrigin {
   std::optional<double> seconds, relative_residual, rcond_min;
   std::vector<std::string> effects;  // of image formation that were on: "defocus", "falloff"
   std::string version, date;
-  std::string prior;  // of the scene's radiance: "ridge", "gradient", "tv"
+  std::string prior;  // of the scene's radiance: "ridge", "gradient", "tv", "patches"
   std::optional<double> strength, noise_sigma;  // of that prior; of the photograph's stored values
   std::optional<int> iterations;
 };
