@@ -49,9 +49,8 @@ void ViewNative(benchmark::State& state) {
   const Scene& scene = TheScene();
   const PictureWarper warper(scene.picture, scene.map);
   for (auto _ : state) {
-    model::ParallelFor(kViews, 2, [&](int) {
-      benchmark::DoNotOptimize(warper.Warp(scene.view).values.data());
-    });
+    model::ParallelFor(
+        kViews, 2, [&](int) { benchmark::DoNotOptimize(warper.Warp(scene.view).values.data()); });
   }
   Count(&state);
 }
