@@ -82,9 +82,10 @@ std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
     for (int x = 0; x < view.width_px; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
       if (view.seen[i] != Seen::kSeen) continue;
+      // Of a library, lround would take as long as all the rest.
       const auto nearest = [](int sample, float way, int count) {
-        const long at = std::lround(static_cast<float>(sample) + way);
-        return static_cast<std::size_t>(std::clamp(at, 0L, static_cast<long>(count) - 1));
+        const int at = sample + static_cast<int>(way + (way < 0 ? -0.5F : 0.5F));
+        return static_cast<std::size_t>(std::clamp(at, 0, count - 1));
       };
       confidence[i] = of_points[nearest(y, view.source_y[i], view.height_px) * width +
                                 nearest(x, view.source_x[i], view.width_px)];
