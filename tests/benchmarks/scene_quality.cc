@@ -8,12 +8,15 @@
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
+#include "thicklens/estimator/depth_noise.h"
+#include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene_simulator.h"
@@ -28,6 +31,7 @@ struct Arguments {
   std::vector<std::string> priors = {"tv"};
   std::vector<double> noises = {1};
   double depth_noise_px = 0.05;
+  bool keep_depth_noise = false;
   int views = 7;
   int border_px = 8;
   int threads = 0;
@@ -71,6 +75,10 @@ Simulated Simulate(const std::string& scene, double noise_grey_levels, const Arg
   input.disparity = estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values,
                                                input.picture.width_px, input.picture.height_px);
   AddNoise(arguments.depth_noise_px, options.seed, &input.disparity);
+  const std::optional<double> found_px = estimator::DepthNoisePx(input.disparity);
+  if (!arguments.keep_depth_noise && found_px && *found_px > estimator::kSmoothedNoisePx) {
+    input.disparity = estimator::SmoothDepth(input.disparity, *found_px, arguments.threads).map;
+  }
   return simulated;
 }
 
@@ -134,6 +142,8 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
   app->add_option("--depth-noise", arguments->depth_noise_px,
                   "of the depth, sigma in px of disparity per view step (0.05)")
       ->check(CLI::NonNegativeNumber);
+  app->add_flag("--keep-depth-noise", arguments->keep_depth_noise,
+                "does not smooth the depth, as `thicklens estimate` does");
   app->add_option("--views", arguments->views, "per axis (7)")->check(CLI::Range(2, 31));
   app->add_option("--border", arguments->border_px, "px that are left out (8)")
       ->check(CLI::Range(0, 60));

@@ -336,20 +336,28 @@ TEST_F(EstimateSceneTest, WarnsOfStepsThatAreTooLarge) {
   EXPECT_NEAR(summary["disparity"]["coarse_share"].get<double>(), 1.0 / kW, 1e-9);
 }
 
-TEST_F(EstimateSceneTest, WarnsOfNoiseInTheDepth) {
+TEST_F(EstimateSceneTest, SmoothsANoisyDepthAndWarnsWhereItStaysNoisy) {
   const auto with_noise = [&](double sigma_px) {
     std::mt19937 engine(11);
     std::normal_distribution<double> noise(0, sigma_px);
     return Depth([&](int x, int) { return 0.01 * x - 0.5 + noise(engine); });
   };
-  const auto summary_of = [&](double sigma_px) {
-    return Summary(
-        {Picture(), with_noise(sigma_px), "--depth-kind", "disparity", "--views", "3x3"});
+  const auto summary_of = [&](double sigma_px, const Arguments& more) {
+    return Summary(With(
+        {Picture(), with_noise(sigma_px), "--depth-kind", "disparity", "--views", "3x3"}, more));
   };
-  const json noisy = summary_of(0.1);
-  EXPECT_NEAR(noisy["disparity"]["noise_px"].get<double>(), 0.1, 0.01);
-  EXPECT_THAT(noisy["warnings"].dump(), AllOf(HasSubstr("noise of about 0.1"), HasSubstr("0.05")));
-  EXPECT_THAT(summary_of(0.02)["warnings"].dump(), Not(HasSubstr("noise")));
+  const json smoothed = summary_of(0.1, {});
+  EXPECT_NEAR(smoothed["disparity"]["noise_px"].get<double>(), 0.1, 0.01);
+  EXPECT_NEAR(smoothed["disparity"]["noise_left_px"].get<double>(), 0.015, 0.005);
+  EXPECT_THAT(smoothed["warnings"].dump(), Not(HasSubstr("noise of")));
+  const json kept = summary_of(0.1, {"--keep-depth-noise"});
+  EXPECT_NEAR(kept["disparity"]["noise_px"].get<double>(), 0.1, 0.01);
+  EXPECT_TRUE(kept["disparity"]["noise_left_px"].is_null());
+  EXPECT_THAT(kept["warnings"].dump(), AllOf(HasSubstr("noise of about 0.1"), HasSubstr("0.05")));
+  EXPECT_THAT(summary_of(0.5, {})["warnings"].dump(), HasSubstr("noise of about 0.0"));
+  const json quiet = summary_of(0.01, {});
+  EXPECT_TRUE(quiet["disparity"]["noise_left_px"].is_null());
+  EXPECT_THAT(quiet["warnings"].dump(), Not(HasSubstr("noise of")));
 }
 
 TEST_F(EstimateSceneTest, SaysWhenItHasNotConverged) {

@@ -15,6 +15,8 @@
 #include "light_field_io.h"
 #include "option_values.h"
 #include "thicklens/error.h"
+#include "thicklens/estimator/depth_noise.h"
+#include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
 
@@ -141,6 +143,19 @@ void CheckViewCounts(const Eigen::ArrayXXd& weights) {
   }
 }
 
+void SmoothNoisyDepth(const EstimateOptions& options, PreparedEstimate* prepared) {
+  estimator::DisparityMap& disparity = prepared->input.disparity;
+  prepared->depth_noise_px = estimator::DepthNoisePx(disparity);
+  if (options.keep_depth_noise || !prepared->depth_noise_px ||
+      !(*prepared->depth_noise_px > estimator::kSmoothedNoisePx)) {
+    return;
+  }
+  estimator::SmoothedDepth smoothed =
+      estimator::SmoothDepth(disparity, *prepared->depth_noise_px, options.common.threads);
+  disparity = std::move(smoothed.map);
+  prepared->depth_noise_left_px = smoothed.noise_left_px;
+}
+
 }  // namespace
 
 PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
@@ -170,6 +185,7 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   if (prepared.depth.depth && options.depth.kind != "disparity") {
     TellUnlikelyDepth(options, *input.camera, *prepared.depth.depth);
   }
+  SmoothNoisyDepth(options, &prepared);
   return prepared;
 }
 

@@ -1,6 +1,8 @@
 #ifndef THICKLENS_TOOLS_ESTIMATE_INPUT_H_
 #define THICKLENS_TOOLS_ESTIMATE_INPUT_H_
 
+#include <optional>
+
 #include "estimate_options.h"
 #include "light_field_options.h"
 #include "thicklens/estimator/estimate.h"
@@ -10,6 +12,8 @@ namespace thicklens::tools {
 struct PreparedEstimate {
   estimator::EstimateInput input;
   PreparedDepth depth;  // without its disparity, which is the input's
+  // Of the disparity, px per view step: as it was, and what is left of it where it was smoothed.
+  std::optional<double> depth_noise_px, depth_noise_left_px;
 };
 
 // Reads picture, depth and camera and tells what is taken for granted of them. Throws Error and

@@ -87,6 +87,8 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
                    "Depth of the ST plane (UV is the aperture); default: the plane of focus")
       ->check(Between(0, 1e9, "millimetres"))
       ->type_name("MM");
+  command->add_flag("--keep-depth-noise", options->keep_depth_noise,
+                    "Takes the depth as it is, however noisy: it is smoothed along surfaces else");
   command->add_option("--without", options->without, "Effects to leave out: falloff")
       ->check(CLI::IsMember({"falloff"}))
       ->delimiter(',')

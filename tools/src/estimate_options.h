@@ -31,6 +31,7 @@ struct EstimateOptions {
   std::string transfer;
   std::string solver = "scene";
   std::optional<double> memory_limit_mib;
+  bool keep_depth_noise = false;
   std::vector<std::string> without;
   std::string device = "auto";
   std::string format = "png";

@@ -192,6 +192,10 @@ std::string DepthText(const PreparedEstimate& prepared) {
   }
   const auto [least_px, most_px] = DisparityRangePx(prepared.input.disparity);
   text += fmt::format("disparity    {:.3f} .. {:.3f} px per view step\n", least_px, most_px);
+  if (prepared.depth_noise_left_px) {
+    text += fmt::format("depth noise  {:.3f} px per view step, smoothed along surfaces to {:.3f}\n",
+                        *prepared.depth_noise_px, *prepared.depth_noise_left_px);
+  }
   if (prepared.depth.holes > 0) {
     text += fmt::format("holes        {} px, filled along the surfaces around them ({:.1f} %)\n",
                         prepared.depth.holes, 100 * HoleShare(prepared));
@@ -204,7 +208,8 @@ std::string DepthText(const PreparedEstimate& prepared) {
 void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome) {
   const estimator::DisparityMap& disparity = prepared.input.disparity;
   outcome->steps = estimator::CheckSteps(disparity, outcome->light_field.landing_step_px);
-  outcome->depth_noise_px = estimator::DepthNoisePx(disparity);
+  outcome->depth_noise_px = prepared.depth_noise_px;
+  outcome->depth_noise_left_px = prepared.depth_noise_left_px;
   if (!outcome->scene) return;
   outcome->patches = estimator::ResidualPatches(outcome->maps.residual, outcome->maps.hidden_share,
                                                 disparity.width_px, disparity.height_px,
@@ -224,12 +229,14 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
                     100 * outcome.steps.share, estimator::kLargestStepPx, outcome.steps.largest_px,
                     options.camera_path.empty() ? "" : "; more --views make the steps smaller"));
   }
-  if (outcome.depth_noise_px && *outcome.depth_noise_px > estimator::kLargestDepthNoisePx) {
+  const std::optional<double> noise_px =
+      outcome.depth_noise_left_px ? outcome.depth_noise_left_px : outcome.depth_noise_px;
+  if (noise_px && *noise_px > estimator::kLargestDepthNoisePx) {
     warnings.push_back(fmt::format(
         "{}: the depth has a noise of about {:.2f} px of disparity per view step, above {:g} px "
         "it costs more than the estimate gains; smooth it along its surfaces first, and keep its "
         "edges",
-        options.depth_path, *outcome.depth_noise_px, estimator::kLargestDepthNoisePx));
+        options.depth_path, *noise_px, estimator::kLargestDepthNoisePx));
   }
   const auto iterations = IterationsOf(outcome);
   if (iterations && !iterations->converged) {
@@ -294,9 +301,13 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
                 {"max_px", most_px},
                 {"largest_step_px", outcome.steps.largest_px},
                 {"coarse_share", outcome.steps.share},
-                {"noise_px", nullptr}}},
+                {"noise_px", nullptr},
+                {"noise_left_px", nullptr}}},
               {"warnings", EstimateWarnings(options, outcome)}};
   if (outcome.depth_noise_px) out["disparity"]["noise_px"] = *outcome.depth_noise_px;
+  if (outcome.depth_noise_left_px) {
+    out["disparity"]["noise_left_px"] = *outcome.depth_noise_left_px;
+  }
   if (prepared.depth.depth) {
     out["depth"] = {{"min_mm", prepared.depth.depth->min_mm},
                     {"median_mm", prepared.depth.depth->median_mm},

@@ -38,7 +38,8 @@ struct EstimateOutcome {
 
   // What the estimate can know of itself.
   estimator::StepCheck steps;
-  std::optional<double> depth_noise_px;
+  std::optional<double> depth_noise_px;       // of the map that was read
+  std::optional<double> depth_noise_left_px;  // where it was smoothed
   std::vector<estimator::ResidualPatch> patches;
   std::optional<double> unexplained_share;  // of `scene`
 };
