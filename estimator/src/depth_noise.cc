@@ -98,8 +98,7 @@ SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads)
   });
   double sum = 0;
   for (const double of_row : variance) sum += of_row;
-  smoothed.noise_left_px =
-      noise_px * std::sqrt(sum / static_cast<double>(map.disparity.size()));
+  smoothed.noise_left_px = noise_px * std::sqrt(sum / static_cast<double>(map.disparity.size()));
   return smoothed;
 }
 
