@@ -233,10 +233,12 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
       outcome.depth_noise_left_px ? outcome.depth_noise_left_px : outcome.depth_noise_px;
   if (noise_px && *noise_px > estimator::kLargestDepthNoisePx) {
     warnings.push_back(fmt::format(
-        "{}: the depth has a noise of about {:.2f} px of disparity per view step, above {:g} px "
-        "it costs more than the estimate gains; smooth it along its surfaces first, and keep its "
-        "edges",
-        options.depth_path, *noise_px, estimator::kLargestDepthNoisePx));
+        "{}: the depth has a noise of about {:.2f} px of disparity per view step{}, above {:g} px "
+        "it costs more than the estimate gains; {}",
+        options.depth_path, *noise_px, outcome.depth_noise_left_px ? " after smoothing" : "",
+        estimator::kLargestDepthNoisePx,
+        outcome.depth_noise_left_px ? "better depth is needed"
+                                    : "without --keep-depth-noise it is smoothed"));
   }
   const auto iterations = IterationsOf(outcome);
   if (iterations && !iterations->converged) {
