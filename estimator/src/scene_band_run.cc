@@ -244,6 +244,7 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
     const SceneBand& band = bands[i];
     ReturnFreedMemory();  // of the band above
     typename Radiance::Run run = RunFor(options);
+    run.confidence = true;
     run.last_iteration = static_cast<int>(iterations_ * (i + 1) / bands.size());
     Radiance radiance(run);
     const double coarse_seconds = Prepare(photograph, band, Start::kFound, &radiance);

@@ -98,7 +98,7 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph, Dispar
   ProjectionOptions projection;
   projection.threads = run_.threads;
   projection.between = run_.options.cubic ? Between::kCubic : Between::kLinear;
-  projection.seen_share = true;
+  projection.seen_share = run_.confidence;
   projection.progress = [this] { run_.progress->Tell(); };
   projection_ = MakeSceneProjection<Real>(disparity_, run_.input.weights, projection);
   ReturnFreedMemory();

@@ -37,6 +37,7 @@ class SceneRadiance {
     double mean_slope = 0;   // over the whole photograph; for options without slope weights
     int last_iteration = 0;  // for the progress: of this band and those before it
     IterationProgress* progress = nullptr;
+    bool confidence = false;  // is asked for
   };
   explicit SceneRadiance(const Run& run) : run_(run) {}
 
@@ -56,7 +57,7 @@ class SceneRadiance {
   model::LinearPicture Solve(SceneSummary* summary);
   // Adds the rows of the band's result to those of the bands above.
   void AddMaps(SceneMaps* maps) const;
-  void AddConfidence(std::vector<Confidence>* of_points) const;
+  void AddConfidence(std::vector<Confidence>* of_points) const;  // where it was asked for
 
  private:
   // The band's result in the rows that are solved for.

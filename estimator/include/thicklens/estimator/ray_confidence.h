@@ -12,9 +12,9 @@
 namespace thicklens::estimator {
 
 // How well a photograph shows one ray of its light field, as one byte:
-//   0           filled in: no point of the centre view is there, the background beside it stands
-//   in; 1 .. 127    a point whose blur is too strong for details (kUnresolvedBlurSigmaPx); 129 ..
-//   255  a point whose blur can be undone.
+//   0           filled in with the background beside it: no point of the centre view is there;
+//   1 .. 127    a point whose blur is too strong for details (kUnresolvedBlurSigmaPx);
+//   129 .. 255  a point whose blur can be undone.
 // Of the last two the distance from the lower end, over 126, is the share of the aperture that sees
 // the point: 127 and 255 are seen whole, the others in part, past an edge or the picture's border.
 using Confidence = std::uint8_t;
