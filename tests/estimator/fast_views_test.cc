@@ -11,7 +11,9 @@
 
 #include "estimator/plain_views.h"
 #include "support/error_message.h"
+#include "surface_taps.h"
 #include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -56,6 +58,16 @@ void ExpectNear(const char* what, const std::vector<float>& found,
     const auto row = static_cast<std::size_t>(width);
     ASSERT_NEAR(found[i], expected[i], tolerance) << what << " at " << i % row << ", " << i / row;
   }
+}
+
+// By what devices agree with.
+std::vector<float> DeviceTwinWarp(const model::LinearPicture& picture, const DisparityMap& map,
+                                  const ViewDisparity& view) {
+  std::vector<float> values;
+  kernels::NewReferenceWarp({picture.width_px, picture.height_px, picture.channels, &picture.values,
+                             &map.disparity, static_cast<float>(SurfaceTolerance(map))})
+      ->Warp({&view.disparity, &view.source_x, &view.source_y}, &values);
+  return values;
 }
 
 double Waves(int x, int y, double noise) {
@@ -188,6 +200,8 @@ TEST_P(TwinTest, WarpsAsThePlainTwinDoes) {
       EXPECT_EQ(warped.channels, channels);
       ExpectNear("value", warped.values, PlainWarp(picture, map, view).values,
                  map.width_px * channels, 2e-6);
+      ExpectNear("value of the device's twin", DeviceTwinWarp(picture, map, view), warped.values,
+                 map.width_px * channels, 1e-5);
     }
   }
 }
@@ -214,6 +228,8 @@ TEST(PictureWarper, CutsSourcesAsThePlainTwinDoes) {
     }
     ExpectNear("value", PictureWarper(picture, map).Warp(view).values,
                PlainWarp(picture, map, view).values, 27, 2e-6);
+    ExpectNear("value of the device's twin", DeviceTwinWarp(picture, map, view),
+               PlainWarp(picture, map, view).values, 27, 1e-5);
   }
 }
 
