@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -70,14 +71,6 @@ void PaintRegularCell(const PixelRow& upper, const PixelRow& lower, int x, int y
   }
 }
 
-void AddDisplacements(const std::vector<float>& disparity, double shift, float* __restrict source) {
-  const float* const from = disparity.data();
-  const std::size_t count = disparity.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    source[i] = static_cast<float>(source[i] + shift * from[i]);
-  }
-}
-
 void PaintSurfaces(const DisparityMap& map, const std::vector<char>& is_surface,
                    const Eigen::Vector2d& shift, DisparityBuffer* buffer) {
   const int width = map.width_px;
@@ -93,18 +86,18 @@ void PaintSurfaces(const DisparityMap& map, const std::vector<char>& is_surface,
     SampleCells(upper, lower, {y, width, map.height_px}, &cells);
     const char* const is_cell = is_surface.data() + Index(y) * Index(width);
     float* const row = buffer->row(y);
-    const auto put = [row](std::int32_t sample, float disparity) {
-      row[sample] = Most(row[sample], disparity);
-    };
+    float nowhere = 0;
     for (int x = 0; x + 1 < width; ++x) {
       const std::size_t i = Index(x);
-      if (!is_cell[i] || cells.samples[i] == CellSamples::kNone) continue;
-      if (cells.samples[i] == CellSamples::kOne) {
-        put(x + cells.first[i], cells.first_disparity[i]);
-      } else if (cells.samples[i] == CellSamples::kTwo) {
-        put(x + cells.first[i], cells.first_disparity[i]);
-        put(x + cells.last[i], cells.last_disparity[i]);
-      } else if (cells.samples[i] == CellSamples::kSeveral) {
+      const CellSamples samples = is_cell[i] ? cells.samples[i] : CellSamples::kNone;
+      if (samples <= CellSamples::kTwo) {
+        // None, one (the first is the last) and two take turns on a slope: no branch.
+        const bool any = samples != CellSamples::kNone;
+        float* const first = any ? row + x + cells.first[i] : &nowhere;
+        *first = Most(*first, cells.first_disparity[i]);
+        float* const last = any ? row + x + cells.last[i] : &nowhere;
+        *last = Most(*last, cells.last_disparity[i]);
+      } else if (samples == CellSamples::kSeveral) {
         PaintRegularCell(upper, lower, x, y, buffer);
       } else {
         PaintCell(upper, lower, x, y, buffer);
@@ -125,34 +118,33 @@ void PaintAlone(const DisparityMap& map, const std::vector<int>& alone,
   }
 }
 
-void FindSources(const DisparityMap& map, const Eigen::Vector2d& shift, DisparityBuffer buffer,
-                 ViewDisparity* view) {
-  const std::size_t count = map.disparity.size();
-  view->source_x.resize(count);
-  view->source_y.resize(count);
-  HoleFiller filler(buffer, shift);
-  for (const HoleFiller::Sample& hole : filler.holes()) {
-    view->seen[buffer.Index(hole.x, hole.y)] = Seen::kHidden;
-  }
-  if (filler.holes().size() == count) {  // looks past the picture: the centre stands in
-    view->disparity = map.disparity;
-    return;
-  }
-  std::vector<HoleFiller::Sample> backgrounds;
-  backgrounds.reserve(filler.holes().size());
-  for (const HoleFiller::Sample& hole : filler.holes()) {
-    backgrounds.push_back(filler.Background(hole.x, hole.y));
-  }
-  for (std::size_t n = 0; n < backgrounds.size(); ++n) {
-    const HoleFiller::Sample& hole = filler.holes()[n];
-    const std::size_t i = buffer.Index(hole.x, hole.y);
-    buffer.Put(hole.x, hole.y, buffer.at(backgrounds[n].x, backgrounds[n].y));
-    view->source_x[i] = static_cast<float>(backgrounds[n].x - hole.x);
-    view->source_y[i] = static_cast<float>(backgrounds[n].y - hole.y);
+// A sample whose background is another one, or it itself.
+CompactView::Hidden HiddenBy(const HoleFiller::Sample& hole, const HoleFiller::Sample& background,
+                             float disparity, const Eigen::Vector2d& shift, std::size_t index) {
+  return {static_cast<std::int32_t>(index),
+          static_cast<float>(background.x - hole.x + shift.x() * disparity),
+          static_cast<float>(background.y - hole.y + shift.y() * disparity), disparity};
+}
+
+void FindSources(const DisparityMap& map, DisparityBuffer buffer, CompactView* view) {
+  HoleFiller filler(buffer, view->shift);
+  const std::vector<HoleFiller::Sample>& holes = filler.holes();
+  view->hidden.reserve(holes.size());
+  if (holes.size() == map.disparity.size()) {  // looks past the picture: the centre stands in
+    for (std::size_t i = 0; i < holes.size(); ++i) {
+      view->hidden.push_back({static_cast<std::int32_t>(i), 0, 0, map.disparity[i]});
+    }
+  } else {
+    for (const HoleFiller::Sample& hole : holes) {
+      const HoleFiller::Sample from = filler.Background(hole.x, hole.y);
+      view->hidden.push_back(HiddenBy(hole, from, buffer.at(from.x, from.y), view->shift,
+                                      buffer.Index(hole.x, hole.y)));
+    }
   }
   view->disparity = std::move(buffer).TakeDisparity();
-  AddDisplacements(view->disparity, shift.x(), view->source_x.data());
-  AddDisplacements(view->disparity, shift.y(), view->source_y.data());
+  for (const CompactView::Hidden& hidden : view->hidden) {
+    view->disparity[Index(hidden.index)] = std::numeric_limits<float>::quiet_NaN();
+  }
 }
 
 }  // namespace
@@ -180,25 +172,48 @@ DisparityRenderer::DisparityRenderer(const DisparityMap& map) : map_(map) {
   }
 }
 
-ViewDisparity DisparityRenderer::Render(double a, double b) const {
-  const Eigen::Vector2d shift(a * map_.step.x(), b * map_.step.y());
-  if (!shift.allFinite()) {
-    throw Error(fmt::format("view ({}, {}) steps from the centre: both must be finite", a, b));
-  }
-  ViewDisparity view;
+CompactView DisparityRenderer::RenderCompact(double a, double b) const {
+  CompactView view;
   view.width_px = map_.width_px;
   view.height_px = map_.height_px;
-  view.seen.assign(map_.disparity.size(), Seen::kSeen);
-  if (shift.isZero(0)) {
+  view.shift = {a * map_.step.x(), b * map_.step.y()};
+  if (!view.shift.allFinite()) {
+    throw Error(fmt::format("view ({}, {}) steps from the centre: both must be finite", a, b));
+  }
+  if (view.shift.isZero(0)) {
     view.disparity = map_.disparity;
-    view.source_x.assign(map_.disparity.size(), 0.0F);
-    view.source_y.assign(map_.disparity.size(), 0.0F);
     return view;
   }
   DisparityBuffer buffer(map_.width_px, map_.height_px);
-  PaintSurfaces(map_, is_surface_, shift, &buffer);
-  PaintAlone(map_, alone_, shift, &buffer);
-  FindSources(map_, shift, std::move(buffer), &view);
+  PaintSurfaces(map_, is_surface_, view.shift, &buffer);
+  PaintAlone(map_, alone_, view.shift, &buffer);
+  FindSources(map_, std::move(buffer), &view);
+  return view;
+}
+
+ViewDisparity DisparityRenderer::Render(double a, double b) const {
+  return Expanded(RenderCompact(a, b));
+}
+
+ViewDisparity Expanded(CompactView compact) {
+  ViewDisparity view;
+  view.width_px = compact.width_px;
+  view.height_px = compact.height_px;
+  view.disparity = std::move(compact.disparity);
+  view.seen.assign(view.disparity.size(), Seen::kSeen);
+  view.source_x.resize(view.disparity.size());
+  view.source_y.resize(view.disparity.size());
+  for (std::size_t i = 0; i < view.disparity.size(); ++i) {
+    view.source_x[i] = static_cast<float>(compact.shift.x() * view.disparity[i]);
+    view.source_y[i] = static_cast<float>(compact.shift.y() * view.disparity[i]);
+  }
+  for (const CompactView::Hidden& hidden : compact.hidden) {
+    const std::size_t i = Index(hidden.index);
+    view.disparity[i] = hidden.disparity;
+    view.seen[i] = Seen::kHidden;
+    view.source_x[i] = hidden.source_x;
+    view.source_y[i] = hidden.source_y;
+  }
   return view;
 }
 

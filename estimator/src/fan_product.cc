@@ -33,11 +33,25 @@ struct CellRange {
   }
 };
 
+// From `first` to before `last`.
+struct Stretch {
+  int first, last;
+};
+std::vector<Stretch> StretchesOfZero(const unsigned char* flags, int count) {
+  std::vector<Stretch> stretches;
+  for (int x = 0; x < count; ++x) {
+    if (flags[x] != 0) continue;
+    if (stretches.empty() || stretches.back().last != x) stretches.push_back({x, x});
+    stretches.back().last = x + 1;
+  }
+  return stretches;
+}
+
 }  // namespace
 
 std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
                                      const DisparityMap& disparity, double tolerance_px,
-                                     int threads) {
+                                     const std::vector<unsigned char>& known, int threads) {
   const CellRange range(disparity);
   std::vector<unsigned char> is_product(disparity.disparity.size());
   model::ParallelFor(fan.height_px, threads, [&](int y) {
@@ -51,15 +65,20 @@ std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
     row.highest = range.high.data();
     row.same_surface = static_cast<float>(SurfaceTolerance(disparity));
     std::vector<std::int32_t> all(Index(fan.width_px), 1);
+    const std::vector<Stretch> unknown = StretchesOfZero(known.data() + begin, fan.width_px);
     for (const FanView& view : fan.views) {
       const auto u = static_cast<std::size_t>(std::lround(view.a + (axes.across.count - 1) / 2.0));
       const auto v = static_cast<std::size_t>(std::lround(view.b + (axes.down.count - 1) / 2.0));
-      row.disparity = view.disparity.data() + begin;
-      row.shift_x = static_cast<float>(view.shift.x());
-      row.shift_y = static_cast<float>(view.shift.y());
+      row.disparity = view.sees.disparity.data() + begin;
+      row.shift_x = static_cast<float>(view.sees.shift.x());
+      row.shift_y = static_cast<float>(view.sees.shift.y());
       row.down = axes.down.source_px[v].data() + begin;
       row.across = axes.across.source_px[u].data();
-      CheckProducts(row, all.data());
+      for (const Stretch& stretch : unknown) {
+        row.first_x = stretch.first;
+        row.last_x = stretch.last;
+        CheckProducts(row, all.data());
+      }
     }
     for (std::size_t x = 0; x < all.size(); ++x)
       is_product[begin + x] = static_cast<unsigned char>(all[x]);
@@ -89,68 +108,123 @@ Taps TapsOnLine(int pixel, float source_px, int count, Between between, const Is
   return {below - pixel, 2, {1 - fraction, fraction, 0, 0}};
 }
 
+// The filter of an axis in one row of the picture.
+template <typename Real>
+struct FilterRow {
+  std::vector<std::int32_t> radius_px;  // of each block
+  std::vector<Real> coefficients;       // as those of a PixelFilter
+};
+
+// What rows of a filter are made from, and room for it.
+class FilterMaker {
+ public:
+  FilterMaker(const FanAxis& axis, kernels::Axis direction, const DisparityMap& disparity,
+              const Eigen::VectorXd& weights, Between between)
+      : axis_(axis),
+        across_(direction == kernels::Axis::kAcross),
+        disparity_(disparity),
+        weights_(weights),
+        between_(between),
+        tolerance_(static_cast<float>(SurfaceTolerance(disparity))),
+        taps_(Index(disparity.width_px) * Index(axis.count)) {}
+
+  template <typename Real>
+  void Make(int y, FilterRow<Real>* row) {
+    FindTaps(y, &row->radius_px);
+    std::vector<std::size_t> start(1, 0);
+    for (const std::int32_t radius : row->radius_px)
+      start.push_back(start.back() + Index(2 * radius + 1) * kernels::kFilterBlockPx);
+    row->coefficients.assign(start.back(), Real(0));
+    const Taps* taps = taps_.data();
+    for (int x = 0; x < disparity_.width_px; ++x, taps += axis_.count) {
+      const std::size_t block = Index(x / kernels::kFilterBlockPx);
+      Real* const middle = row->coefficients.data() + start[block] +
+                           Index(row->radius_px[block]) * kernels::kFilterBlockPx +
+                           Index(x % kernels::kFilterBlockPx);
+      if (!IsUsable(x, y)) {
+        *middle = static_cast<Real>(weights_.sum());
+        continue;
+      }
+      for (int position = 0; position < axis_.count; ++position) {
+        const double weight = weights_[position];
+        Real* to = middle + std::ptrdiff_t{taps[position].offset} * kernels::kFilterBlockPx;
+        for (int n = 0; n < taps[position].count; ++n, to += kernels::kFilterBlockPx)
+          *to += static_cast<Real>(weight * taps[position].weight[Index(n)]);
+      }
+    }
+  }
+
+ private:
+  bool IsUsable(int x, int y) const {
+    return axis_.usable[Index(y) * Index(disparity_.width_px) + Index(x)] != 0;
+  }
+
+  void FindTaps(int y, std::vector<std::int32_t>* radius_px) {
+    const int width_px = disparity_.width_px;
+    radius_px->assign(Index((width_px + kernels::kFilterBlockPx - 1) / kernels::kFilterBlockPx), 0);
+    const int count = across_ ? width_px : disparity_.height_px;
+    const std::size_t step = across_ ? 1 : Index(width_px);
+    const float* const row = disparity_.disparity.data() + Index(y) * Index(width_px);
+    Taps* to = taps_.data();
+    for (int x = 0; x < width_px; ++x, to += axis_.count) {
+      if (!IsUsable(x, y)) continue;
+      const float* const line = across_ ? row : disparity_.disparity.data() + x;
+      const float here = row[x];
+      std::int32_t reach = 0;
+      for (int position = 0; position < axis_.count; ++position) {
+        const float way = axis_.source_px[Index(position)][Index(y) * Index(width_px) + Index(x)];
+        to[position] = TapsOnLine(across_ ? x : y, way, count, between_, [&](int n) {
+          return std::abs(line[Index(n) * step] - here) <= tolerance_;
+        });
+        reach =
+            std::max({reach, -to[position].offset, to[position].offset + to[position].count - 1});
+      }
+      std::int32_t& radius = (*radius_px)[Index(x / kernels::kFilterBlockPx)];
+      radius = std::max(radius, reach);
+    }
+  }
+
+  const FanAxis& axis_;
+  const bool across_;
+  const DisparityMap& disparity_;
+  const Eigen::VectorXd& weights_;
+  const Between between_;
+  const float tolerance_;
+  std::vector<Taps> taps_;  // of a row: of each pixel, of each position
+};
+
 }  // namespace
 
 template <typename Real>
 kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction,
                                     const DisparityMap& disparity, const Eigen::VectorXd& weights,
                                     Between between, int threads) {
-  using kernels::kFilterBlockPx;
-  const int width_px = disparity.width_px, height_px = disparity.height_px;
+  constexpr int kBandRows = 32;
+  const int height_px = disparity.height_px;
   kernels::PixelFilter<Real> filter;
   filter.axis = direction;
-  filter.width_px = width_px;
+  filter.width_px = disparity.width_px;
   filter.height_px = height_px;
-  const bool across = direction == kernels::Axis::kAcross;
-  const int blocks = filter.blocks_in_row();
-  filter.radius_px.assign(Index(blocks) * Index(height_px), 0);
-  const auto tolerance = static_cast<float>(SurfaceTolerance(disparity));
-  const auto taps_of = [&](int x, int y, int position) {
-    const std::size_t i = Index(y) * Index(width_px) + Index(x);
-    const float way = axis.source_px[Index(position)][i];
-    const float* const line =
-        disparity.disparity.data() + (across ? Index(y) * Index(width_px) : Index(x));
-    const std::size_t step = across ? 1 : Index(width_px);
-    const float here = disparity.disparity[i];
-    return TapsOnLine(across ? x : y, way, across ? width_px : height_px, between,
-                      [&](int n) { return std::abs(line[Index(n) * step] - here) <= tolerance; });
-  };
-  const auto for_row = [&](int y, const auto& use) {
-    for (int x = 0; x < width_px; ++x) {
-      const std::size_t i = Index(y) * Index(width_px) + Index(x);
-      if (axis.usable[i] == 0) continue;
-      const std::size_t block = Index(y) * Index(blocks) + Index(x / kFilterBlockPx);
-      for (int position = 0; position < axis.count; ++position)
-        use(block, x, taps_of(x, y, position), weights[position]);
-    }
-  };
-  model::ParallelFor(height_px, threads, [&](int y) {
-    for_row(y, [&](std::size_t block, int, const Taps& taps, double) {
-      const int reach = std::max(-taps.offset, taps.offset + taps.count - 1);
-      filter.radius_px[block] = std::max(filter.radius_px[block], reach);
-    });
+  std::vector<FilterRow<Real>> rows(Index(height_px));
+  model::ParallelFor((height_px + kBandRows - 1) / kBandRows, threads, [&](int band) {
+    FilterMaker maker(axis, direction, disparity, weights, between);
+    const int last = std::min((band + 1) * kBandRows, height_px);
+    for (int y = band * kBandRows; y < last; ++y) maker.Make(y, &rows[Index(y)]);
   });
   filter.start.assign(1, 0);
-  for (const int radius : filter.radius_px) {
-    filter.start.push_back(filter.start.back() + Index(2 * radius + 1) * kFilterBlockPx);
-  }
-  filter.coefficients.assign(filter.start.back(), Real(0));
-  const double total = weights.sum();
-  model::ParallelFor(height_px, threads, [&](int y) {
-    const auto coefficient = [&](std::size_t block, int x, int offset) -> Real& {
-      return filter.coefficients[filter.start[block] +
-                                 Index(offset + filter.radius_px[block]) * kFilterBlockPx +
-                                 Index(x % kFilterBlockPx)];
-    };
-    for_row(y, [&](std::size_t block, int x, const Taps& taps, double weight) {
-      for (int n = 0; n < taps.count; ++n)
-        coefficient(block, x, taps.offset + n) += static_cast<Real>(weight * taps.weight[Index(n)]);
-    });
-    for (int x = 0; x < width_px; ++x) {
-      if (axis.usable[Index(y) * Index(width_px) + Index(x)] != 0) continue;
-      const std::size_t block = Index(y) * Index(blocks) + Index(x / kFilterBlockPx);
-      coefficient(block, x, 0) = static_cast<Real>(total);
+  for (const FilterRow<Real>& row : rows) {
+    filter.radius_px.insert(filter.radius_px.end(), row.radius_px.begin(), row.radius_px.end());
+    for (const std::int32_t radius : row.radius_px) {
+      filter.start.push_back(filter.start.back() + Index(2 * radius + 1) * kernels::kFilterBlockPx);
     }
+  }
+  filter.coefficients.resize(filter.start.back());
+  model::ParallelFor(height_px, threads, [&](int y) {
+    FilterRow<Real>& row = rows[Index(y)];
+    const std::size_t first = filter.start[Index(y) * row.radius_px.size()];
+    std::copy(row.coefficients.begin(), row.coefficients.end(),
+              filter.coefficients.begin() + static_cast<std::ptrdiff_t>(first));
+    row = {};
   });
   return filter;
 }

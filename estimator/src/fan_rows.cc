@@ -95,10 +95,10 @@ class Gatherer {
   int first_row_ = 0, last_row_ = -1;
 };
 
-const FanView::Hidden& HiddenAt(const FanView& view, std::size_t i) {
+const CompactView::Hidden& HiddenAt(const CompactView& view, std::size_t i) {
   return *std::lower_bound(
       view.hidden.begin(), view.hidden.end(), i,
-      [](const FanView::Hidden& h, std::size_t at) { return Index(h.index) < at; });
+      [](const CompactView::Hidden& h, std::size_t at) { return Index(h.index) < at; });
 }
 
 // The taps of the ray with this source, as TapsAt has them.
@@ -145,18 +145,19 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
     for (int x = 0; x < fan.width_px; ++x) {
       const std::size_t i = Index(y) * Index(fan.width_px) + Index(x);
       if (is_product[i] != 0) continue;
-      for (const FanView& view : fan.views) {
+      for (const FanView& of_fan : fan.views) {
+        const CompactView& view = of_fan.sees;
         float disparity = view.disparity[i];
         auto source_x = static_cast<float>(view.shift.x() * disparity);
         auto source_y = static_cast<float>(view.shift.y() * disparity);
         if (std::isnan(disparity)) {
-          const FanView::Hidden& hidden = HiddenAt(view, i);
+          const CompactView::Hidden& hidden = HiddenAt(view, i);
           source_x = hidden.source_x;
           source_y = hidden.source_y;
           disparity = hidden.disparity;
         }
         AddTaps(map, tolerance, x + static_cast<double>(source_x),
-                y + static_cast<double>(source_y), disparity, view.weight, &gatherer);
+                y + static_cast<double>(source_y), disparity, of_fan.weight, &gatherer);
       }
       band->pixel.push_back(static_cast<std::int32_t>(i));
       gatherer.MoveTo(band);

@@ -26,6 +26,10 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 std::size_t Stride(int width_px) { return Index(width_px + kBefore + kAfter); }
 
+// So many channels of a pixel are read at once, of a picture with more than one.
+constexpr int kFour = 4;
+int ChannelsOfPixel(int channels) { return channels == 1 ? 1 : kFour; }
+
 void CheckPicture(const model::LinearPicture& picture) {
   if (picture.width_px < 1 || picture.height_px < 1 || picture.channels < 1 ||
       picture.values.size() !=
@@ -43,13 +47,44 @@ void CheckSameSize(const char* what, int width_px, int height_px, const Disparit
                           width_px, height_px, map.width_px, map.height_px));
 }
 
+// Unaligned.
+using Four = float __attribute__((vector_size(kFour * sizeof(float)), aligned(sizeof(float))));
+inline __attribute__((always_inline)) Four Load(const float* from) {
+  return *reinterpret_cast<const Four*>(from);
+}
+
 // The weights of catmull_rom.h, in float and the four at once.
-EIGEN_ALWAYS_INLINE Eigen::Array4f CatmullRom(float fraction) {
-  const Eigen::Array4f cubic(-0.5F, 1.5F, -1.5F, 0.5F);
-  const Eigen::Array4f square(1, -2.5F, 2, -0.5F);
-  const Eigen::Array4f linear(-0.5F, 0, 0.5F, 0);
-  const Eigen::Array4f constant(0, 1, 0, 0);
-  return ((cubic * fraction + square) * fraction + linear) * fraction + constant;
+inline __attribute__((always_inline)) Four CatmullRom(float fraction) {
+  constexpr Four kCubic{-0.5F, 1.5F, -1.5F, 0.5F};
+  constexpr Four kSquare{1, -2.5F, 2, -0.5F};
+  constexpr Four kLinear{-0.5F, 0, 0.5F, 0};
+  constexpr Four kConstant{0, 1, 0, 0};
+  return ((kCubic * fraction + kSquare) * fraction + kLinear) * fraction + kConstant;
+}
+
+// Four taps below each other, `stride` numbers apart.
+inline __attribute__((always_inline)) Four Down(const float* tap, std::size_t stride,
+                                                const Four& weight) {
+  return weight[0] * Load(tap) + weight[1] * Load(tap + stride) +
+         weight[2] * Load(tap + 2 * stride) + weight[3] * Load(tap + 3 * stride);
+}
+
+// The 16 taps from `tap` on, of pixels with four channels. Summed in the same order as those of
+// pixels with one, so that each channel gets the same bits as alone.
+inline __attribute__((always_inline)) Four BicubicOfFour(const float* tap, std::size_t stride,
+                                                         const Four& weight_x,
+                                                         const Four& weight_y) {
+  return (weight_x[0] * Down(tap, stride, weight_y) +
+          weight_x[1] * Down(tap + kFour, stride, weight_y)) +
+         (weight_x[2] * Down(tap + 2 * kFour, stride, weight_y) +
+          weight_x[3] * Down(tap + 3 * kFour, stride, weight_y));
+}
+
+inline __attribute__((always_inline)) float BicubicOfOne(const float* tap, std::size_t stride,
+                                                         const Four& weight_x,
+                                                         const Four& weight_y) {
+  const Four terms = weight_x * Down(tap, stride, weight_y);
+  return (terms[0] + terms[1]) + (terms[2] + terms[3]);
 }
 
 // Sources along one axis, cut to the pixels 0 to `last`: the pixel before and the rest. The source
@@ -73,10 +108,26 @@ void SplitSources(const float* source, int count, std::int32_t origin, std::int3
 
 }  // namespace
 
+// Of one row of a view: disparities, ways to the sources; and of these the pixels before, and the
+// rest of the way.
 struct PictureWarper::TapRow {
   explicit TapRow(int count)
-      : x(Index(count)), y(Index(count)), fraction_x(Index(count)), fraction_y(Index(count)) {}
+      : way_x(Index(count)),
+        way_y(Index(count)),
+        x(Index(count)),
+        y(Index(count)),
+        fraction_x(Index(count)),
+        fraction_y(Index(count)) {}
 
+  void Split(const float* source_x, const float* source_y, int row, int height_px) {
+    const int width_px = static_cast<int>(x.size());
+    const auto limit_px = static_cast<float>(width_px + height_px);
+    SplitSources(source_x, width_px, 0, 1, width_px - 1, limit_px, x.data(), fraction_x.data());
+    SplitSources(source_y, width_px, row, 0, height_px - 1, limit_px, y.data(), fraction_y.data());
+  }
+
+  const float* disparity = nullptr;
+  std::vector<float> way_x, way_y;
   std::vector<std::int32_t> x, y;
   std::vector<float> fraction_x, fraction_y;
 };
@@ -84,25 +135,29 @@ struct PictureWarper::TapRow {
 PictureWarper::PictureWarper(const model::LinearPicture& picture, const DisparityMap& map)
     : map_(map),
       channels_(picture.channels),
-      tolerance_(kSamePointPx / map.step.cwiseAbs().maxCoeff()) {
+      tolerance_(static_cast<float>(kSamePointPx / map.step.cwiseAbs().maxCoeff())) {
   CheckPicture(picture);
   CheckSameSize("the picture", picture.width_px, picture.height_px, map);
-  CopyPlanes(picture);
+  CopyPixels(picture);
   FindRanges();
 }
 
-void PictureWarper::CopyPlanes(const model::LinearPicture& picture) {
+void PictureWarper::CopyPixels(const model::LinearPicture& picture) {
   const int width = picture.width_px;
   const int height = picture.height_px;
-  planes_.resize(Stride(width) * Stride(height) * Index(channels_));
-  float* to = planes_.data();
-  for (int c = 0; c < channels_; ++c) {
+  const int of_pixel = ChannelsOfPixel(channels_);
+  const int planes = (channels_ + of_pixel - 1) / of_pixel;
+  pixels_.resize(Stride(width) * Stride(height) * Index(of_pixel) * Index(planes));
+  float* to = pixels_.data();
+  for (int plane = 0; plane < planes; ++plane) {
+    const int first = plane * of_pixel;
+    const int count = std::min(of_pixel, channels_ - first);
     for (int y = -kBefore; y < height + kAfter; ++y) {
       const float* const row =
           picture.values.data() +
-          Index(std::clamp(y, 0, height - 1)) * Index(width) * Index(channels_) + c;
-      for (int x = -kBefore; x < width + kAfter; ++x) {
-        *to++ = row[Index(std::clamp(x, 0, width - 1)) * Index(channels_)];
+          Index(std::clamp(y, 0, height - 1)) * Index(width) * Index(channels_) + first;
+      for (int x = -kBefore; x < width + kAfter; ++x, to += of_pixel) {
+        std::copy_n(row + Index(std::clamp(x, 0, width - 1)) * Index(channels_), count, to);
       }
     }
   }
@@ -135,46 +190,81 @@ void PictureWarper::FindRanges() {
   }
 }
 
-bool PictureWarper::Agrees(float tap_disparity, float disparity) const {
-  return std::abs(static_cast<double>(tap_disparity) - disparity) <= tolerance_;
-}
-
 // Of the first channel.
 const float* PictureWarper::Tap(int x, int y) const {
-  return planes_.data() + Index(y + kBefore) * Stride(map_.width_px) + Index(x + kBefore);
+  return pixels_.data() + (Index(y + kBefore) * Stride(map_.width_px) + Index(x + kBefore)) *
+                              Index(ChannelsOfPixel(channels_));
 }
 
+// The loop: the processor's own vector instructions come in with the caller that it is inlined
+// into. kChannels: 0 for any.
 template <int kChannels>
-void PictureWarper::WarpRow(const TapRow& taps, const float* disparity, float* warped) const {
+inline __attribute__((always_inline)) void PictureWarper::WarpRowOf(const TapRow& row,
+                                                                    float* warped) const {
   const int channels = kChannels > 0 ? kChannels : channels_;
-  const std::size_t stride = Stride(map_.width_px);
+  const std::size_t stride = Stride(map_.width_px) * Index(kChannels == 1 ? 1 : kFour);
   const std::size_t plane = stride * Stride(map_.height_px);
   for (int n = 0; n < map_.width_px; ++n, warped += channels) {
     const std::size_t i = Index(n);
-    const int x0 = taps.x[i];
-    const int y0 = taps.y[i];
+    const int x0 = row.x[i];
+    const int y0 = row.y[i];
+    const float disparity = row.disparity[i];
     const Range& range = ranges_[Index(y0) * Index(map_.width_px) + Index(x0)];
-    if (!Agrees(range.lowest, disparity[i]) || !Agrees(range.highest, disparity[i])) {
-      Bilinear(x0, y0, taps.fraction_x[i], taps.fraction_y[i], disparity[i], warped);
+    if (!Agrees(range.lowest, disparity) || !Agrees(range.highest, disparity)) {
+      Bilinear(x0, y0, row.fraction_x[i], row.fraction_y[i], disparity, warped);
       continue;
     }
-    using FourOfRow = Eigen::Map<const Eigen::Array4f>;
-    const Eigen::Array4f weight_x = CatmullRom(taps.fraction_x[i]);
-    const Eigen::Array4f weight_y = CatmullRom(taps.fraction_y[i]);
+    const Four weight_x = CatmullRom(row.fraction_x[i]);
+    const Four weight_y = CatmullRom(row.fraction_y[i]);
     const float* tap = Tap(x0 - 1, y0 - 1);
-    for (int c = 0; c < channels; ++c, tap += plane) {
-      const Eigen::Array4f down =
-          weight_y[0] * FourOfRow(tap) + weight_y[1] * FourOfRow(tap + stride) +
-          weight_y[2] * FourOfRow(tap + 2 * stride) + weight_y[3] * FourOfRow(tap + 3 * stride);
-      warped[c] = (weight_x * down).sum();
+    if (kChannels == 1) {
+      *warped = BicubicOfOne(tap, stride, weight_x, weight_y);
+      continue;
     }
+    for (int first = 0; first < channels; first += kFour, tap += plane) {
+      const Four values = BicubicOfFour(tap, stride, weight_x, weight_y);
+      for (int c = 0; c < std::min(kFour, channels - first); ++c) warped[first + c] = values[c];
+    }
+  }
+}
+
+#if defined(__x86_64__)
+
+template <int kChannels>
+__attribute__((target("avx2"))) void PictureWarper::WarpRowAvx2(const TapRow& row,
+                                                                float* warped) const {
+  WarpRowOf<kChannels>(row, warped);
+}
+
+#endif
+
+template <int kChannels>
+void PictureWarper::WarpRow(const TapRow& row, float* warped) const {
+#if defined(__x86_64__)
+  // Without FMA, which would round sums of one channel and of four differently.
+  if (__builtin_cpu_supports("avx2")) return WarpRowAvx2<kChannels>(row, warped);
+#endif
+  WarpRowOf<kChannels>(row, warped);
+}
+
+void PictureWarper::WarpRow(const TapRow& row, float* warped) const {
+  if (channels_ == 3) {
+    WarpRow<3>(row, warped);
+  } else if (channels_ == 1) {
+    WarpRow<1>(row, warped);
+  } else {
+    WarpRow<0>(row, warped);
   }
 }
 
 // Of the taps of the surface alone; where none is, the tap nearest to it in disparity.
 void PictureWarper::Bilinear(int x0, int y0, float fraction_x, float fraction_y, float disparity,
                              float* value) const {
-  const std::size_t plane = Stride(map_.width_px) * Stride(map_.height_px);
+  const int of_pixel = ChannelsOfPixel(channels_);
+  const std::size_t plane = Stride(map_.width_px) * Stride(map_.height_px) * Index(of_pixel);
+  const auto channel = [&](const float* tap, int c) {
+    return tap[Index(c / of_pixel) * plane + Index(c % of_pixel)];
+  };
   double sum_of_weights = 0;
   double closest = std::numeric_limits<double>::infinity();
   const float* closest_tap = Tap(x0, y0);
@@ -194,40 +284,58 @@ void PictureWarper::Bilinear(int x0, int y0, float fraction_x, float fraction_y,
       if (!Agrees(there, disparity)) continue;
       sum_of_weights += weight;
       for (int c = 0; c < channels_; ++c) {
-        value[c] += static_cast<float>(weight) * tap[Index(c) * plane];
+        value[c] += static_cast<float>(weight) * channel(tap, c);
       }
     }
   }
   for (int c = 0; c < channels_; ++c) {
     value[c] = sum_of_weights > 0 ? value[c] / static_cast<float>(sum_of_weights)
-                                  : closest_tap[Index(c) * plane];
+                                  : channel(closest_tap, c);
   }
 }
 
 model::LinearPicture PictureWarper::Warp(const ViewDisparity& view) const {
   CheckSameSize("the view", view.width_px, view.height_px, map_);
-  const int width = map_.width_px;
-  model::LinearPicture warped{width, map_.height_px, channels_, {}};
+  const std::size_t width = Index(map_.width_px);
+  model::LinearPicture warped{map_.width_px, map_.height_px, channels_, {}};
   warped.values.resize(map_.disparity.size() * Index(channels_));
-  const auto limit_px = static_cast<float>(width + map_.height_px);
-  TapRow taps(width);
+  TapRow row(map_.width_px);
   for (int y = 0; y < map_.height_px; ++y) {
-    const std::size_t row = Index(y) * Index(width);
-    SplitSources(view.source_x.data() + row, width, 0, 1, width - 1, limit_px, taps.x.data(),
-                 taps.fraction_x.data());
-    SplitSources(view.source_y.data() + row, width, y, 0, map_.height_px - 1, limit_px,
-                 taps.y.data(), taps.fraction_y.data());
-    const float* const disparity = view.disparity.data() + row;
-    float* const values = warped.values.data() + row * Index(channels_);
-    if (channels_ == 3) {
-      WarpRow<3>(taps, disparity, values);
-    } else if (channels_ == 1) {
-      WarpRow<1>(taps, disparity, values);
-    } else {
-      WarpRow<0>(taps, disparity, values);
-    }
+    const std::size_t first = Index(y) * width;
+    row.disparity = view.disparity.data() + first;
+    row.Split(view.source_x.data() + first, view.source_y.data() + first, y, map_.height_px);
+    WarpRow(row, warped.values.data() + first * Index(channels_));
   }
   return warped;
+}
+
+void PictureWarper::Warp(const CompactView& view, model::LinearPicture* warped) const {
+  CheckSameSize("the view", view.width_px, view.height_px, map_);
+  const std::size_t width = Index(map_.width_px);
+  warped->width_px = map_.width_px;
+  warped->height_px = map_.height_px;
+  warped->channels = channels_;
+  warped->values.resize(map_.disparity.size() * Index(channels_));
+  TapRow row(map_.width_px);
+  std::vector<float> disparity(width);
+  row.disparity = disparity.data();
+  auto hidden = view.hidden.begin();
+  for (int y = 0; y < map_.height_px; ++y) {
+    const std::size_t first = Index(y) * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      disparity[x] = view.disparity[first + x];
+      row.way_x[x] = static_cast<float>(view.shift.x() * disparity[x]);
+      row.way_y[x] = static_cast<float>(view.shift.y() * disparity[x]);
+    }
+    for (; hidden != view.hidden.end() && Index(hidden->index) < first + width; ++hidden) {
+      const std::size_t x = Index(hidden->index) - first;
+      disparity[x] = hidden->disparity;
+      row.way_x[x] = hidden->source_x;
+      row.way_y[x] = hidden->source_y;
+    }
+    row.Split(row.way_x.data(), row.way_y.data(), y, map_.height_px);
+    WarpRow(row, warped->values.data() + first * Index(channels_));
+  }
 }
 
 model::LinearPicture WarpPicture(const model::LinearPicture& picture, const DisparityMap& map,

@@ -23,7 +23,7 @@ inline __attribute__((always_inline)) void Check(const ProductRow& given,
   const auto last_y = static_cast<float>(row.height_px - 1);
   // No two of the arrays overlap.
 #pragma GCC ivdep
-  for (std::int32_t x = 0; x < row.width_px; ++x) {
+  for (std::int32_t x = row.first_x; x < row.last_x; ++x) {
     const float disparity = row.disparity[x];
     const float source_x = row.shift_x * disparity;
     const float source_y = row.shift_y * disparity;

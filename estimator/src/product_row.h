@@ -9,6 +9,7 @@ namespace thicklens::estimator {
 // a product have in their place. No index of a pixel may exceed 2^31.
 struct ProductRow {
   int y = 0, width_px = 0, height_px = 0;
+  int first_x = 0, last_x = 0;  // what is looked at: up to before last_x
   // Of the row's rays: NaN fails; the way to the source is shift * disparity, px.
   const float* disparity = nullptr;
   float shift_x = 0, shift_y = 0;

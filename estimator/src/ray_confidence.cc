@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "estimate_input.h"
+#include "plain_pixels.h"
 #include "ray_landing.h"
 #include "scene_data.h"
 #include "scene_projection.h"
@@ -64,7 +65,10 @@ std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads)
   }
   threads = model::ResolveThreads(threads);
   const ViewFan fan = RenderFan(disparity, input.weights, threads, nullptr);
-  const std::vector<float> seen = SeenShare(fan, disparity, threads);
+  const PlainPixels plain =
+      FindPlainPixels(disparity, static_cast<int>(input.weights.cols()),
+                      static_cast<int>(input.weights.rows()), ProjectionOptions().tolerance_px);
+  const std::vector<float> seen = SeenShare(fan, disparity, plain.is_seen, threads);
   const std::vector<float> blur_sigma_px = BlurSigmaPx(disparity, input.weights);
   std::vector<Confidence> confidence(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -75,21 +79,27 @@ std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads)
 }
 
 std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
-                                      const ViewDisparity& view) {
-  std::vector<Confidence> confidence(view.disparity.size(), kFilledIn);
+                                      const CompactView& view) {
+  std::vector<Confidence> confidence(view.disparity.size());
   const auto width = static_cast<std::size_t>(view.width_px);
+  const auto shift_x = static_cast<float>(view.shift.x());
+  const auto shift_y = static_cast<float>(view.shift.y());
   for (int y = 0; y < view.height_px; ++y) {
+    const std::size_t row = static_cast<std::size_t>(y) * width;
     for (int x = 0; x < view.width_px; ++x) {
-      const std::size_t i = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
-      if (view.seen[i] != Seen::kSeen) continue;
-      // Of a library, lround would take as long as all the rest.
+      const std::size_t i = row + static_cast<std::size_t>(x);
+      // Of a library, lround would take as long as all the rest. NaN goes to the first.
       const auto nearest = [](int sample, float way, int count) {
-        const int at = sample + static_cast<int>(way + (way < 0 ? -0.5F : 0.5F));
-        return static_cast<std::size_t>(std::clamp(at, 0, count - 1));
+        const float at = static_cast<float>(sample) + way + 0.5F;
+        const auto last = static_cast<float>(count - 1);
+        return static_cast<std::size_t>(at > 0 ? (at < last ? at : last) : 0.0F);
       };
-      confidence[i] = of_points[nearest(y, view.source_y[i], view.height_px) * width +
-                                nearest(x, view.source_x[i], view.width_px)];
+      confidence[i] = of_points[nearest(y, shift_y * view.disparity[i], view.height_px) * width +
+                                nearest(x, shift_x * view.disparity[i], view.width_px)];
     }
+  }
+  for (const CompactView::Hidden& hidden : view.hidden) {
+    confidence[static_cast<std::size_t>(hidden.index)] = kFilledIn;
   }
   return confidence;
 }

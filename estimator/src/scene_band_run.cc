@@ -81,7 +81,8 @@ SceneBandRun<Real>::SceneBandRun(const EstimateInput& input, const SceneOptions&
       summary_(summary) {}
 
 template <typename Real>
-SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, SceneMaps* maps) {
+SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, bool wants_confidence,
+                                      SceneMaps* maps) {
   const auto start = Clock::now();
   const int height_px = photograph.height_px;
   if (!options_.slope_weights) {
@@ -98,7 +99,7 @@ SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, Sc
   }
   summary_->setup_seconds += SecondsSince(start);
   for (;;) {
-    std::optional<SolvedScene> solved = SolveIn(count, photograph, maps);
+    std::optional<SolvedScene> solved = SolveIn(count, photograph, wants_confidence, maps);
     if (solved) return std::move(*solved);
     count = std::max(count + 1, BandsFor(bytes_per_pixel_));
   }
@@ -209,10 +210,14 @@ double SceneBandRun<Real>::StrengthFor(const model::LinearPicture& photograph,
 }
 
 template <typename Real>
-bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
-  const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes());
-  summary_->predicted_memory_mib = std::max(summary_->predicted_memory_mib, bytes / kBytesPerMib);
-  if (!options_.memory_limit_mib || bytes <= *options_.memory_limit_mib * kBytesPerMib) return true;
+bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance, double fan_bytes) {
+  const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes(), fan_bytes);
+  const bool fits =
+      !options_.memory_limit_mib || bytes <= *options_.memory_limit_mib * kBytesPerMib;
+  if (fits || fan_bytes == 0) {
+    summary_->predicted_memory_mib = std::max(summary_->predicted_memory_mib, bytes / kBytesPerMib);
+  }
+  if (fits) return true;
   bytes_per_pixel_ =
       std::max(bytes_per_pixel_, radiance.operator_bytes() /
                                      static_cast<double>(input_.picture.width_px) / band.rows());
@@ -220,9 +225,16 @@ bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
 }
 
 template <typename Real>
+bool SceneBandRun<Real>::MayKeepFan(int bands) const {
+  if (bands > 1) return false;
+  if (!input_.grid) return true;
+  return LandingStepPx(*input_.camera, *input_.grid).isZero(0);
+}
+
+template <typename Real>
 std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
                                                        const model::LinearPicture& photograph,
-                                                       SceneMaps* maps) {
+                                                       bool wants_confidence, SceneMaps* maps) {
   auto lap = Clock::now();
   const auto take_lap = [&lap] { return SecondsSince(std::exchange(lap, Clock::now())); };
   const std::vector<SceneBand> bands =
@@ -239,24 +251,29 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
   JoinedSummary joined;
   SolvedScene whole;
   whole.radiance = {photograph.width_px, 0, photograph.channels, {}};
-  whole.of_points.reserve(input_.disparity.disparity.size());
+  if (wants_confidence) whole.of_points.reserve(input_.disparity.disparity.size());
   for (std::size_t i = 0; i < bands.size(); ++i) {
     const SceneBand& band = bands[i];
     ReturnFreedMemory();  // of the band above
     typename Radiance::Run run = RunFor(options);
-    run.confidence = true;
+    run.confidence = wants_confidence;
+    run.fan = MayKeepFan(count);
     run.last_iteration = static_cast<int>(iterations_ * (i + 1) / bands.size());
     Radiance radiance(run);
     const double coarse_seconds = Prepare(photograph, band, Start::kFound, &radiance);
     summary_->solve_seconds += coarse_seconds;
     summary_->setup_seconds += take_lap() - coarse_seconds;
     if (!Fits(band, radiance)) return std::nullopt;
+    if (run.fan) {
+      ViewFan fan = radiance.TakeFan();
+      if (Fits(band, radiance, BytesOf(fan))) whole.fan = std::move(fan);
+    }
     SceneSummary of_band;
     model::LinearPicture solved = radiance.Solve(&of_band);
     progress_->SkipTo(run.last_iteration);
     joined.Add(of_band, band.last - band.first);
     if (maps != nullptr) radiance.AddMaps(maps);
-    radiance.AddConfidence(&whole.of_points);
+    if (wants_confidence) radiance.AddConfidence(&whole.of_points);
     if (count == 1) {
       whole.radiance = std::move(solved);
     } else {

@@ -14,7 +14,8 @@ namespace thicklens::estimator {
 
 struct SolvedScene {
   model::LinearPicture radiance;
-  std::vector<Confidence> of_points;  // of the centre view
+  std::vector<Confidence> of_points;  // of the centre view, if it is wanted
+  ViewFan fan;                        // views that were rendered already; perhaps none
 };
 
 // The radiance of a photograph, solved for in as few bands as the memory allows, one after the
@@ -29,7 +30,7 @@ class SceneBandRun {
 
   // Of the input's photograph without its fall-off. Sets of the summary what the solution tells,
   // and adds the times. Throws Error if the memory limit is too low for the lowest bands.
-  SolvedScene Solve(const model::LinearPicture& photograph, SceneMaps* maps);
+  SolvedScene Solve(const model::LinearPicture& photograph, bool wants_confidence, SceneMaps* maps);
 
  private:
   using Radiance = SceneRadiance<Real>;
@@ -49,8 +50,10 @@ class SceneBandRun {
                  Radiance* radiance) const;
   // Absent if one of them takes more memory than it may.
   std::optional<SolvedScene> SolveIn(int count, const model::LinearPicture& photograph,
-                                     SceneMaps* maps);
-  bool Fits(const SceneBand& band, const Radiance& radiance);
+                                     bool wants_confidence, SceneMaps* maps);
+  bool Fits(const SceneBand& band, const Radiance& radiance, double fan_bytes = 0);
+  // Whether the views of the photograph's rays are those of the light field.
+  bool MayKeepFan(int bands) const;
 
   const EstimateInput& input_;
   const SceneOptions& options_;

@@ -13,9 +13,8 @@ namespace {
 
 constexpr double kFloat = sizeof(float);
 
-// Of a view in the making, for each pixel: its disparity and ways to the sources, what is hidden.
-// And its confidence.
-constexpr double kRenderedBytes = 3 * kFloat + 1 + 1;
+// Of a view in the making, for each pixel: its disparity and confidence.
+constexpr double kRenderedBytes = kFloat + 1;
 // Code that is read in when it runs first, stacks, and all that is not as large as the picture.
 constexpr double kSmallBytes = 8 << 20;
 
@@ -39,7 +38,7 @@ SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options
       patches_(options.prior == Prior::kPatches),
       keeps_(keeps) {}
 
-double SceneMemory::MostBytes(int rows, double operator_bytes) const {
+double SceneMemory::MostBytes(int rows, double operator_bytes, double fan_bytes) const {
   const double all = static_cast<double>(width_px_) * height_px_;
   double kept = all;  // the confidence of its points
   if (keeps_.photograph) kept += kFloat * all * channels_;
@@ -52,8 +51,9 @@ double SceneMemory::MostBytes(int rows, double operator_bytes) const {
     band += kFloat * pixels * channels_;
   }
   return before_ + kept +
-         std::max(band + operator_bytes + std::max(SetupBytes(pixels), SolveBytes(pixels)),
-                  ViewsBytes());
+         std::max(
+             band + operator_bytes + std::max(SetupBytes(pixels), fan_bytes + SolveBytes(pixels)),
+             fan_bytes + ViewsBytes());
 }
 
 double SceneMemory::RowBytes() const {
@@ -101,11 +101,14 @@ double SceneMemory::ViewsBytes() const {
   const double all = static_cast<double>(width_px_) * height_px_;
   const double view = kFloat * channels_;
   constexpr double kRanges = 2 * kFloat;
-  const double all_views = view + kRanges + kRendererBytes;
+  constexpr int kFour = 4;  // channels that are read together, if there are several
+  const int read = channels_ == 1 ? 1 : (channels_ + kFour - 1) / kFour * kFour;
+  const double all_views = kFloat * read + kRanges + kRendererBytes;
   const int at_once = std::min(threads_, u_count_ * v_count_);
   double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
   bytes += at_once * keeps_.sink_bytes;
-  if (keeps_.device) bytes += all * (2 * view + 6 * kFloat);  // the picture, one view, its sources
+  // The picture, one view, its sources; and of each view in the making its sources.
+  if (keeps_.device) bytes += all * (2 * view + 6 * kFloat + at_once * (2 * kFloat + 1));
   if (keeps_.light_field) {
     const double ray = view + (keeps_.maps ? 1 : 0);
     bytes += all * ray * u_count_ * v_count_;

@@ -22,8 +22,9 @@ class SceneMemory {
   SceneMemory(const EstimateInput& input, const SceneOptions& options, const Keeps& keeps,
               int reach_px);
 
-  // In bands of at most so many rows, of which H takes so much.
-  double MostBytes(int rows, double operator_bytes) const;
+  // In bands of at most so many rows, of which H takes so much; and views of the fan are kept, from
+  // when H is made to when they are shown, that take so much.
+  double MostBytes(int rows, double operator_bytes, double fan_bytes = 0) const;
   // What H of a band takes if each pixel takes so much where the picture does not end.
   double OperatorBytes(int rows, double bytes_per_pixel) const;
   // More than any pixel takes.

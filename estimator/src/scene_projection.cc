@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plain_pixels.h"
 #include "seen_share.h"
 #include "thicklens/error.h"
 
@@ -34,7 +35,7 @@ std::vector<Product> ProductsOf(const Eigen::ArrayXXd& weights) {
 std::vector<float> HiddenShare(const ViewFan& fan, std::size_t pixels) {
   std::vector<double> share(pixels, 0.0);
   for (const FanView& view : fan.views) {
-    for (const FanView::Hidden& hidden : view.hidden)
+    for (const CompactView::Hidden& hidden : view.sees.hidden)
       share[static_cast<std::size_t>(hidden.index)] += view.weight;
   }
   return {share.begin(), share.end()};
@@ -139,20 +140,23 @@ template <typename Real>
 SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                           const Eigen::ArrayXXd& weights,
                                           const ProjectionOptions& options) {
-  const ViewFan fan = RenderFan(disparity, weights, options.threads, options.progress);
+  ViewFan fan = RenderFan(disparity, weights, options.threads, options.progress);
+  const auto u_count = static_cast<int>(weights.cols()), v_count = static_cast<int>(weights.rows());
+  const PlainPixels plain = FindPlainPixels(disparity, u_count, v_count, options.tolerance_px);
   SceneProjection<Real> projection;
   projection.width_px = disparity.width_px;
   projection.height_px = disparity.height_px;
   projection.threads = options.threads;
   projection.hidden_share = HiddenShare(fan, projection.pixels());
-  if (options.seen_share) projection.seen_share = SeenShare(fan, disparity, options.threads);
+  if (options.seen_share)
+    projection.seen_share = SeenShare(fan, disparity, plain.is_seen, options.threads);
 
   std::vector<unsigned char> is_product(projection.pixels(), 0);
   const std::vector<Product> products = ProductsOf(weights);
   if (products.size() <= kMostTerms) {
-    const FanAxes axes = AxesOf(fan, disparity, static_cast<int>(weights.cols()),
-                                static_cast<int>(weights.rows()), options.threads);
-    is_product = IsProduct(fan, axes, disparity, options.tolerance_px, options.threads);
+    const FanAxes axes = AxesOf(fan, disparity, u_count, v_count, options.threads);
+    is_product =
+        IsProduct(fan, axes, disparity, options.tolerance_px, plain.is_product, options.threads);
     for (const Product& product : products) {
       projection.terms.push_back({FilterOf<Real>(axes.across, kernels::Axis::kAcross, disparity,
                                                  product.across, options.between, options.threads),
@@ -161,6 +165,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
     }
   }
   projection.rows = RunsOf<Real>(fan, disparity, is_product, options.threads);
+  if (options.fan) projection.fan = std::move(fan);
   return projection;
 }
 

@@ -40,6 +40,7 @@ class SceneProjection {
   std::vector<float> hidden_share;
   // Share of the aperture that sees each point of the centre view; only where it was asked for.
   std::vector<float> seen_share;
+  ViewFan fan;  // likewise
 
   // Both set their results.
   void Apply(const Real* x, int channels, Real* y) const;
@@ -64,6 +65,7 @@ struct ProjectionOptions {
   double tolerance_px = 0.2;          // of a ray's place, where the fan is taken for a product
   Between between = Between::kCubic;  // of the products; rows are linear
   bool seen_share = false;            // is found, too
+  bool fan = false;                   // is kept
   int threads = 1;
   std::function<void()> progress;  // called now and then, from any thread; may throw to stop
 };

@@ -99,6 +99,7 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph, Dispar
   projection.threads = run_.threads;
   projection.between = run_.options.cubic ? Between::kCubic : Between::kLinear;
   projection.seen_share = run_.confidence;
+  projection.fan = run_.fan;
   projection.progress = [this] { run_.progress->Tell(); };
   projection_ = MakeSceneProjection<Real>(disparity_, run_.input.weights, projection);
   ReturnFreedMemory();

@@ -2,6 +2,7 @@
 #define THICKLENS_ESTIMATOR_SRC_SCENE_RADIANCE_H_
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "iteration_progress.h"
@@ -38,6 +39,7 @@ class SceneRadiance {
     int last_iteration = 0;  // for the progress: of this band and those before it
     IterationProgress* progress = nullptr;
     bool confidence = false;  // is asked for
+    bool fan = false;         // is to be kept
   };
   explicit SceneRadiance(const Run& run) : run_(run) {}
 
@@ -52,6 +54,9 @@ class SceneRadiance {
   // Of the band's result.
   double result_operator_bytes() const { return OperatorBytes(first_row(), last_row()); }
   SignalSum Signal() const;
+
+  // The views of the photograph's rays, if they were to be kept; they are no longer after it.
+  ViewFan TakeFan() { return std::exchange(projection_.fan, {}); }
 
   // Sets what the summary tells of the solution, and of the band's result.
   model::LinearPicture Solve(SceneSummary* summary);

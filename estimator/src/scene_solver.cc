@@ -85,7 +85,9 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
         WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, summary->threads);
   }
   summary->setup_seconds = SecondsSince(start);
-  SolvedScene solved = run.Solve(falloff ? *without_falloff : input.picture, maps);
+  const bool wants_confidence = sink != nullptr ? sink->wants_confidence : maps != nullptr;
+  SolvedScene solved =
+      run.Solve(falloff ? *without_falloff : input.picture, wants_confidence, maps);
   without_falloff.reset();
   ReturnFreedMemory();
 
@@ -105,7 +107,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
                                       index * static_cast<std::ptrdiff_t>(confidence.size()));
                       }
                     },
-                    0});
+                    0, maps != nullptr});
   } else {
     ShowInAllViews(input, solved, summary->threads, backend, &progress, *sink);
   }

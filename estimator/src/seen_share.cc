@@ -26,7 +26,7 @@ bool FindAround(float at, int count, Around* around) {
 }
 
 // Whether the ray of one view from the point at (x, y) comes through to the photograph.
-bool ComesThrough(const FanView& view, const DisparityMap& map, float tolerance, int x, int y) {
+bool ComesThrough(const CompactView& view, const DisparityMap& map, float tolerance, int x, int y) {
   const float disparity = map.disparity[Index(y) * Index(map.width_px) + Index(x)];
   Around across, down;
   if (!FindAround(static_cast<float>(x) - static_cast<float>(view.shift.x()) * disparity,
@@ -45,15 +45,18 @@ bool ComesThrough(const FanView& view, const DisparityMap& map, float tolerance,
 
 }  // namespace
 
-std::vector<float> SeenShare(const ViewFan& fan, const DisparityMap& disparity, int threads) {
+std::vector<float> SeenShare(const ViewFan& fan, const DisparityMap& disparity,
+                             const std::vector<unsigned char>& known, int threads) {
   const auto tolerance = static_cast<float>(SurfaceTolerance(disparity));
   std::vector<float> share(disparity.disparity.size(), 0.0F);
   model::ParallelFor(disparity.height_px, threads, [&](int y) {
     float* const row = share.data() + Index(y) * Index(disparity.width_px);
+    const unsigned char* const known_row = known.data() + Index(y) * Index(disparity.width_px);
     for (const FanView& view : fan.views) {
       const auto weight = static_cast<float>(view.weight);
       for (int x = 0; x < disparity.width_px; ++x) {
-        if (ComesThrough(view, disparity, tolerance, x, y)) row[x] += weight;
+        if (known_row[x] != 0 || ComesThrough(view.sees, disparity, tolerance, x, y))
+          row[x] += weight;
       }
     }
   });

@@ -16,35 +16,18 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 double Offset(int position, int count) { return position - (count - 1) / 2.0; }
 
-FanView Compact(ViewDisparity rendered) {
-  FanView view;
-  view.disparity = std::move(rendered.disparity);
-  for (std::size_t i = 0; i < view.disparity.size(); ++i) {
-    if (rendered.seen[i] == Seen::kSeen) continue;
-    view.hidden.push_back({static_cast<std::int32_t>(i), rendered.source_x[i], rendered.source_y[i],
-                           view.disparity[i]});
-    view.disparity[i] = kNone;
-  }
-  return view;
-}
-
 // A view's ways to its sources along one axis, NaN where it is hidden; from the fan if it is one of
 // its views.
 std::vector<float> SourcesOf(const ViewFan& fan, const DisparityMap& disparity, double a, double b,
                              bool across) {
-  for (const FanView& view : fan.views) {
-    if (view.a != a || view.b != b) continue;
-    std::vector<float> way = view.disparity;
+  const auto ways_of = [across](const CompactView& view) {
+    std::vector<float> ways = view.disparity;
     const auto shift = static_cast<float>(across ? view.shift.x() : view.shift.y());
-    for (float& d : way) d *= shift;
-    return way;
-  }
-  ViewDisparity view = RenderDisparity(disparity, a, b);
-  std::vector<float> way = std::move(across ? view.source_x : view.source_y);
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    if (view.seen[i] != Seen::kSeen) way[i] = kNone;
-  }
-  return way;
+    for (float& way : ways) way *= shift;
+    return ways;
+  };
+  if (const CompactView* view = ViewAt(fan, a, b)) return ways_of(*view);
+  return ways_of(DisparityRenderer(disparity).RenderCompact(a, b));
 }
 
 // The same for a position on an axis of the aperture; of an even count of views, the mean of the
@@ -63,6 +46,22 @@ std::vector<float> SourcesOnAxis(const ViewFan& fan, const DisparityMap& dispari
 }
 
 }  // namespace
+
+double BytesOf(const ViewFan& fan) {
+  std::size_t bytes = 0;
+  for (const FanView& view : fan.views) {
+    bytes += view.sees.disparity.capacity() * sizeof(float) +
+             view.sees.hidden.capacity() * sizeof(CompactView::Hidden);
+  }
+  return static_cast<double>(bytes);
+}
+
+const CompactView* ViewAt(const ViewFan& fan, double a, double b) {
+  for (const FanView& view : fan.views) {
+    if (view.a == a && view.b == b) return &view.sees;
+  }
+  return nullptr;
+}
 
 ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
                   const std::function<void()>& progress) {
@@ -84,12 +83,7 @@ ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights,
   model::ParallelFor(static_cast<int>(fan.views.size()), threads, [&](int i) {
     if (progress) progress();
     FanView& view = fan.views[Index(i)];
-    FanView rendered = Compact(renderer.Render(view.a, view.b));
-    rendered.a = view.a;
-    rendered.b = view.b;
-    rendered.weight = view.weight;
-    rendered.shift = {view.a * disparity.step.x(), view.b * disparity.step.y()};
-    view = std::move(rendered);
+    view.sees = renderer.RenderCompact(view.a, view.b);
   });
   return fan;
 }

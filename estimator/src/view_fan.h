@@ -2,7 +2,6 @@
 #define THICKLENS_ESTIMATOR_SRC_VIEW_FAN_H_
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -11,18 +10,10 @@
 
 namespace thicklens::estimator {
 
-// One view's ViewDisparity in a third of the memory: the way to a seen sample's source follows from
-// its disparity.
 struct FanView {
-  struct Hidden {
-    std::int32_t index = 0;  // of the sample
-    float source_x = 0, source_y = 0, disparity = 0;
-  };
   double a = 0, b = 0;  // steps from the centre
   double weight = 0;
-  Eigen::Vector2d shift{0, 0};   // px per unit of disparity
-  std::vector<float> disparity;  // NaN: hidden
-  std::vector<Hidden> hidden;    // by index
+  CompactView sees;
 };
 
 // All rays of the aperture through the pixels of a photograph.
@@ -30,6 +21,9 @@ struct ViewFan {
   int width_px = 0, height_px = 0;
   std::vector<FanView> views;  // those with a weight, row by row
 };
+double BytesOf(const ViewFan& fan);
+// The view that is so many steps from the centre; null if it has no weight.
+const CompactView* ViewAt(const ViewFan& fan, double a, double b);
 ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
                   const std::function<void()>& progress);
 
@@ -48,10 +42,11 @@ FanAxes AxesOf(const ViewFan& fan, const DisparityMap& disparity, int u_count, i
                int threads);
 
 // For each pixel whether the product of the axes puts every ray of the fan where it belongs, to a
-// tolerance, on taps of one surface inside the picture.
+// tolerance, on taps of one surface inside the picture. Those that are known to be are not looked
+// at.
 std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
                                      const DisparityMap& disparity, double tolerance_px,
-                                     int threads);
+                                     const std::vector<unsigned char>& known, int threads);
 
 // How a picture is read between its pixels.
 enum class Between {

@@ -198,6 +198,9 @@ TEST_P(TwinTest, WarpsAsThePlainTwinDoes) {
       const ViewDisparity view = PlainView(map, a, b);
       const model::LinearPicture warped = warper.Warp(view);
       EXPECT_EQ(warped.channels, channels);
+      model::LinearPicture of_compact{1, 1, 1, {0}};  // of another size before
+      warper.Warp(DisparityRenderer(map).RenderCompact(a, b), &of_compact);
+      EXPECT_EQ(of_compact.values, warper.Warp(RenderDisparity(map, a, b)).values);
       ExpectNear("value", warped.values, PlainWarp(picture, map, view).values,
                  map.width_px * channels, 2e-6);
       ExpectNear("value of the device's twin", DeviceTwinWarp(picture, map, view), warped.values,

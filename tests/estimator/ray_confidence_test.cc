@@ -129,7 +129,7 @@ TEST(RayConfidence, IsThatOfThePointAndNothingWhereThereIsNone) {
   const std::vector<Confidence> of_points = PointConfidence(input, 1);
   // One step to the right the card has moved one px to the left, and uncovers a column.
   const std::vector<Confidence> rays =
-      RayConfidence(of_points, RenderDisparity(input.disparity, 1, 0));
+      RayConfidence(of_points, DisparityRenderer(input.disparity).RenderCompact(1, 0));
   for (int y = 8; y < 14; ++y) {
     for (int x = 9; x < 17; ++x) EXPECT_EQ(rays[At(x, y)], 255) << x << ", " << y;
     EXPECT_EQ(rays[At(17, y)], kFilledIn);
@@ -137,7 +137,8 @@ TEST(RayConfidence, IsThatOfThePointAndNothingWhereThereIsNone) {
     EXPECT_EQ(rays[At(8, y)], of_points[At(8, y)]);
   }
   // In the middle view all rays are of points.
-  EXPECT_EQ(RayConfidence(of_points, RenderDisparity(input.disparity, 0, 0)), of_points);
+  EXPECT_EQ(RayConfidence(of_points, DisparityRenderer(input.disparity).RenderCompact(0, 0)),
+            of_points);
 }
 
 TEST(RayConfidence, ComesWithTheSceneSolver) {
@@ -153,8 +154,9 @@ TEST(RayConfidence, ComesWithTheSceneSolver) {
     for (int k = 0; k < 3; ++k) {
       const auto first =
           maps.confidence.begin() + (l * 3 + k) * static_cast<std::ptrdiff_t>(of_points.size());
-      EXPECT_EQ(std::vector<Confidence>(first, first + kW * kH),
-                RayConfidence(of_points, RenderDisparity(input.disparity, k - 1, l - 1)))
+      EXPECT_EQ(
+          std::vector<Confidence>(first, first + kW * kH),
+          RayConfidence(of_points, DisparityRenderer(input.disparity).RenderCompact(k - 1, l - 1)))
           << k << ", " << l;
     }
   }

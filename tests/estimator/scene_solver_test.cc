@@ -9,8 +9,10 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/error_message.h"
@@ -356,6 +358,49 @@ TEST(SceneSolver, MapsTellBlurAndWhatIsHidden) {
   double squares = 0;
   for (const float value : maps.residual) squares += static_cast<double>(value) * value;
   EXPECT_NEAR(std::sqrt(squares / (40 * 36)), summary.residual_rms, 1e-6);
+}
+
+// Whether or not the views that H was made of are shown again: those of a weight, of a photograph
+// on its own grid.
+TEST(SceneSolver, ViewsAreTheRadianceWarped) {
+  EstimateInput simulated = SimulatedScene().input;
+  simulated.weights(0, 0) = 0;  // has no part in H
+  simulated.weights /= simulated.weights.sum();
+  EstimateInput off_focus = simulated;
+  off_focus.grid = model::GridOnPlanes(*simulated.camera, {0, 700}, 5, 5);
+  off_focus.disparity = simulated.disparity;
+  for (const EstimateInput& input : {simulated, off_focus}) {
+    SceneSummary summary;
+    SceneMaps maps;
+    const model::LightField found = EstimateScene(input, {}, &summary, &maps);
+    for (const auto& [k, l] : {std::pair{0, 0}, {2, 2}, {4, 1}, {1, 3}}) {
+      EXPECT_EQ(model::ViewPicture(found, k, l).values,
+                WarpPicture(maps.radiance, input.disparity,
+                            RenderDisparity(input.disparity, k - 2, l - 2))
+                    .values)
+          << k << ", " << l;
+    }
+  }
+}
+
+TEST(SceneSolver, GivesConfidenceToASinkThatWantsIt) {
+  const EstimateInput input = MadeUp(1.5F, 1);
+  for (const bool wanted : {true, false}) {
+    SceneViewSink sink;
+    sink.wants_confidence = wanted;
+    std::mutex mutex;
+    int views = 0;
+    sink.take = [&](int, int, const model::LinearPicture& view,
+                    const std::vector<Confidence>& confidence) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      EXPECT_EQ(view.values.size(), 40 * 36u);
+      EXPECT_EQ(confidence.size(), wanted ? 40 * 36u : 0u);
+      ++views;
+    };
+    SceneSummary summary;
+    EstimateSceneViews(input, {}, sink, &summary, nullptr);
+    EXPECT_EQ(views, 9);
+  }
 }
 
 TEST(SceneSolver, ProgressNeverGoesBackAndMayStop) {

@@ -26,8 +26,8 @@ void WriteConfidence(const estimator::EstimateInput& input, int threads, LightFi
   model::ParallelFor(u_count * v_count, model::ResolveThreads(threads), [&](int i) {
     ThrowIfInterrupted();
     const int k = i % u_count, l = i / u_count;
-    const estimator::ViewDisparity view =
-        renderer.Render(k - (u_count - 1) / 2.0, l - (v_count - 1) / 2.0);
+    const estimator::CompactView view =
+        renderer.RenderCompact(k - (u_count - 1) / 2.0, l - (v_count - 1) / 2.0);
     writer->WriteConfidence(k, l, estimator::RayConfidence(of_points, view), view.width_px);
   });
 }

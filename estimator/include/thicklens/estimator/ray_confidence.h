@@ -43,7 +43,7 @@ std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads)
 
 // Of the rays of one view, whose disparity was rendered, from that of the points.
 std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
-                                      const ViewDisparity& view);
+                                      const CompactView& view);
 
 }  // namespace thicklens::estimator
 

@@ -127,10 +127,12 @@ model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& 
 // Takes the views one by one as they are made: each once, in any order, from several threads at the
 // same time. May throw to stop.
 struct SceneViewSink {
+  // `confidence` is empty where it is not wanted.
   std::function<void(int k, int l, const model::LinearPicture& view,
                      const std::vector<Confidence>& confidence)>
       take;
   double bytes = 0;  // that it needs for one view while it has it
+  bool wants_confidence = true;
 };
 // EstimateScene without ever holding all views; what comes back has none.
 model::LightField EstimateSceneViews(const EstimateInput& input, const SceneOptions& options,

@@ -2,6 +2,7 @@
 #define THICKLENS_ESTIMATOR_VIEW_GEOMETRY_H_
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -67,6 +68,22 @@ struct ViewDisparity {
   std::vector<float> source_x, source_y;
 };
 
+// ViewDisparity in a third of the memory: the way to the source of what is seen follows from its
+// disparity.
+struct CompactView {
+  struct Hidden {
+    std::int32_t index = 0;  // of the sample
+    float source_x = 0, source_y = 0, disparity = 0;
+  };
+  int width_px = 0;
+  int height_px = 0;
+  Eigen::Vector2d shift{0, 0};   // px per unit of disparity
+  std::vector<float> disparity;  // NaN: hidden
+  std::vector<Hidden> hidden;    // by index
+};
+
+ViewDisparity Expanded(CompactView view);
+
 // The disparity rendered into the view at (a, b) steps: every 2 x 2 cell of centre pixels whose
 // disparities differ by at most .2 px per view step is two triangles at (x - a d, y - b d), and
 // every pixel of the other cells a square of +-.5 px; the nearest wins. Px per view step are those
@@ -86,6 +103,7 @@ class DisparityRenderer {
   explicit DisparityRenderer(const DisparityMap&& map) = delete;
 
   ViewDisparity Render(double a, double b) const;
+  CompactView RenderCompact(double a, double b) const;
 
  private:
   const DisparityMap& map_;
@@ -109,6 +127,8 @@ class PictureWarper {
   PictureWarper(const model::LinearPicture& picture, const DisparityMap&& map) = delete;
 
   model::LinearPicture Warp(const ViewDisparity& view) const;
+  // To a picture whose memory is taken again where it has enough.
+  void Warp(const CompactView& view, model::LinearPicture* warped) const;
 
  private:
   struct Range {
@@ -116,19 +136,26 @@ class PictureWarper {
   };
   struct TapRow;
 
-  void CopyPlanes(const model::LinearPicture& picture);
+  void CopyPixels(const model::LinearPicture& picture);
   void FindRanges();
+  void WarpRow(const TapRow& row, float* warped) const;
   template <int kChannels>
-  void WarpRow(const TapRow& taps, const float* disparity, float* warped) const;
+  void WarpRow(const TapRow& row, float* warped) const;
+  template <int kChannels>
+  void WarpRowAvx2(const TapRow& row, float* warped) const;
+  template <int kChannels>
+  void WarpRowOf(const TapRow& row, float* warped) const;
   void Bilinear(int x0, int y0, float fraction_x, float fraction_y, float disparity,
                 float* value) const;
-  bool Agrees(float tap_disparity, float disparity) const;
+  bool Agrees(float tap_disparity, float disparity) const {
+    return std::abs(tap_disparity - disparity) <= tolerance_;
+  }
   const float* Tap(int x, int y) const;
 
   const DisparityMap& map_;
   const int channels_;
-  const double tolerance_;     // in the unit of the map; infinite where the steps are 0
-  std::vector<float> planes_;  // of the channels, with their borders repeated
+  const float tolerance_;      // in the unit of the map; infinite where the steps are 0
+  std::vector<float> pixels_;  // fours of channels, a plane each, with their borders repeated
   std::vector<Range> ranges_;  // of the disparities of the 16 taps of each pixel
 };
 
