@@ -28,57 +28,52 @@ class Gatherer {
  public:
   // Rows of the picture lie stride_px apart.
   Gatherer(int stride_px, int height_px)
-      : sum_(Index(stride_px) * Index(height_px), Real{0}),
-        stride_(Index(stride_px)),
-        extent_(Index(height_px)),
-        first_row_(height_px) {}
+      : sum_(Index(stride_px) * Index(height_px), Real{0}), stride_(Index(stride_px)) {}
 
   void Add(int row, int column, Real weight) {
-    const std::size_t at = PlaceOf(row, column);
-    sum_[at] += weight;
-    Extend(row, at, at + 1);
+    sum_[PlaceOf(row, column)] += weight;
+    Reach(row, column, 1);
   }
 
-  // To the pixel and the one at its right.
-  void Add(int row, int column, Real weight, Real weight_right) {
-    const std::size_t at = PlaceOf(row, column);
-    sum_[at] += weight;
-    sum_[at + 1] += weight_right;
-    Extend(row, at, at + 2);
+  // To the pixels (row, column), the one at its right, and the two below.
+  void AddFour(int row, int column, Real upper, Real upper_right, Real lower, Real lower_right) {
+    Real* const at = sum_.data() + PlaceOf(row, column);
+    at[0] += upper;
+    at[1] += upper_right;
+    at[stride_] += lower;
+    at[stride_ + 1] += lower_right;
+    Reach(row, column, 2);
   }
 
   // All sums to the end of a band, as the runs of one row.
   void MoveTo(Band<Real>* band) {
     const std::size_t before = band->index.size();
-    for (int row = first_row_; row <= last_row_; ++row) {
-      MoveRuns(extent_[Index(row)], band);
-      extent_[Index(row)] = {};
-    }
+    for (int row = reached_.first_row; row < reached_.end_row; ++row) MoveRuns(row, band);
     band->runs.push_back(static_cast<std::int32_t>(band->index.size() - before));
-    first_row_ = static_cast<int>(extent_.size());
-    last_row_ = -1;
+    reached_ = {};
   }
 
  private:
-  // The places of a row of the picture that have a sum lie in [first, end).
-  struct Extent {
-    std::size_t first = std::numeric_limits<std::size_t>::max(), end = 0;
+  // Of the picture, where sums may be.
+  struct Part {
+    int first_row = std::numeric_limits<int>::max(), end_row = 0;
+    int first_column = std::numeric_limits<int>::max(), end_column = 0;
   };
 
   std::size_t PlaceOf(int row, int column) const { return Index(row) * stride_ + Index(column); }
 
-  void Extend(int row, std::size_t first, std::size_t end) {
-    Extent& extent = extent_[Index(row)];
-    extent.first = std::min(extent.first, first);
-    extent.end = std::max(extent.end, end);
-    first_row_ = std::min(first_row_, row);
-    last_row_ = std::max(last_row_, row);
+  void Reach(int row, int column, int count) {
+    reached_.first_row = std::min(reached_.first_row, row);
+    reached_.end_row = std::max(reached_.end_row, row + count);
+    reached_.first_column = std::min(reached_.first_column, column);
+    reached_.end_column = std::max(reached_.end_column, column + count);
   }
 
-  // What is moved is 0 afterwards, so that runs need not end with the extent.
-  void MoveRuns(const Extent& extent, Band<Real>* band) {
+  // What is moved is 0 afterwards, so that runs need not end where the sums do.
+  void MoveRuns(int row, Band<Real>* band) {
     constexpr std::size_t kPixels = kernels::kPixelsOfRun;
-    for (std::size_t at = extent.first; at < extent.end; ++at) {
+    const std::size_t end = PlaceOf(row, reached_.end_column);
+    for (std::size_t at = PlaceOf(row, reached_.first_column); at < end; ++at) {
       if (sum_[at] == 0) continue;
       const auto first = sum_.begin() + static_cast<std::ptrdiff_t>(at);
       const auto last = first + static_cast<std::ptrdiff_t>(kPixels);
@@ -91,8 +86,7 @@ class Gatherer {
 
   std::vector<Real> sum_;  // of each pixel of the picture
   std::size_t stride_;
-  std::vector<Extent> extent_;
-  int first_row_ = 0, last_row_ = -1;
+  Part reached_;
 };
 
 const CompactView::Hidden& HiddenAt(const CompactView& view, std::size_t i) {
@@ -101,38 +95,65 @@ const CompactView::Hidden& HiddenAt(const CompactView& view, std::size_t i) {
       [](const CompactView::Hidden& h, std::size_t at) { return Index(h.index) < at; });
 }
 
-// The taps of the ray with this source, as TapsAt has them.
+int Floor(float x) {
+  const int toward_zero = static_cast<int>(x);
+  return toward_zero - (static_cast<float>(toward_zero) > x ? 1 : 0);
+}
+
+// A ray of the pixel (x, y).
+struct FanRay {
+  float source_x = 0, source_y = 0, disparity = 0;
+  double weight = 0;
+};
+
+// Its taps, as TapsAt has them.
 template <typename Real>
-void AddTaps(const DisparityMap& map, double tolerance, double x, double y, float disparity,
-             double weight, Gatherer<Real>* gatherer) {
-  const double inside_y = std::clamp(y, 0.0, map.height_px - 1.0);
-  const int row = static_cast<int>(inside_y);
-  const std::size_t below = Index(row + 1) * Index(map.width_px);
-  // Most rays read four pixels of one surface.
-  if (x >= 0 && x < map.width_px - 1 && y >= 0 && y < map.height_px - 1) {
-    const int column = static_cast<int>(x);
-    const std::size_t under = below + Index(column);
-    const std::size_t pixel = under - Index(map.width_px);
-    const auto is_near = [&](std::size_t p) {
-      return std::abs(static_cast<double>(map.disparity[p]) - disparity) <= tolerance;
-    };
-    if (is_near(pixel) && is_near(pixel + 1) && is_near(under) && is_near(under + 1)) {
-      const double right = x - column;
-      const double lower = weight * (y - row), upper = weight - lower;
-      gatherer->Add(row, column, static_cast<Real>(upper - upper * right),
-                    static_cast<Real>(upper * right));
-      gatherer->Add(row + 1, column, static_cast<Real>(lower - lower * right),
-                    static_cast<Real>(lower * right));
-      return;
-    }
-  }
-  const SurfaceTaps taps = TapsAt(map, tolerance, x, y, disparity);
+void AddTaps(const DisparityMap& map, double tolerance, int x, int y, const FanRay& ray,
+             Gatherer<Real>* gatherer) {
+  const SurfaceTaps taps = TapsAt(map, tolerance, x + static_cast<double>(ray.source_x),
+                                  y + static_cast<double>(ray.source_y), ray.disparity);
   for (std::size_t t = 0; t < Index(taps.count); ++t) {
-    const bool is_below = taps.pixel[t] >= below;
-    const std::size_t first = is_below ? below : below - Index(map.width_px);
-    gatherer->Add(is_below ? row + 1 : row, static_cast<int>(taps.pixel[t] - first),
-                  static_cast<Real>(weight * taps.weight[t]));
+    const auto width = Index(map.width_px);
+    gatherer->Add(static_cast<int>(taps.pixel[t] / width), static_cast<int>(taps.pixel[t] % width),
+                  static_cast<Real>(ray.weight * taps.weight[t]));
   }
+}
+
+// The same of most rays: they read four pixels of one surface. False for the others. `limit_px`:
+// more than the picture is wide and high.
+template <typename Real>
+bool AddFourTaps(const DisparityMap& map, float tolerance, float limit_px, int x, int y,
+                 const FanRay& ray, Gatherer<Real>* gatherer) {
+  if (!(std::abs(ray.source_x) < limit_px && std::abs(ray.source_y) < limit_px)) return false;
+  const int step_x = Floor(ray.source_x), step_y = Floor(ray.source_y);
+  const int column = x + step_x, row = y + step_y;
+  if (column < 0 || row < 0 || column + 1 >= map.width_px || row + 1 >= map.height_px) return false;
+  const float* const upper = map.disparity.data() + Index(row) * Index(map.width_px) + column;
+  const float* const lower = upper + map.width_px;
+  const auto is_near = [&](float there) { return std::abs(there - ray.disparity) <= tolerance; };
+  if (!is_near(upper[0]) || !is_near(upper[1]) || !is_near(lower[0]) || !is_near(lower[1])) {
+    return false;
+  }
+  const auto weight = static_cast<Real>(ray.weight);
+  const auto right = static_cast<Real>(ray.source_x - static_cast<float>(step_x));
+  const Real below = weight * static_cast<Real>(ray.source_y - static_cast<float>(step_y));
+  const Real above = weight - below;
+  gatherer->AddFour(row, column, above - above * right, above * right, below - below * right,
+                    below * right);
+  return true;
+}
+
+// Room for as many runs in the rows to come as there were in those that are done. What is reserved
+// and never written takes no memory.
+template <typename Real>
+void Reserve(int rows_done, int rows, Band<Real>* band) {
+  constexpr double kMore = 1.1;
+  const double per_row = kMore * static_cast<double>(band->index.size()) / rows_done;
+  const std::size_t needed = band->index.size() + static_cast<std::size_t>(per_row);
+  if (band->index.capacity() >= needed) return;
+  const auto runs = static_cast<std::size_t>(per_row * rows);
+  band->index.reserve(runs);
+  band->weight.reserve(runs * Index(kernels::kPixelsOfRun));
 }
 
 template <typename Real>
@@ -140,6 +161,8 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
               const std::vector<unsigned char>& is_product, int stride_px, int first_row,
               int last_row, Band<Real>* band) {
   const double tolerance = SurfaceTolerance(map);
+  const auto near = static_cast<float>(tolerance);
+  const auto limit_px = static_cast<float>(map.width_px + map.height_px);
   Gatherer<Real> gatherer(stride_px, map.height_px);
   for (int y = first_row; y < last_row; ++y) {
     for (int x = 0; x < fan.width_px; ++x) {
@@ -147,31 +170,27 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
       if (is_product[i] != 0) continue;
       for (const FanView& of_fan : fan.views) {
         const CompactView& view = of_fan.sees;
-        float disparity = view.disparity[i];
-        auto source_x = static_cast<float>(view.shift.x() * disparity);
-        auto source_y = static_cast<float>(view.shift.y() * disparity);
-        if (std::isnan(disparity)) {
+        FanRay ray;
+        ray.weight = of_fan.weight;
+        ray.disparity = view.disparity[i];
+        if (std::isnan(ray.disparity)) {
           const CompactView::Hidden& hidden = HiddenAt(view, i);
-          source_x = hidden.source_x;
-          source_y = hidden.source_y;
-          disparity = hidden.disparity;
+          ray.source_x = hidden.source_x;
+          ray.source_y = hidden.source_y;
+          ray.disparity = hidden.disparity;
+        } else {
+          ray.source_x = static_cast<float>(view.shift.x() * ray.disparity);
+          ray.source_y = static_cast<float>(view.shift.y() * ray.disparity);
         }
-        AddTaps(map, tolerance, x + static_cast<double>(source_x),
-                y + static_cast<double>(source_y), disparity, of_fan.weight, &gatherer);
+        if (!AddFourTaps(map, near, limit_px, x, y, ray, &gatherer)) {
+          AddTaps(map, tolerance, x, y, ray, &gatherer);
+        }
       }
       band->pixel.push_back(static_cast<std::int32_t>(i));
       gatherer.MoveTo(band);
     }
+    Reserve(y + 1 - first_row, last_row - first_row, band);
   }
-  // All bands are held at once, and half of what they reserved may be empty.
-  band->index.shrink_to_fit();
-  band->weight.shrink_to_fit();
-}
-
-template <typename T>
-void Append(std::vector<T>* from, std::vector<T>* to) {
-  to->insert(to->end(), from->begin(), from->end());
-  *from = {};
 }
 
 }  // namespace
@@ -189,24 +208,26 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
     FillBand(fan, disparity, is_product, runs.stride_px(), n * kBandRows,
              std::min((n + 1) * kBandRows, fan.height_px), &parts[Index(n)]);
   });
-  std::size_t weights = 0, count = 0, rows = 0;
+  std::vector<std::size_t> first(1, 0);  // run of each band; and the end
   for (const Band<Real>& part : parts) {
-    weights += part.weight.size();
-    count += part.index.size();
-    rows += part.pixel.size();
+    first.push_back(first.back() + part.index.size());
+    runs.pixel.insert(runs.pixel.end(), part.pixel.begin(), part.pixel.end());
   }
-  runs.weight.reserve(weights);
-  runs.index.reserve(count);
-  runs.pixel.reserve(rows);
-  runs.run.reserve(rows + 1);
   runs.run.push_back(0);
-  for (Band<Real>& part : parts) {
+  for (const Band<Real>& part : parts) {
     for (const std::int32_t of_row : part.runs) runs.run.push_back(runs.run.back() + of_row);
-    Append(&part.pixel, &runs.pixel);
-    Append(&part.index, &runs.index);
-    Append(&part.weight, &runs.weight);
-    part = {};
   }
+  runs.index.resize(first.back());
+  runs.weight.resize(first.back() * Index(kernels::kPixelsOfRun));
+  model::ParallelFor(bands, threads, [&](int n) {
+    Band<Real>& part = parts[Index(n)];
+    const std::size_t at = first[Index(n)];
+    std::copy(part.index.begin(), part.index.end(),
+              runs.index.begin() + static_cast<std::ptrdiff_t>(at));
+    std::copy(part.weight.begin(), part.weight.end(),
+              runs.weight.data() + at * Index(kernels::kPixelsOfRun));
+    part = {};
+  });
   kernels::SetBands(&runs);
   return runs;
 }

@@ -3,6 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
 namespace thicklens::kernels {
@@ -47,6 +50,20 @@ PixelRows<Real> Transposed(const PixelRows<Real>& rows);
 // Pixels beside each other that are read together.
 constexpr int kPixelsOfRun = 8;
 
+// For vectors whose resize() leaves new numbers as they are, so that the threads that write them
+// first are those that pay for the memory.
+template <typename T>
+struct UntouchedAllocator : std::allocator<T> {
+  template <typename U>
+  struct rebind {
+    using other = UntouchedAllocator<U>;
+  };
+  template <typename U, typename... Arguments>
+  void construct(U* at, Arguments&&... arguments) {
+    if constexpr (sizeof...(Arguments) > 0) new (at) U(std::forward<Arguments>(arguments)...);
+  }
+};
+
 // The same sums by runs of pixels that lie beside each other, which take less to hold and to read:
 // run n reads the pixels index_n to index_n + kPixelsOfRun - 1 of a copy of the picture whose rows
 // lie stride_px() apart, by weights that may be 0 (and are beyond the picture's row).
@@ -56,7 +73,8 @@ struct PixelRuns {
   std::vector<std::int32_t> pixel;  // of each row: ascending, none twice
   std::vector<std::int64_t> run;    // of each row its first; one more than there are rows
   std::vector<std::int32_t> index;  // of each run
-  std::vector<Real> weight;         // kPixelsOfRun of each run
+  // kPixelsOfRun of each run.
+  std::vector<Real, UntouchedAllocator<Real>> weight;
   // First rows of bands, and the end: two bands that have one between them read different pixels.
   std::vector<std::size_t> band;
 
