@@ -17,9 +17,10 @@ namespace {
 
 // A picture starts from the estimate at half its size, unless that is smaller than this.
 constexpr int kLeastCoarsePx = 128;
-// Of that estimate: what the full size mends costs more here.
-constexpr double kCoarseTolerance = 1e-4;
-constexpr int kCoarseIterations = 40;
+// Of that estimate, the tolerance over that at full size: what is left to the full size costs four
+// times as much there.
+constexpr double kCoarseTolerance = 0.3;
+constexpr int kCoarseIterations = 80;
 
 // The strength that stands for the same at half the size, where the data have a quarter of the
 // pixels and differences are twice as large.
@@ -70,7 +71,7 @@ void SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
   half.weights = run_.input.weights;
   half.transfer = run_.input.transfer;
   SceneOptions options = run_.options;
-  options.tolerance = std::max(options.tolerance_or_usual(), kCoarseTolerance);
+  options.tolerance = kCoarseTolerance * options.tolerance_or_usual();
   options.max_iterations = std::min(options.max_iterations, kCoarseIterations);
   options.prior = SolvedFirst(options.prior);
   options.strength = CoarseStrength(options.prior, options.strength);

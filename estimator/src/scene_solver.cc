@@ -161,7 +161,7 @@ std::string PriorName(Prior prior) {
 }
 
 double UsualTolerance(Prior prior) {
-  return prior == Prior::kTotalVariation || prior == Prior::kPatches ? 5e-5 : 1e-3;
+  return prior == Prior::kTotalVariation || prior == Prior::kPatches ? 1e-4 : 1e-3;
 }
 
 bool SceneOptions::IsValid(std::string* why) const {

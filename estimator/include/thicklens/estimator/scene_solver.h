@@ -22,7 +22,7 @@ enum class Prior {
 Prior PriorFromName(const std::string& name);  // "ridge", "gradient", "tv", "patches"; throws Error
 std::string PriorName(Prior prior);
 
-// Below which nothing is gained: 5e-5 for total variation and patches, 1e-3 for the others.
+// Below which little is gained: 1e-4 for total variation and patches, 1e-3 for the others.
 double UsualTolerance(Prior prior);
 
 enum class StrengthRule {
@@ -112,7 +112,7 @@ struct SceneMaps {
 //   kAuto      mu = .2 sigma^2/var(s (I - H I)), eta = .125 sigma^2/var(s grad I), both variances
 //              without their noise; lambda = 1e-3 (255 sigma)^1.5
 //   kGcv       the minimum of generalised cross-validation near that, the trace times 1.4
-// The iteration starts from the estimate at half the size, which starts likewise.
+// The iteration starts from the estimate at half the size.
 // Derived here; H as in SceneProjection. The iterations are computed where the backend is (null:
 // by C++ on the processor). Throws Error for options and inputs that do not fit, a memory limit
 // that is too low, and what a device reports. The result does not depend on the number of threads.
