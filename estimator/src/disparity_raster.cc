@@ -118,7 +118,7 @@ void PaintAlone(const DisparityMap& map, const std::vector<int>& alone,
   }
 }
 
-// A sample whose background is another one, or it itself.
+// A sample with its background, whose disparity is given.
 CompactView::Hidden HiddenBy(const HoleFiller::Sample& hole, const HoleFiller::Sample& background,
                              float disparity, const Eigen::Vector2d& shift, std::size_t index) {
   return {static_cast<std::int32_t>(index),

@@ -218,14 +218,13 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
       filter.start.push_back(filter.start.back() + Index(2 * radius + 1) * kernels::kFilterBlockPx);
     }
   }
-  filter.coefficients.resize(filter.start.back());
-  model::ParallelFor(height_px, threads, [&](int y) {
-    FilterRow<Real>& row = rows[Index(y)];
-    const std::size_t first = filter.start[Index(y) * row.radius_px.size()];
-    std::copy(row.coefficients.begin(), row.coefficients.end(),
-              filter.coefficients.begin() + static_cast<std::ptrdiff_t>(first));
+  // Row by row, each freed at once: never held twice.
+  filter.coefficients.reserve(filter.start.back());
+  for (FilterRow<Real>& row : rows) {
+    filter.coefficients.insert(filter.coefficients.end(), row.coefficients.begin(),
+                               row.coefficients.end());
     row = {};
-  });
+  }
   return filter;
 }
 

@@ -147,6 +147,7 @@ bool AddFourTaps(const DisparityMap& map, float tolerance, float limit_px, int x
 // and never written takes no memory.
 template <typename Real>
 void Reserve(int rows_done, int rows, Band<Real>* band) {
+  if (rows_done == rows) return;
   constexpr double kMore = 1.1;
   const double per_row = kMore * static_cast<double>(band->index.size()) / rows_done;
   const std::size_t needed = band->index.size() + static_cast<std::size_t>(per_row);

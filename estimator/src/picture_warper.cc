@@ -47,10 +47,11 @@ void CheckSameSize(const char* what, int width_px, int height_px, const Disparit
                           width_px, height_px, map.width_px, map.height_px));
 }
 
-// Unaligned.
-using Four = float __attribute__((vector_size(kFour * sizeof(float)), aligned(sizeof(float))));
+using Four = float __attribute__((vector_size(kFour * sizeof(float))));
 inline __attribute__((always_inline)) Four Load(const float* from) {
-  return *reinterpret_cast<const Four*>(from);
+  Four four;
+  __builtin_memcpy(&four, from, sizeof four);
+  return four;
 }
 
 // The weights of catmull_rom.h, in float and the four at once.
@@ -70,7 +71,8 @@ inline __attribute__((always_inline)) Four Down(const float* tap, std::size_t st
 }
 
 // The 16 taps from `tap` on, of pixels with four channels. Summed in the same order as those of
-// pixels with one, so that each channel gets the same bits as alone.
+// pixels with one, so that each channel gets the same bits as alone
+// (where the compiler fuses no sums with products).
 inline __attribute__((always_inline)) Four BicubicOfFour(const float* tap, std::size_t stride,
                                                          const Four& weight_x,
                                                          const Four& weight_y) {

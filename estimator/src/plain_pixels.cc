@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <opencv2/imgproc.hpp>
 
 #include "surface_taps.h"
@@ -40,6 +39,7 @@ PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_co
   const int width_px = disparity.width_px, height_px = disparity.height_px;
   const double across = (u_count - 1) / 2.0 * std::abs(disparity.step.x());
   const double down = (v_count - 1) / 2.0 * std::abs(disparity.step.y());
+  const double beside_middle = v_count % 2 == 0 ? std::abs(disparity.step.y()) / 2 : 0;
   const cv::Mat map(height_px, width_px, CV_32F, const_cast<float*>(disparity.disparity.data()));
   const cv::Mat size = cv::abs(map);
   double largest = 0;
@@ -47,7 +47,7 @@ PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_co
 
   cv::Mat is_product = cv::Mat::zeros(height_px, width_px, CV_8U);
   const double reach_x = std::ceil(across * largest) + kTapsPx;
-  const double reach_y = std::ceil(down * largest) + kTapsPx;
+  const double reach_y = std::ceil((down + beside_middle) * largest) + kTapsPx;
   if (!(2 * reach_x < width_px && 2 * reach_y < height_px)) {
     return {Flags(is_product), Flags(is_product)};
   }
@@ -59,8 +59,9 @@ PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_co
   for (int y = reach_px.height; y < height_px - reach_px.height; ++y) {
     for (int x = reach_px.width; x < width_px - reach_px.width; ++x) {
       const double g = step_x.at<float>(y, x), h = step_y.at<float>(y, x);
-      const double e = across * g * most.at<float>(y, x) / (1 - down * h);
-      const double f = h * (1 + down * e) / (1 - across * g);
+      const double d = most.at<float>(y, x);
+      const double e = across * g * d / (1 - down * h);
+      const double f = h * (1 + down * e + beside_middle * d) / (1 - across * g);
       // What is read lies less than three pixels from what it is compared with.
       is_product.at<unsigned char>(y, x) = across * g + down * h < 0.5 &&
                                            down * e <= tolerance_px && across * f <= tolerance_px &&

@@ -1,7 +1,6 @@
 #ifndef THICKLENS_ESTIMATOR_SRC_PLAIN_PIXELS_H_
 #define THICKLENS_ESTIMATOR_SRC_PLAIN_PIXELS_H_
 
-#include <Eigen/Core>
 #include <vector>
 
 #include "thicklens/estimator/view_geometry.h"
@@ -23,8 +22,11 @@ struct PlainPixels {
 // of neighbours across and down there: neighbouring points keep their order in all views where
 // A G + B H < 1, since where a point is shown moves by less than the point does. The product reads
 // the disparity of a point that is A D beside that of the ray, hence wrong by at most
-//   e = A G D/(1 - B H)  (down),  then  f = H (1 + B e)/(1 - A G)  (across, a row beside it),
-// and misplaces the ray by at most B e and A f. Derived here.
+//   e = A G D/(1 - B H)  (down),  then  f = H (1 + B e + C D)/(1 - A G)  (across, a row beside it),
+// and misplaces the ray by at most B e and A f. C is 0, but for an even v_count half a view's step
+// down: there the axis is the mean of the two views beside the middle, which read so far above and
+// below. (Of an even u_count the two lie in the row itself, and e holds.) Derived here.
+// `tolerance_px` must be below 1.
 PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_count,
                             double tolerance_px);
 

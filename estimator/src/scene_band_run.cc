@@ -210,14 +210,15 @@ double SceneBandRun<Real>::StrengthFor(const model::LinearPicture& photograph,
 }
 
 template <typename Real>
-bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance, double fan_bytes) {
-  const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes(), fan_bytes);
-  const bool fits =
-      !options_.memory_limit_mib || bytes <= *options_.memory_limit_mib * kBytesPerMib;
-  if (fits || fan_bytes == 0) {
-    summary_->predicted_memory_mib = std::max(summary_->predicted_memory_mib, bytes / kBytesPerMib);
-  }
-  if (fits) return true;
+bool SceneBandRun<Real>::IsWithinLimit(double bytes) const {
+  return !options_.memory_limit_mib || bytes <= *options_.memory_limit_mib * kBytesPerMib;
+}
+
+template <typename Real>
+bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
+  const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes());
+  summary_->predicted_memory_mib = std::max(summary_->predicted_memory_mib, bytes / kBytesPerMib);
+  if (IsWithinLimit(bytes)) return true;
   bytes_per_pixel_ =
       std::max(bytes_per_pixel_, radiance.operator_bytes() /
                                      static_cast<double>(input_.picture.width_px) / band.rows());
@@ -266,7 +267,11 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
     if (!Fits(band, radiance)) return std::nullopt;
     if (run.fan) {
       ViewFan fan = radiance.TakeFan();
-      if (Fits(band, radiance, BytesOf(fan))) whole.fan = std::move(fan);
+      const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes(), BytesOf(fan));
+      if (IsWithinLimit(bytes)) {
+        summary_->predicted_memory_mib = bytes / kBytesPerMib;
+        whole.fan = std::move(fan);
+      }
     }
     SceneSummary of_band;
     model::LinearPicture solved = radiance.Solve(&of_band);

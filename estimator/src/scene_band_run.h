@@ -51,7 +51,8 @@ class SceneBandRun {
   // Absent if one of them takes more memory than it may.
   std::optional<SolvedScene> SolveIn(int count, const model::LinearPicture& photograph,
                                      bool wants_confidence, SceneMaps* maps);
-  bool Fits(const SceneBand& band, const Radiance& radiance, double fan_bytes = 0);
+  bool Fits(const SceneBand& band, const Radiance& radiance);
+  bool IsWithinLimit(double bytes) const;
   // Whether the views of the photograph's rays are those of the light field.
   bool MayKeepFan(int bands) const;
 

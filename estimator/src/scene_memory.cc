@@ -13,8 +13,9 @@ namespace {
 
 constexpr double kFloat = sizeof(float);
 
-// Of a view in the making, for each pixel: its disparity and confidence.
-constexpr double kRenderedBytes = kFloat + 1;
+// Of a view in the making, for each pixel: its disparity and confidence; and what is hidden, where
+// a third is.
+constexpr double kRenderedBytes = kFloat + 1 + 8;
 // Code that is read in when it runs first, stacks, and all that is not as large as the picture.
 constexpr double kSmallBytes = 8 << 20;
 
@@ -108,7 +109,7 @@ double SceneMemory::ViewsBytes() const {
   double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
   bytes += at_once * keeps_.sink_bytes;
   // The picture, one view, its sources; and of each view in the making its sources.
-  if (keeps_.device) bytes += all * (2 * view + 6 * kFloat + at_once * (2 * kFloat + 1));
+  if (keeps_.device) bytes += all * (2 * view + 6 * kFloat + at_once * (3 * kFloat + 1));
   if (keeps_.light_field) {
     const double ray = view + (keeps_.maps ? 1 : 0);
     bytes += all * ray * u_count_ * v_count_;

@@ -142,7 +142,12 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                           const ProjectionOptions& options) {
   ViewFan fan = RenderFan(disparity, weights, options.threads, options.progress);
   const auto u_count = static_cast<int>(weights.cols()), v_count = static_cast<int>(weights.rows());
-  const PlainPixels plain = FindPlainPixels(disparity, u_count, v_count, options.tolerance_px);
+  const std::vector<Product> products = ProductsOf(weights);
+  const bool has_products = products.size() <= kMostTerms;
+  PlainPixels plain;
+  if (has_products || options.seen_share) {
+    plain = FindPlainPixels(disparity, u_count, v_count, options.tolerance_px);
+  }
   SceneProjection<Real> projection;
   projection.width_px = disparity.width_px;
   projection.height_px = disparity.height_px;
@@ -152,8 +157,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
     projection.seen_share = SeenShare(fan, disparity, plain.is_seen, options.threads);
 
   std::vector<unsigned char> is_product(projection.pixels(), 0);
-  const std::vector<Product> products = ProductsOf(weights);
-  if (products.size() <= kMostTerms) {
+  if (has_products) {
     const FanAxes axes = AxesOf(fan, disparity, u_count, v_count, options.threads);
     is_product =
         IsProduct(fan, axes, disparity, options.tolerance_px, plain.is_product, options.threads);

@@ -188,7 +188,7 @@ TEST_P(TwinTest, WarpsAsThePlainTwinDoes) {
   const DisparityMap map = MapOf(GetParam());
   std::mt19937 engine(3);
   std::uniform_real_distribution<float> uniform(0, 1);
-  for (const int channels : {1, 2, 3, 4}) {
+  for (const int channels : {1, 2, 3, 4, 5}) {
     model::LinearPicture picture{map.width_px, map.height_px, channels, {}};
     picture.values.resize(map.disparity.size() * static_cast<std::size_t>(channels));
     for (float& value : picture.values) value = uniform(engine);

@@ -54,6 +54,9 @@ constexpr int kPixelsOfRun = 8;
 // first are those that pay for the memory.
 template <typename T>
 struct UntouchedAllocator : std::allocator<T> {
+  UntouchedAllocator() = default;
+  template <typename U>
+  UntouchedAllocator(const UntouchedAllocator<U>&) noexcept {}
   template <typename U>
   struct rebind {
     using other = UntouchedAllocator<U>;
@@ -73,7 +76,7 @@ struct PixelRuns {
   std::vector<std::int32_t> pixel;  // of each row: ascending, none twice
   std::vector<std::int64_t> run;    // of each row its first; one more than there are rows
   std::vector<std::int32_t> index;  // of each run
-  // kPixelsOfRun of each run.
+  // kPixelsOfRun of each run. resize() leaves them to be written.
   std::vector<Real, UntouchedAllocator<Real>> weight;
   // First rows of bands, and the end: two bands that have one between them read different pixels.
   std::vector<std::size_t> band;
