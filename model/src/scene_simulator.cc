@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "random_draws.h"
+#include "ray_irradiance.h"
 #include "ray_set.h"
 #include "scene_texture.h"
 #include "thicklens/error.h"
@@ -269,16 +270,10 @@ struct SceneSimulator::Impl {
     return light;
   }
 
-  // cos(alpha) cos^3(beta) of (12): alpha in front of the lens; beta behind it, where the ray runs
-  // from A on the aperture to its landing point -(x - cx) p over the distance d1. Erratum of the
-  // source's (9), kept: for rho != 0 the rear principal plane would be the place to start from.
   double RelativeIrradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const {
-    const double tan2_alpha = ray.slope.squaredNorm();
-    const double tan2_beta =
-        ((sensor.pixel_pitch_mm * (position_px - sensor.principal_point_px) + ray.aperture_mm) /
-         options.camera.image_distance_mm())
-            .squaredNorm();
-    return 1 / (std::sqrt((1 + tan2_alpha) * (1 + tan2_beta)) * (1 + tan2_beta));
+    return RayIrradiance(ray.slope,
+                         sensor.pixel_pitch_mm * (position_px - sensor.principal_point_px),
+                         ray.aperture_mm, options.camera.image_distance_mm());
   }
 
   // (12) fixes its constant k by exposure: uniform radiance 1 gives 1 at the principal point.

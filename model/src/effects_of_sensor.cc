@@ -1,0 +1,131 @@
+// Effects of what light meets behind the aperture: diffraction, lens floor, pixels, electronics.
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "airy.h"
+#include "effect_bounds.h"
+
+namespace thicklens::model {
+namespace {
+
+// Of a uniform distribution of width 1.
+constexpr double kBoxVariance = 1.0 / 12;
+
+double RoundingStep(const EffectOptics& optics) {
+  return 255 / (std::exp2(optics.conditions().bits) - 1);
+}
+
+}  // namespace
+
+// Pixel box. Formula: mean over a square of one px, of variance 1/12 per axis. Bound: BlurChange;
+// at a jump, which no box has made a ramp yet, up to 3/4 of it (the tip of a right angle has a
+// quarter of its pixel). Enters: where rays land.
+EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place,
+                            const EffectSet& others) {
+  EffectPlace smooth = place;
+  smooth.jump = 0;
+  const EffectOptics::Smoothing other = optics.SmoothingBy(others, place);
+  double change = BlurChange(smooth, kBoxVariance, {}) + 0.75 * place.jump;
+  if (other.gaussian_px2 > 0 || other.disc_px > 0) {
+    EffectPlace worst = place;
+    worst.jump = worst.slope = worst.bend = 1e9;  // only what the blur leaves of it
+    change = std::min(change, BlurChange(worst, kBoxVariance, other));
+  }
+  return {std::sqrt(kBoxVariance),
+          StoredChange(optics, place, std::min(change, place.bright - place.dark))};
+}
+
+// Lens floor. Formula: a Gaussian of the measured sigma, in quadrature with defocus. Bound:
+// BlurChange. Enters: where rays land.
+EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others) {
+  const double floor_px = optics.floor_px();
+  const double change = BlurChange(place, floor_px * floor_px, optics.SmoothingBy(others, place));
+  return {floor_px, StoredChange(optics, place, change)};
+}
+
+// Diffraction. Formula: airy.h. A lens floor that was measured holds it already: then it is not
+// added once more, and its impact is 0. Bound: of the Gaussian BlurChange; of a disc's pattern,
+// which has no variance, the mean of min(R, |d| slope) + J min(1, sqrt(2) |d_n|/2) over its
+// displacements d. Enters: where rays land.
+EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& place,
+                               const EffectSet& others) {
+  const double radius_px = AiryRadiusPx(optics.camera(), optics.conditions().wavelength_mm);
+  if (optics.floor_px() > 0 && others.Has(Effect::kLensFloor)) return {radius_px, 0};
+  const double range = place.bright - place.dark;
+  if (!optics.is_disc()) {
+    const double sigma_px = radius_px / kGaussianAiryRadius;
+    const double change =
+        BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
+    return {radius_px, StoredChange(optics, place, change)};
+  }
+  constexpr int kQuantiles = 64;
+  static const std::vector<double> airy_radii = AiryQuantiles(kQuantiles);
+  constexpr double kMeanOfComponent = 2 / 3.14159265358979323846;  // E|cos| over all directions
+  double change = 0;
+  for (const double airy_radius : airy_radii) {
+    const double distance_px = radius_px * airy_radius;
+    const double past_edge = std::sqrt(2.0) * distance_px * kMeanOfComponent / 2;
+    change += (std::min(range, distance_px * place.slope) + place.jump * std::min(1.0, past_edge)) /
+              kQuantiles;
+  }
+  return {radius_px, StoredChange(optics, place, std::min(range, change))};
+}
+
+// Shot noise. Formula: Poisson of L n electrons, n at full scale: sd sqrt(L/n) in linear light.
+// Bound: times the slope of the transfer curve, the largest between dark and bright. Enters: after
+// the picture is formed.
+EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& /*others*/) {
+  const double full_well = optics.conditions().full_well_electrons;
+  if (!(full_well > 0)) return {};
+  constexpr int kLevels = 32;
+  double largest = 0;
+  for (int i = 0; i <= kLevels; ++i) {
+    EffectPlace level = place;
+    level.dark = std::max(0.0, place.dark + (place.bright - place.dark) * i / kLevels);
+    largest =
+        std::max(largest, std::sqrt(level.dark / full_well) * StoredSlope(optics, level));
+  }
+  return {largest, largest};
+}
+
+// Read noise. Formula: normal, in electrons before the transfer curve or in stored values after
+// it. Bound: the former times the curve's slope where it is dark; both in quadrature. Enters: after
+// the picture is formed.
+EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& /*others*/) {
+  const EffectConditions& conditions = optics.conditions();
+  double sigma = conditions.stored_noise_grey_levels;
+  if (conditions.full_well_electrons > 0) {
+    sigma = std::hypot(sigma, conditions.read_noise_electrons / conditions.full_well_electrons *
+                                  StoredSlope(optics, place));
+  }
+  return {sigma, sigma};
+}
+
+// Quantisation. Formula: rounding to 1/(2^bits - 1), an error of standard deviation 1/sqrt(12) of
+// that. Enters: last of all.
+EffectImpact QuantisationImpact(const EffectOptics& optics, const EffectPlace& /*place*/,
+                                const EffectSet& /*others*/) {
+  const double sigma = RoundingStep(optics) * std::sqrt(kBoxVariance);
+  return {sigma, sigma};
+}
+
+// Transfer curve. Formula: IEC 61966-2-1 or a power. Bound: its largest distance from linear light
+// between dark and bright. Enters: after the picture is formed.
+EffectImpact TransferCurveImpact(const EffectOptics& optics, const EffectPlace& place,
+                                 const EffectSet& /*others*/) {
+  const TransferCurve& transfer = optics.camera().sensor.transfer;
+  constexpr int kLevels = 64;
+  double largest = 0;
+  for (int i = 0; i <= kLevels; ++i) {
+    const double light =
+        std::clamp(place.dark + (place.bright - place.dark) * i / kLevels, 0.0, 1.0);
+    largest = std::max(largest, 255 * std::abs(transfer.Encode(light) - light));
+  }
+  return {largest, largest};
+}
+
+}  // namespace thicklens::model
