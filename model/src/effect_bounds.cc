@@ -53,7 +53,8 @@ EffectOptics::Smoothing EffectOptics::SmoothingBy(const EffectSet& effects,
 //   |I - L| <= E|d| sup|grad L|, E|d| <= sqrt(2 v)        Jensen
 // and past a straight jump of height J, which the pixel's box has made a ramp no steeper than
 // sqrt(2) J per px, from the foot of the ramp: sqrt(2) J E[d_n^+], which for a Gaussian is
-// J sqrt(v/pi); without the box half of it. In a picture that has a Gaussian blur of variance g already,
+// J sqrt(v/pi); without the box half of it. In a picture that has a Gaussian blur of variance g
+// already,
 //   sup(|L_xx| + |L_yy|) <= R 4 phi(1)/g, phi the normal density,
 // since |d2/dx2 (G * M)| <= R/2 integral |d2G/dx2| = 2 phi(1) R/g; and in one that has been
 // averaged over a disc of radius b, |I - L| <= R/2 integral |k * D - D|
@@ -64,7 +65,8 @@ double BlurChange(const EffectPlace& place, double variance_px2,
   if (!(variance_px2 > 0)) return 0;
   const double sigma_px = std::sqrt(variance_px2);
   const double range = Range(place);
-  const double smooth = std::min(variance_px2 / 2 * place.bend, std::sqrt(2.0) * sigma_px * place.slope);
+  const double smooth =
+      std::min(variance_px2 / 2 * place.bend, std::sqrt(2.0) * sigma_px * place.slope);
   const double of_jump = other.boxed ? std::min(sigma_px / std::sqrt(kPi), 1.0) : 0.5;
   double change = std::min(range, smooth + place.jump * of_jump);
   if (other.gaussian_px2 > 0) {
@@ -77,15 +79,16 @@ double BlurChange(const EffectPlace& place, double variance_px2,
   return change;
 }
 
-// |L(x + d) - L(x)| <= |d| sup|grad L| and, at a jump that a box has made a ramp, sqrt(2) J |d|; after a Gaussian blur
-// of variance g at most R |d|/sqrt(2 pi g), after a disc of radius b R |d| 2/(pi b): the most that
-// an edge has.
+// |L(x + d) - L(x)| <= |d| sup|grad L| and, at a jump that a box has made a ramp, sqrt(2) J |d|;
+// after a Gaussian blur of variance g at most R |d|/sqrt(2 pi g), after a disc of radius b R |d|
+// 2/(pi b): the most that an edge has.
 double ShiftChange(const EffectPlace& place, double shift_px,
                    const EffectOptics::Smoothing& other) {
   const double range = Range(place);
   double slope = place.slope + std::sqrt(2.0) * place.jump;
   if (!other.boxed && place.jump > 0) slope = std::numeric_limits<double>::infinity();
-  if (other.gaussian_px2 > 0) slope = std::min(slope, range / std::sqrt(2 * kPi * other.gaussian_px2));
+  if (other.gaussian_px2 > 0)
+    slope = std::min(slope, range / std::sqrt(2 * kPi * other.gaussian_px2));
   if (other.disc_px > 0) slope = std::min(slope, 2 * range / (kPi * other.disc_px));
   return shift_px == 0 ? 0 : std::min(range, slope * std::abs(shift_px));
 }

@@ -1,6 +1,8 @@
 #ifndef THICKLENS_MODEL_SRC_EFFECT_BOUNDS_H_
 #define THICKLENS_MODEL_SRC_EFFECT_BOUNDS_H_
 
+#include <vector>
+
 #include "thicklens/model/effect_impact.h"
 
 namespace thicklens::model {
@@ -12,9 +14,9 @@ class EffectOptics {
 
   const EffectConditions& conditions() const { return conditions_; }
   const Camera& camera() const { return conditions_.camera; }
-  double inverse_focus() const { return inverse_focus_; }        // 1/zf, per mm
+  double inverse_focus() const { return inverse_focus_; }          // 1/zf, per mm
   double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
-  double scale_px() const { return scale_px_; }                  // K/p
+  double scale_px() const { return scale_px_; }                    // K/p
   double floor_px() const { return floor_px_; }
   bool is_disc() const { return conditions_.camera.psf == Psf::kDisc; }
 
@@ -52,6 +54,13 @@ double StoredChange(const EffectOptics& optics, const EffectPlace& place, double
 double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative);
 // The largest slope of the transfer curve between dark and bright, times 255.
 double StoredSlope(const EffectOptics& optics, const EffectPlace& place);
+
+// Throws Error if the conditions are not valid or there is no place.
+void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places);
+bool MattersMore(const EffectImpact& a, const EffectImpact& b);
+// Where it matters most of all places.
+EffectFinding FindImpact(Effect effect, const EffectOptics& optics,
+                         const std::vector<EffectPlace>& places, const EffectSet& others);
 
 // The sections: one function an effect.
 EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,

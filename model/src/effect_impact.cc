@@ -60,14 +60,16 @@ Section SectionOf(Effect effect) {
   throw Error("no such effect");
 }
 
-void Check(const EffectConditions& conditions, const std::vector<EffectPlace>& places) {
-  std::string why;
-  if (!conditions.IsValid(&why)) throw Error("effects: " + why);
-  if (places.empty()) throw Error("effects: there is no place to look at: at least one is needed");
-}
+}  // namespace
 
 bool MattersMore(const EffectImpact& a, const EffectImpact& b) {
   return std::pair(a.grey_levels, a.amount) > std::pair(b.grey_levels, b.amount);
+}
+
+void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places) {
+  std::string why;
+  if (!conditions.IsValid(&why)) throw Error("effects: " + why);
+  if (places.empty()) throw Error("effects: there is no place to look at: at least one is needed");
 }
 
 EffectFinding FindImpact(Effect effect, const EffectOptics& optics,
@@ -78,40 +80,12 @@ EffectFinding FindImpact(Effect effect, const EffectOptics& optics,
     const EffectImpact impact = section(optics, place, others);
     if (MattersMore(impact, finding.impact)) finding = {effect, impact, place};
   }
+  // A bound that adds up several parts may pass what a stored value can change at all.
+  if (!FactsOf(effect).random) {
+    finding.impact.grey_levels = std::min(finding.impact.grey_levels, 255.0);
+  }
   return finding;
 }
-
-// What the effects that have been left out have taken of the tolerance.
-class Spent {
- public:
-  explicit Spent(const EffectTolerance& tolerance) : tolerance_(tolerance) {}
-
-  bool Allows(const EffectFinding& finding) const {
-    const EffectFacts& facts = FactsOf(finding.effect);
-    if (facts.random) {
-      return std::hypot(noise_, finding.impact.grey_levels) <= tolerance_.grey_levels;
-    }
-    if (tolerance_.px && facts.unit == EffectUnit::kPx) {
-      return finding.impact.amount <= *tolerance_.px;
-    }
-    return bounds_ + finding.impact.grey_levels <= tolerance_.grey_levels;
-  }
-
-  void Add(const EffectFinding& finding) {
-    const EffectFacts& facts = FactsOf(finding.effect);
-    if (facts.random) {
-      noise_ = std::hypot(noise_, finding.impact.grey_levels);
-    } else if (!tolerance_.px || facts.unit != EffectUnit::kPx) {
-      bounds_ += finding.impact.grey_levels;
-    }
-  }
-
- private:
-  const EffectTolerance& tolerance_;
-  double bounds_ = 0, noise_ = 0;
-};
-
-}  // namespace
 
 bool EffectConditions::IsValid(std::string* why) const {
   const auto fail = [why](std::string reason) {
@@ -156,14 +130,14 @@ bool EffectConditions::IsValid(std::string* why) const {
 
 EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectPlace& place,
                       const EffectSet& others) {
-  Check(conditions, {place});
+  CheckEffects(conditions, {place});
   return SectionOf(effect)(EffectOptics(conditions), place, others.Without({effect}));
 }
 
 std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
                                        const std::vector<EffectPlace>& places,
                                        const EffectSet& effects) {
-  Check(conditions, places);
+  CheckEffects(conditions, places);
   const EffectOptics optics(conditions);
   std::vector<EffectFinding> findings;
   for (const Effect effect : effects.Effects()) {
@@ -172,72 +146,13 @@ std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
   return findings;
 }
 
-bool EffectTolerance::IsValid(std::string* why) const {
-  const std::array<std::pair<const char*, double>, 2> limits = {
-      {{"grey_levels", grey_levels}, {"px", px.value_or(1)}}};
-  for (const auto& [unit, limit] : limits) {
-    if (limit > 0 && std::isfinite(limit)) continue;
-    if (why != nullptr) {
-      *why = fmt::format("tolerance in {} is {}: it must be finite and > 0", unit, limit);
-    }
-    return false;
-  }
-  return true;
-}
-
-EffectTolerance EffectToleranceFromText(const std::string& text) {
-  const auto fail = [&text] {
-    return Error(fmt::format(
-        "tolerance \"{}\": a number > 0 with its unit is expected, such as 0.5gl or 0.1px", text));
-  };
-  std::size_t end = 0;
-  double number = 0;
-  try {
-    number = std::stod(text, &end);
-  } catch (const std::exception&) {
-    throw fail();
-  }
-  EffectTolerance tolerance;
-  const std::string unit = text.substr(end);
-  if (unit == "gl") {
-    tolerance.grey_levels = number;
-  } else if (unit == "px") {
-    tolerance.px = number;
-  } else {
-    throw fail();
-  }
-  if (!tolerance.IsValid(nullptr)) throw fail();
-  return tolerance;
-}
-
-EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
-                        const EffectSet& effects, const EffectTolerance& tolerance) {
-  std::string why;
-  if (!tolerance.IsValid(&why)) throw Error("effects: " + why);
-  Spent spent(tolerance);
-  EffectSet chosen = effects;
-  for (;;) {
-    std::vector<EffectFinding> findings = FindImpacts(conditions, places, chosen);
-    std::stable_sort(findings.begin(), findings.end(),
-                     [](const EffectFinding& a, const EffectFinding& b) {
-                       return MattersMore(b.impact, a.impact);
-                     });
-    const auto least = std::find_if(findings.begin(), findings.end(), [&](const EffectFinding& f) {
-      return spent.Allows(f);
-    });
-    if (least == findings.end()) return chosen;
-    spent.Add(*least);
-    chosen.Remove(least->effect);
-    if (chosen.empty()) return chosen;
-  }
-}
-
 std::vector<EffectPlace> PlacesBetween(const Camera& camera, double near_mm, double far_mm,
                                        bool occlusion) {
   if (!(near_mm > 0) || !(far_mm >= near_mm) || !std::isfinite(near_mm)) {
-    throw Error(fmt::format("depths from {} to {} mm: they must be > 0, the first finite and not "
-                            "beyond the second",
-                            near_mm, far_mm));
+    throw Error(
+        fmt::format("depths from {} to {} mm: they must be > 0, the first finite and not "
+                    "beyond the second",
+                    near_mm, far_mm));
   }
   constexpr int kSteps = 33;
   const Sensor& sensor = camera.sensor;

@@ -40,8 +40,7 @@ EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectPlace& pl
   if (!bench || !bench->lamp_at_camera || !(optics.inverse_focus() > 0)) return {};
   const double light = std::pow(1 / (place.depth_mm * optics.inverse_focus()), 2);
   // Relative to the brighter of the two, as StoredScaling has it.
-  return {std::abs(light - 1),
-          StoredScaling(optics, place, light < 1 ? 1 - light : 1 - 1 / light)};
+  return {std::abs(light - 1), StoredScaling(optics, place, light < 1 ? 1 - light : 1 - 1 / light)};
 }
 
 // Flicker. Formula: a normal factor of each frame, sd relative. Enters: a factor of each frame.
@@ -59,9 +58,8 @@ EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectPlace& 
   if (!optics.conditions().bench || !(optics.inverse_focus() > 0)) return {};
   const double scale = 1 / (place.depth_mm * optics.inverse_focus());
   const double shift_px = FromAxisPx(optics, place).norm() * std::abs(scale - 1);
-  return {shift_px,
-          StoredChange(optics, place,
-                       ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
+  return {shift_px, StoredChange(optics, place,
+                                 ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
 // Drift. Formula: a normal displacement of the target in each frame, sd per axis in px at zf.
@@ -71,9 +69,8 @@ EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
   const auto& bench = optics.conditions().bench;
   if (!bench) return {};
   const double shift_px = bench->drift_sigma_px;
-  return {shift_px,
-          StoredChange(optics, place,
-                       ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
+  return {shift_px, StoredChange(optics, place,
+                                 ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
 // Tilt. Formula: the depth of the target at X beside the axis is off by X tan(tilt). Bound: what
@@ -82,8 +79,8 @@ EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
                         const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
   if (!bench || !std::isfinite(place.depth_mm)) return {};
-  const double beside_mm = std::abs(FromAxisPx(optics, place).x()) * place.depth_mm /
-                           optics.scale_px();
+  const double beside_mm =
+      std::abs(FromAxisPx(optics, place).x()) * place.depth_mm / optics.scale_px();
   const double shift_mm = beside_mm * std::tan(std::abs(bench->tilt_deg) * kPi / 180);
   return {shift_mm, StoredChange(optics, place, ChangeByDepth(optics, place, shift_mm, others))};
 }

@@ -1,6 +1,7 @@
 // Effects of the lens and of light on its way through it.
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "effect_bounds.h"
 #include "ray_irradiance.h"
@@ -8,48 +9,134 @@
 namespace thicklens::model {
 namespace {
 
-// Of a uniform radiance, at a position of the picture: the mean over the aperture, and the standard
-// deviation over it relative to that. Two points per axis at +-1 standard deviation: exact up to
-// the third order in the aperture.
-struct Irradiance {
-  double mean = 0, spread = 0;
-};
-Irradiance IrradianceAt(const EffectOptics& optics, const Eigen::Vector2d& position_px,
-                        double image_distance_mm, bool pinhole) {
-  const Sensor& sensor = optics.camera().sensor;
-  const Eigen::Vector2d from_axis_px = position_px - sensor.principal_point_px;
-  const double reach_mm = pinhole ? 0 : optics.aperture_sigma_mm();
-  Irradiance irradiance;
-  double squares = 0;
-  for (const double x : {-reach_mm, reach_mm}) {
-    for (const double y : {-reach_mm, reach_mm}) {
-      const Eigen::Vector2d aperture_mm(x, y);
-      const double value = RayIrradiance(
-          from_axis_px / optics.scale_px() - aperture_mm * optics.inverse_focus(),
-          sensor.pixel_pitch_mm * from_axis_px, aperture_mm, image_distance_mm);
-      irradiance.mean += value / 4;
-      squares += value * value / 4;
-    }
-  }
-  irradiance.spread =
-      std::sqrt(std::max(0.0, squares - irradiance.mean * irradiance.mean)) / irradiance.mean;
-  return irradiance;
-}
-
-// Relative to the principal point, where exposure makes it 1.
-Irradiance RelativeIrradianceAt(const EffectOptics& optics, const EffectPlace& place,
-                                double image_distance_mm, bool pinhole) {
-  Irradiance irradiance = IrradianceAt(optics, place.position_px, image_distance_mm, pinhole);
-  irradiance.mean /=
-      IrradianceAt(optics, optics.camera().sensor.principal_point_px, image_distance_mm, pinhole)
-          .mean;
-  return irradiance;
-}
+constexpr double kPi = 3.14159265358979323846;
 
 double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
-  return std::max(
-      std::abs(optics.DefocusPx(place.depth_mm)),
-      std::abs(optics.DefocusPx(place.other_depth_mm.value_or(place.depth_mm))));
+  return std::max(std::abs(optics.DefocusPx(place.depth_mm)),
+                  std::abs(optics.DefocusPx(place.other_depth_mm.value_or(place.depth_mm))));
+}
+
+enum class Aperture { kPinhole, kGaussian, kDisc };
+
+Aperture ApertureOf(const EffectOptics& optics, const EffectSet& effects) {
+  if (!effects.Has(Effect::kDefocus)) return Aperture::kPinhole;
+  return optics.is_disc() && effects.Has(Effect::kApertureShape) ? Aperture::kDisc
+                                                                 : Aperture::kGaussian;
+}
+
+// Points of an aperture of standard deviation 1 whose mean is exact up to the fifth order.
+struct AperturePoint {
+  double x, y, weight;
+};
+const std::vector<AperturePoint>& PointsOf(Aperture aperture) {
+  static const std::vector<AperturePoint> pinhole = {{0, 0, 1}};
+  // Gauss and Hermite's three on each axis.
+  static const std::vector<AperturePoint> gaussian = [] {
+    std::vector<AperturePoint> points;
+    const double at[] = {-std::sqrt(3.0), 0, std::sqrt(3.0)},
+                 weight[] = {1.0 / 6, 2.0 / 3, 1.0 / 6};
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) points.push_back({at[i], at[j], weight[i] * weight[j]});
+    }
+    return points;
+  }();
+  // Abramowitz and Stegun 25.4.61, seven points of a disc of radius 2.
+  static const std::vector<AperturePoint> disc = [] {
+    std::vector<AperturePoint> points = {{0, 0, 0.25}};
+    const double radius = 2 * std::sqrt(2.0 / 3);
+    for (int i = 0; i < 6; ++i) {
+      points.push_back({radius * std::cos(kPi * i / 3), radius * std::sin(kPi * i / 3), 0.125});
+    }
+    return points;
+  }();
+  return aperture == Aperture::kPinhole ? pinhole : aperture == Aperture::kDisc ? disc : gaussian;
+}
+
+// What rays through the points of an aperture bring to a position of the picture of a uniform
+// radiance: their mean, 1 at the principal point by exposure, and each over that mean.
+struct Irradiance {
+  double mean = 0;
+  std::vector<double> over_mean;
+};
+Irradiance IrradianceAt(const EffectOptics& optics, const Eigen::Vector2d& position_px,
+                        double image_distance_mm, Aperture aperture) {
+  const Sensor& sensor = optics.camera().sensor;
+  const auto values_at = [&](const Eigen::Vector2d& from_axis_px) {
+    std::vector<double> values;
+    for (const AperturePoint& point : PointsOf(aperture)) {
+      const Eigen::Vector2d aperture_mm =
+          optics.aperture_sigma_mm() * Eigen::Vector2d(point.x, point.y);
+      values.push_back(
+          RayIrradiance(from_axis_px / optics.scale_px() - aperture_mm * optics.inverse_focus(),
+                        sensor.pixel_pitch_mm * from_axis_px, aperture_mm, image_distance_mm));
+    }
+    return values;
+  };
+  const auto mean_of = [&](const std::vector<double>& values) {
+    double sum = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) sum += PointsOf(aperture)[i].weight * values[i];
+    return sum;
+  };
+  Irradiance irradiance;
+  irradiance.over_mean = values_at(position_px - sensor.principal_point_px);
+  const double mean = mean_of(irradiance.over_mean);
+  for (double& value : irradiance.over_mean) value /= mean;
+  irradiance.mean = mean / mean_of(values_at({0, 0}));
+  return irradiance;
+}
+
+// What weights of the aperture's rays change of a picture, stored: `weights` over the points, less
+// 1, of standard deviation s. It is their covariance with what different rays see, whose own
+// standard deviation is at most sqrt((I - dark)(bright - I)) where they see I in the mean, and at
+// most what their displacement by defocus changes.
+double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aperture aperture,
+                      const std::vector<double>& weights, const EffectSet& others) {
+  double square = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    square += PointsOf(aperture)[i].weight * std::pow(weights[i] - 1, 2);
+  }
+  const double sd = std::sqrt(square);
+  if (!(sd > 0)) return 0;
+  EffectOptics::Smoothing boxed;
+  boxed.boxed = others.Has(Effect::kPixelBox);
+  const double displaced = ShiftChange(place, SigmaPx(optics, place), boxed);
+  constexpr int kLevels = 16;
+  double most = 0;
+  EffectPlace level = place;
+  for (int i = 0; i < kLevels; ++i) {
+    level.dark = place.dark + (place.bright - place.dark) * i / kLevels;
+    const double seen = std::sqrt((level.dark - place.dark) * (place.bright - level.dark));
+    most = std::max(most, StoredChange(optics, level, sd * std::min(seen, displaced)));
+  }
+  return most;
+}
+
+// What the whole aperture does to the fall-off of a picture through its middle, stored.
+double FalloffOfAperture(const EffectOptics& optics, const EffectPlace& place,
+                         const EffectSet& others, Aperture aperture) {
+  if (!others.Has(Effect::kFalloff)) return 0;
+  const double distance_mm = optics.camera().image_distance_mm();
+  const Irradiance whole = IrradianceAt(optics, place.position_px, distance_mm, aperture);
+  const Irradiance middle =
+      IrradianceAt(optics, place.position_px, distance_mm, Aperture::kPinhole);
+  return StoredScaling(optics, place, whole.mean / middle.mean - 1) +
+         WeighingChange(optics, place, aperture, whole.over_mean, others);
+}
+
+// What another shape of the aperture does to the fall-off: weights that are linear over the
+// aperture, g A, weigh what different rays see by at most g R/2 integral |A_x| |D|, D the
+// difference of both densities, which is 0.587 of the g sigma R/2 of the Gaussian.
+double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
+                      const EffectSet& others) {
+  if (!others.Has(Effect::kFalloff)) return 0;
+  constexpr double kNotShared = 0.587;
+  const double distance_mm = optics.camera().image_distance_mm();
+  const Irradiance disc = IrradianceAt(optics, place.position_px, distance_mm, Aperture::kDisc);
+  const Irradiance gaussian =
+      IrradianceAt(optics, place.position_px, distance_mm, Aperture::kGaussian);
+  return StoredScaling(optics, place, gaussian.mean / disc.mean - 1) +
+         kNotShared *
+             WeighingChange(optics, place, Aperture::kGaussian, gaussian.over_mean, others);
 }
 
 }  // namespace
@@ -57,74 +144,74 @@ double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
 // Thickness. Formula: (13), (25), (26) depend on the lens through f1 and zf alone, since
 // f1 D/f2 = K = f1 zf/(zf - f1): the thin lens f1 that is focused on the same plane puts every ray
 // in the same place. Its image distance is another, K instead of d1, and with it cos(beta).
-// Bound: the ratio of both irradiances. Enters: the camera is replaced by its thin counterpart.
+// Bound: the ratio of both irradiances, and of their weights of the rays. Enters: the camera is
+// replaced by its thin counterpart.
 EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   if (!others.Has(Effect::kFalloff)) return {};
-  const bool pinhole = !others.Has(Effect::kDefocus);
+  const Aperture aperture = ApertureOf(optics, others);
   const double thin_mm = optics.scale_px() * optics.camera().sensor.pixel_pitch_mm;
-  const Irradiance thick =
-      RelativeIrradianceAt(optics, place, optics.camera().image_distance_mm(), pinhole);
-  const Irradiance thin = RelativeIrradianceAt(optics, place, thin_mm, pinhole);
-  return {0, StoredScaling(optics, place, thin.mean / thick.mean - 1)};
+  Irradiance thick =
+      IrradianceAt(optics, place.position_px, optics.camera().image_distance_mm(), aperture);
+  const Irradiance thin = IrradianceAt(optics, place.position_px, thin_mm, aperture);
+  for (std::size_t i = 0; i < thin.over_mean.size(); ++i) {
+    thick.over_mean[i] += 1 - thin.over_mean[i];
+  }
+  return {0, StoredScaling(optics, place, thin.mean / thick.mean - 1) +
+                 WeighingChange(optics, place, aperture, thick.over_mean, others)};
 }
 
-// Defocus. Formula: sigma = kappa r |c(z)|/p, (25), (26). Bound: BlurChange of its variance.
-// Enters: rays go through the whole aperture instead of its middle.
+// Defocus. Formula: sigma = kappa r |c(z)|/p, (25), (26). Bound: BlurChange of its variance, and
+// what the whole aperture does to the fall-off. Enters: rays go through the whole aperture instead
+// of its middle.
 EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
                            const EffectSet& others) {
   const double sigma_px = SigmaPx(optics, place);
-  const double change =
-      BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
-  return {sigma_px, StoredChange(optics, place, change)};
+  const double change = BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
+  EffectSet all = others;
+  all.Add(Effect::kDefocus);
+  return {sigma_px, StoredChange(optics, place, change) +
+                        FalloffOfAperture(optics, place, others, ApertureOf(optics, all))};
 }
 
 // Aperture shape. Formula: a disc of radius 2 sigma against a Gaussian of sigma, the same second
-// moments. Derived here. Bound: the light of the one that is not in the other is 0.289 of all
-// (the densities cross at r^2 = 2 log(2) sigma^2, where the disc has taken 0.347 and the Gaussian
-// 0.5, and outside the disc the Gaussian has exp(-2)), so at most 0.289 R; small ones, by their
-// variance alone, at most twice what their blur changes. Amount: the farthest that their edge
-// spreads are apart, 0.040, as a displacement of the edge, 0.040 sigma sqrt(2 pi). Enters: where
-// rays go through the aperture.
+// moments. Bound, derived here, D the difference of both and A(r) that of their light within r,
+// min(r^2/(4 sigma^2), 1) - 1 + exp(-r^2/(2 sigma^2)): with psi' = A/(2 pi r), so that D is the
+// Laplacian of psi, the change D * L is at most
+//   1/2 integral |D| R = 0.289 R                      for any picture of range R
+//   integral |psi'| sup|grad L| = 0.222 sigma slope
+//   integral |psi| sup|laplacian L| = 0.0940 sigma^2 bend
+// and at a straight jump the farthest distance of the edge spreads, 0.0404 of it, at a corner of
+// two at most twice that. Amount: 0.0404 as a displacement of the edge, times sigma sqrt(2 pi).
+// With what the shape does to the fall-off. Enters: where rays go through the aperture.
 EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& place,
                                  const EffectSet& others) {
   if (!optics.is_disc() || !others.Has(Effect::kDefocus)) return {};
-  constexpr double kNotShared = 0.2887;
-  constexpr double kEdge = 0.0404 * 2.5066;
+  constexpr double kNotShared = 0.2887, kOfSlope = 0.2216, kOfBend = 0.0940, kEdge = 0.0404;
   const double sigma_px = SigmaPx(optics, place);
-  const double change = std::min(
-      kNotShared * (place.bright - place.dark),
+  const double smooth =
+      std::min(kOfSlope * sigma_px * place.slope, kOfBend * sigma_px * sigma_px * place.bend);
+  const double blurred =
       2 * BlurChange(place, sigma_px * sigma_px,
-                     optics.SmoothingBy(others.Without({Effect::kDefocus}), place)));
-  return {kEdge * sigma_px, StoredChange(optics, place, change)};
+                     optics.SmoothingBy(others.Without({Effect::kDefocus}), place));
+  const double change = std::min(
+      {kNotShared * (place.bright - place.dark), smooth + 2 * kEdge * place.jump, blurred});
+  return {kEdge * std::sqrt(2 * kPi) * sigma_px,
+          StoredChange(optics, place, change) + FalloffOfShape(optics, place, others)};
 }
 
 // Fall-off. Formula: (12), cos(alpha) cos^3(beta), 1 at the principal point by exposure. Bound:
-// its mean over the aperture scales what is seen. Its deviations w from that mean, of standard
-// deviation s, change it by the covariance of w with what different rays see, whose standard
-// deviation is at most sqrt((I - dark)(bright - I)) where they see I in the mean, and at most what
-// their displacement by defocus changes. Enters: a weight of each ray.
+// its mean over the aperture scales what is seen; its deviations from that mean weigh what
+// different rays see. Enters: a weight of each ray.
 EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
                            const EffectSet& others) {
-  const bool pinhole = !others.Has(Effect::kDefocus);
+  const Aperture aperture = ApertureOf(optics, others);
   const Irradiance irradiance =
-      RelativeIrradianceAt(optics, place, optics.camera().image_distance_mm(), pinhole);
+      IrradianceAt(optics, place.position_px, optics.camera().image_distance_mm(), aperture);
   const double loss = 1 - irradiance.mean;
-  double mixed = 0;
-  if (!pinhole) {
-    EffectOptics::Smoothing boxed;
-    boxed.boxed = others.Has(Effect::kPixelBox);
-    const double displaced = ShiftChange(place, SigmaPx(optics, place), boxed);
-    constexpr int kLevels = 16;
-    EffectPlace level = place;
-    for (int i = 0; i < kLevels; ++i) {
-      level.dark = place.dark + (place.bright - place.dark) * i / kLevels;
-      const double most = std::sqrt((level.dark - place.dark) * (place.bright - level.dark));
-      mixed = std::max(mixed, StoredChange(optics, level,
-                                           irradiance.spread * std::min(most, displaced)));
-    }
-  }
-  return {std::abs(loss), StoredScaling(optics, place, loss) + mixed};
+  return {std::abs(loss),
+          StoredScaling(optics, place, loss) +
+              WeighingChange(optics, place, aperture, irradiance.over_mean, others)};
 }
 
 // Vignetting. Formula: (10), rays of directional samples at u cross the aperture at
@@ -149,10 +236,10 @@ EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& pla
   return {lost, StoredChange(optics, place, lost * (place.bright - place.dark))};
 }
 
-// Occlusion. Formula: the parallax between both sides of an edge of depth, kappa r |c(z1) - c(z2)|/p
-// for each standard deviation of the aperture. Bound: rays that are carried past the edge see
-// another surface: as at a jump of the height of the range, BlurChange of that parallax. Enters:
-// each ray is traced to what it meets first.
+// Occlusion. Formula: the parallax between both sides of an edge of depth, kappa r |c(z1) -
+// c(z2)|/p for each standard deviation of the aperture. Bound: rays that are carried past the edge
+// see another surface: as at a jump of the height of the range, BlurChange of that parallax.
+// Enters: each ray is traced to what it meets first.
 EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   if (!place.other_depth_mm || !others.Has(Effect::kDefocus)) return {};

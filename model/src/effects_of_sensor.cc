@@ -56,8 +56,7 @@ EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& pl
   const double range = place.bright - place.dark;
   if (!optics.is_disc()) {
     const double sigma_px = radius_px / kGaussianAiryRadius;
-    const double change =
-        BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
+    const double change = BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
     return {radius_px, StoredChange(optics, place, change)};
   }
   constexpr int kQuantiles = 64;
@@ -74,19 +73,20 @@ EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& pl
 }
 
 // Shot noise. Formula: Poisson of L n electrons, n at full scale: sd sqrt(L/n) in linear light.
-// Bound: times the slope of the transfer curve, the largest between dark and bright. Enters: after
-// the picture is formed.
+// Bound: times the slope of the transfer curve, which together grow where the curve is straight,
+// near black, and fall where it is a power of at most 1/2; looked at where these meet, too. Enters:
+// after the picture is formed.
 EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& /*others*/) {
   const double full_well = optics.conditions().full_well_electrons;
   if (!(full_well > 0)) return {};
-  constexpr int kLevels = 32;
+  constexpr double kKnee = 0.0031308;  // of sRGB
   double largest = 0;
-  for (int i = 0; i <= kLevels; ++i) {
-    EffectPlace level = place;
-    level.dark = std::max(0.0, place.dark + (place.bright - place.dark) * i / kLevels);
-    largest =
-        std::max(largest, std::sqrt(level.dark / full_well) * StoredSlope(optics, level));
+  EffectPlace level = place;
+  for (const double light :
+       {place.dark, place.bright, std::clamp(kKnee, place.dark, place.bright)}) {
+    level.dark = std::max(light, 1e-6);
+    largest = std::max(largest, std::sqrt(level.dark / full_well) * StoredSlope(optics, level));
   }
   return {largest, largest};
 }
@@ -113,18 +113,26 @@ EffectImpact QuantisationImpact(const EffectOptics& optics, const EffectPlace& /
   return {sigma, sigma};
 }
 
-// Transfer curve. Formula: IEC 61966-2-1 or a power. Bound: its largest distance from linear light
-// between dark and bright. Enters: after the picture is formed.
+// Transfer curve. Formula: IEC 61966-2-1 or a power. Bound: its distance from linear light, which
+// is concave: the largest between dark and bright is at its maximum or at the nearer end. Enters:
+// after the picture is formed.
 EffectImpact TransferCurveImpact(const EffectOptics& optics, const EffectPlace& place,
                                  const EffectSet& /*others*/) {
   const TransferCurve& transfer = optics.camera().sensor.transfer;
-  constexpr int kLevels = 64;
-  double largest = 0;
-  for (int i = 0; i <= kLevels; ++i) {
-    const double light =
-        std::clamp(place.dark + (place.bright - place.dark) * i / kLevels, 0.0, 1.0);
-    largest = std::max(largest, 255 * std::abs(transfer.Encode(light) - light));
+  const double dark = std::clamp(place.dark, 0.0, 1.0);
+  const double bright = std::clamp(place.bright, dark, 1.0);
+  const auto distance = [&](double light) { return transfer.Encode(light) - light; };
+  double low = dark, high = bright;
+  for (int i = 0; i < 40; ++i) {
+    const double left = low + (high - low) / 3, right = high - (high - low) / 3;
+    if (distance(left) < distance(right)) {
+      low = left;
+    } else {
+      high = right;
+    }
   }
+  const double largest = 255 * std::max({std::abs(distance((low + high) / 2)),
+                                         std::abs(distance(dark)), std::abs(distance(bright))});
   return {largest, largest};
 }
 

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "airy.h"
+
 namespace thicklens::model {
 namespace {
 
@@ -40,7 +42,8 @@ double Quantile(const Distribution& below, double reach, double share) {
 
 double NormalQuantile(double share) { return Quantile(NormalBelow, 9, share); }
 
-double PixelQuantile(double sigma, double share) {
+double PixelQuantile(bool box, double sigma, double share) {
+  if (!box) return sigma == 0 ? 0 : sigma * NormalQuantile(share);
   return Quantile([sigma](double x) { return PixelBelow(x, sigma); }, 0.5 + 9 * sigma, share);
 }
 
@@ -88,29 +91,43 @@ void StandardiseAperture(std::vector<PixelRay>* rays) {
 
 }  // namespace
 
-std::vector<PixelRay> PhotographRays(Psf psf, double floor_sigma_px, int count) {
+std::vector<PixelRay> PhotographRays(const RaySpread& spread, int count) {
   const std::vector<double> v = EvenShares(2, count);
   const std::vector<double> x = EvenShares(3, count);
   const std::vector<double> y = EvenShares(5, count);
   std::vector<PixelRay> rays(v.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const double u = (static_cast<double>(i) + 0.5) / count;
-    rays[i].aperture = psf == Psf::kDisc ? InDisc(u, v[i])
-                                         : Eigen::Vector2d(NormalQuantile(u), NormalQuantile(v[i]));
-    rays[i].offset_px = {PixelQuantile(floor_sigma_px, x[i]), PixelQuantile(floor_sigma_px, y[i])};
+    if (spread.aperture == Psf::kDisc) rays[i].aperture = InDisc(u, v[i]);
+    if (spread.aperture == Psf::kGaussian) {
+      rays[i].aperture = {NormalQuantile(u), NormalQuantile(v[i])};
+    }
+    rays[i].offset_px = {PixelQuantile(spread.box, spread.gaussian_px, x[i]),
+                         PixelQuantile(spread.box, spread.gaussian_px, y[i])};
   }
-  StandardiseAperture(&rays);
+  if (spread.aperture) StandardiseAperture(&rays);
+  if (spread.airy_px > 0) {
+    const std::vector<double> radii = AiryQuantiles(count);
+    const std::vector<double> radius = EvenShares(7, count);
+    const std::vector<double> turn = EvenShares(11, count);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const double r_px = spread.airy_px * radii[static_cast<std::size_t>(radius[i] * count)];
+      const double phi = 2 * kPi * turn[i];
+      rays[i].offset_px += r_px * Eigen::Vector2d(std::cos(phi), std::sin(phi));
+    }
+  }
   return rays;
 }
 
-std::vector<PixelRay> ViewRays(double floor_sigma_px) {
+std::vector<PixelRay> ViewRays(bool box, double gaussian_px) {
   constexpr int kCount = 89;  // two neighbours of the Fibonacci series
   constexpr int kBefore = 55;
+  if (!box && gaussian_px == 0) return {PixelRay()};
   std::vector<PixelRay> rays;
   for (int i = 0; i < kCount; ++i) {
     PixelRay ray;
-    ray.offset_px = {PixelQuantile(floor_sigma_px, (i + 0.5) / kCount),
-                     PixelQuantile(floor_sigma_px, (i * kBefore % kCount + 0.5) / kCount)};
+    ray.offset_px = {PixelQuantile(box, gaussian_px, (i + 0.5) / kCount),
+                     PixelQuantile(box, gaussian_px, (i * kBefore % kCount + 0.5) / kCount)};
     rays.push_back(ray);
   }
   return rays;

@@ -2,6 +2,7 @@
 #define THICKLENS_MODEL_SRC_RAY_SET_H_
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "thicklens/model/camera.h"
@@ -14,14 +15,22 @@ struct PixelRay {
   Eigen::Vector2d offset_px{0, 0};  // from the pixel's centre
 };
 
+// Over what the rays of a pixel spread.
+struct RaySpread {
+  std::optional<Psf> aperture;  // absent: a pinhole in its middle
+  bool box = true;              // the pixel's own, of one px
+  double gaussian_px = 0;       // sigma per axis of a Gaussian by which they miss it
+  double airy_px = 0;           // radius of an Airy pattern by which they miss it, too
+};
+
 // `count` rays of equal weight: over the aperture by the PSF's shape, with mean 0 and second moment
-// 1 per axis, and over the pixel's box of one px convolved with a Gaussian of `floor_sigma_px`.
-// Hammersley points in four dimensions, mapped by the inverse distribution functions.
-std::vector<PixelRay> PhotographRays(Psf psf, double floor_sigma_px, int count);
+// 1 per axis, and over the box convolved with the Gaussian and the pattern. Hammersley points in
+// as many dimensions as it takes, mapped by the inverse distribution functions.
+std::vector<PixelRay> PhotographRays(const RaySpread& spread, int count);
 
 // The same over the pixel alone, all through the middle of the aperture: 89 points of a Fibonacci
-// lattice.
-std::vector<PixelRay> ViewRays(double floor_sigma_px);
+// lattice, or one where nothing spreads.
+std::vector<PixelRay> ViewRays(bool box, double gaussian_px);
 
 }  // namespace thicklens::model
 

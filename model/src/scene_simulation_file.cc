@@ -182,13 +182,45 @@ SceneLayer ReadLayer(const YamlNode& node) {
   return layer;
 }
 
+// effects: auto, all, none or a list of names; without: a list of names.
+void ReadEffects(const YamlNode& root, EffectChoice* choice) {
+  const auto names = [](const YamlNode& node) {
+    EffectSet effects;
+    for (const YamlNode& name : node.Elements()) {
+      try {
+        effects.Add(EffectFromName(name.Text()));
+      } catch (const Error& error) {
+        throw name.ErrorHere(error.what());
+      }
+    }
+    return effects;
+  };
+  if (const auto effects = root.Find("effects")) {
+    if (effects->IsSequence()) {
+      choice->base = EffectChoice::Base::kGiven;
+      choice->given = names(*effects);
+    } else {
+      *choice = EffectChoiceFromText(effects->OneOf({"auto", "all", "none"}), "", "");
+    }
+  }
+  if (const auto without = root.Find("without")) choice->without = names(*without);
+  if (const auto tolerance = root.Find("tolerance")) {
+    try {
+      choice->tolerance = EffectToleranceFromText(tolerance->Text());
+    } catch (const Error& error) {
+      throw tolerance->ErrorHere(error.what());
+    }
+  }
+}
+
 }  // namespace
 
 SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
-  root.RequireKeys({"schema", "camera", "truth", "size_px", "layers", "falloff", "rays_per_pixel",
-                    "noise_sigma_grey_levels", "bits", "views", "seed"});
+  root.RequireKeys({"schema", "camera", "truth", "size_px", "layers", "effects", "without",
+                    "tolerance", "rays_per_pixel", "wavelength_nm", "full_well_electrons",
+                    "read_noise_electrons", "noise_sigma_grey_levels", "bits", "views", "seed"});
   constexpr int kAny = std::numeric_limits<int>::max();  // the options' own check is the bound
   SceneSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
@@ -197,9 +229,14 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   for (const YamlNode& layer : root.At("layers").Elements()) {
     options.layers.push_back(ReadLayer(layer));
   }
-  if (const auto falloff = root.Find("falloff")) options.falloff = falloff->Boolean();
+  ReadEffects(root, &options.effects);
   if (const auto rays = root.Find("rays_per_pixel"))
     options.rays_per_pixel = rays->Integer(1, kAny);
+  if (const auto wavelength = root.Find("wavelength_nm")) {
+    options.wavelength_mm = wavelength->PositiveNumber() * 1e-6;
+  }
+  ReadNumber(root, "full_well_electrons", &options.full_well_electrons);
+  ReadNumber(root, "read_noise_electrons", &options.read_noise_electrons);
   ReadNumber(root, "noise_sigma_grey_levels", &options.noise_sigma_grey_levels);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
   if (const auto views = root.Find("views")) {
@@ -228,7 +265,10 @@ std::string SceneTruthToYaml(const SceneTruth& truth) {
   number("nearest_depth_mm", truth.nearest_depth_mm);
   number("farthest_depth_mm", truth.farthest_depth_mm);
   number("largest_blur_sigma_px", truth.largest_blur_sigma_px);
-  out << YAML::Key << "falloff" << YAML::Value << truth.falloff;
+  out << YAML::Key << "effects" << YAML::Value << YAML::Flow << truth.effects;
+  out << YAML::Key << "left_out_grey_levels" << YAML::Value << YAML::Flow << YAML::BeginMap;
+  for (const auto& [name, grey_levels] : truth.left_out) number(name.c_str(), grey_levels);
+  out << YAML::EndMap;
   out << YAML::Key << "seed" << YAML::Value << truth.seed << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }

@@ -13,6 +13,7 @@
 #include "effect_bounds.h"
 #include "support/error_message.h"
 #include "thicklens/model/blur_transfer.h"
+#include "thicklens/model/effect_choice.h"
 #include "thicklens/model/effect_impact.h"
 #include "thicklens/model/light_field_grid.h"
 
@@ -175,8 +176,8 @@ TEST(EffectsTest, GaussianApertureDiffractsToAGaussian) {
 TEST(EffectsTest, DiffractionIsNotCountedTwice) {
   const EffectPlace place = PlaceAt(300, 250, 300);
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
-    const EffectImpact measured = ImpactAt(
-        Effect::kDiffraction, ConditionsOf(TheCamera(psf, 0.5)), place, EffectSet::All());
+    const EffectImpact measured =
+        ImpactAt(Effect::kDiffraction, ConditionsOf(TheCamera(psf, 0.5)), place, EffectSet::All());
     const EffectImpact alone =
         ImpactAt(Effect::kDiffraction, ConditionsOf(TheCamera(psf, 0)), place, EffectSet::All());
     EXPECT_EQ(measured.grey_levels, 0);
@@ -185,14 +186,19 @@ TEST(EffectsTest, DiffractionIsNotCountedTwice) {
   }
 }
 
-// The two constants of the aperture's shape, integrated.
+// The constants of the aperture's shape, integrated.
 TEST(EffectsTest, DiscAndGaussianDifferAsStated) {
-  double not_shared = 0, farthest = 0;
-  for (int i = 0; i < 60000; ++i) {
-    const double r = (i + 0.5) / 10000;  // sigmas
-    const double disc = r < 2 ? 1 / (4 * kPi) : 0;
-    const double gauss = std::exp(-r * r / 2) / (2 * kPi);
-    not_shared += std::max(0.0, gauss - disc) * 2 * kPi * r / 10000;
+  constexpr double kStep = 1e-4;
+  double not_shared = 0, farthest = 0, first = 0, second = 0, psi = 0, weighed = 0;
+  for (int i = 90000; i >= 0; --i) {     // from outside, where psi is 0
+    const double r = (i + 0.5) * kStep;  // sigmas
+    const double difference = (r < 2 ? 1 / (4 * kPi) : 0) - std::exp(-r * r / 2) / (2 * kPi);
+    const double within = std::min(r * r / 4, 1.0) - 1 + std::exp(-r * r / 2);
+    not_shared += std::abs(difference) * kPi * r * kStep;
+    weighed += 2 / kPi * r * std::abs(difference) * 2 * kPi * r * kStep;
+    first += std::abs(within) * kStep;
+    psi -= within / (2 * kPi * r) * kStep;
+    second += std::abs(psi) * 2 * kPi * r * kStep;
     if (r < 2) {
       const double u = r / 2;
       const double edge = 0.5 + (u * std::sqrt(1 - u * u) + std::asin(u)) / kPi;
@@ -201,11 +207,14 @@ TEST(EffectsTest, DiscAndGaussianDifferAsStated) {
   }
   EXPECT_NEAR(not_shared, 0.2887, 1e-4);
   EXPECT_NEAR(farthest, 0.0404, 1e-4);
+  EXPECT_NEAR(first, 0.2216, 1e-4);
+  EXPECT_NEAR(second, 0.0940, 1e-4);
+  EXPECT_NEAR(weighed, 0.587, 1e-3);
 }
 
 // Pictures in closed form, blurred in closed form: never beyond the bound, and near it.
 TEST(EffectsTest, BlurBoundHoldsForWavesAndEdges) {
-  for (const double f : {0.02, 0.1, 0.3, 0.5}) {      // cycles per px along x
+  for (const double f : {0.02, 0.1, 0.3, 0.5}) {        // cycles per px along x
     for (const double sigma : {0.05, 0.2, 0.7, 2.0}) {  // added
       for (const double other : {0.0, 0.5, 2.0}) {
         const double w = 2 * kPi * f;
@@ -221,8 +230,8 @@ TEST(EffectsTest, BlurBoundHoldsForWavesAndEdges) {
         const double bound = BlurChange(wave, sigma * sigma, smoothing);
         EXPECT_GE(bound, change) << f << " " << sigma << " " << other;
         if (sigma < 0.3 / f / 2 && other == 0) {
- EXPECT_LT(bound, 4 * change);
-}
+          EXPECT_LT(bound, 4 * change);
+        }
       }
     }
   }
@@ -323,11 +332,11 @@ TEST(EffectsTest, WhatIsLeftOutStaysWithinTheToleranceAllTogether) {
     last = chosen;
     // Both kinds of noise together, 0.42, or one of them, or none.
     if (grey_levels == 0.5) {
- EXPECT_FALSE(chosen.Has(Effect::kReadNoise));
-}
+      EXPECT_FALSE(chosen.Has(Effect::kReadNoise));
+    }
     if (grey_levels == 0.1) {
- EXPECT_TRUE(chosen.Has(Effect::kReadNoise));
-}
+      EXPECT_TRUE(chosen.Has(Effect::kReadNoise));
+    }
     double sum = 0;
     for (const Effect effect : all.Without(chosen).Effects()) {
       if (FactsOf(effect).random) continue;
@@ -351,6 +360,31 @@ TEST(EffectsTest, ToleranceInPxJudgesDisplacements) {
   EXPECT_EQ(ChooseEffects(conditions, places, optics, EffectToleranceFromText("0.19px")), optics);
   EXPECT_EQ(ChooseEffects(conditions, places, optics, EffectToleranceFromText("0.21px")),
             EffectSet({Effect::kLensFloor}));
+}
+
+TEST(EffectsTest, ChoiceIsReadAndFollowed) {
+  const EffectChoice choice = EffectChoiceFromText("defocus,falloff", "falloff", "2gl");
+  EXPECT_EQ(choice.given, EffectSet({Effect::kDefocus, Effect::kFalloff}));
+  EXPECT_EQ(choice.tolerance.grey_levels, 2);
+  const EffectConditions conditions = ConditionsOf(TheCamera());
+  const std::vector<EffectPlace> places = PlacesBetween(conditions.camera, 250, 350, true);
+  const EffectSet model = EffectSet::All().Without({Effect::kTilt, Effect::kVignetting});
+  const auto on = [&](EffectChoice wanted) {
+    return DecideEffects(wanted, conditions, places, model).on;
+  };
+  EXPECT_EQ(on(choice), EffectSet({Effect::kDefocus}));
+  EXPECT_EQ(on(EffectChoiceFromText("none", "", "")), EffectSet());
+  EXPECT_EQ(on(EffectChoiceFromText("all", "drift", "")), model.Without({Effect::kDrift}));
+  EffectChoice automatic = EffectChoiceFromText("auto", "", "");
+  EXPECT_FALSE(on(automatic).Has(Effect::kQuantisation));
+  EXPECT_TRUE(on(automatic).Has(Effect::kOcclusion));
+  automatic.kept = {Effect::kQuantisation};
+  EXPECT_TRUE(on(automatic).Has(Effect::kQuantisation));
+  automatic.without = automatic.kept;
+  EXPECT_FALSE(on(automatic).Has(Effect::kQuantisation));
+  EXPECT_EQ(DecideEffects(automatic, conditions, places, model).findings.size(), 17U);
+  EXPECT_THAT(ErrorOf([&] { on(EffectChoiceFromText("auto", "tilt,drift", "")); }),
+              HasSubstr("effect tilt is not one of this picture's: it has thickness"));
 }
 
 TEST(EffectsTest, SaysWhatIsWrong) {

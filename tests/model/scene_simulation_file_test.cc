@@ -74,7 +74,12 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
            "  outline: {centre_mm: [1, 2], size_mm: [3, 4]}\n"
            "  texture: {kind: noise, saturation: 0}\n"
            "  gloss: [{depth_mm: 320, centre_px: [5, 6.5], sigma_px: 2.5, strength: 0.75}]\n"
-           "falloff: false\n"
+           "effects: [defocus, occlusion, falloff]\n"
+           "without: [falloff]\n"
+           "tolerance: 0.1px\n"
+           "wavelength_nm: 633\n"
+           "full_well_electrons: 12000\n"
+           "read_noise_electrons: 5\n"
            "rays_per_pixel: 100\n"
            "noise_sigma_grey_levels: 1.5\n"
            "bits: 16\n"
@@ -87,7 +92,14 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.camera.sensor.width_px, 400);
   EXPECT_EQ(options.camera.sensor.height_px, 301);
   EXPECT_EQ(options.camera.sensor.principal_point_px, Eigen::Vector2d(201.5, 150));
-  EXPECT_FALSE(options.falloff);
+  EXPECT_EQ(options.effects.base, EffectChoice::Base::kGiven);
+  EXPECT_EQ(options.effects.given,
+            EffectSet({Effect::kDefocus, Effect::kOcclusion, Effect::kFalloff}));
+  EXPECT_EQ(options.effects.without, EffectSet({Effect::kFalloff}));
+  EXPECT_EQ(options.effects.tolerance.px.value(), 0.1);
+  EXPECT_DOUBLE_EQ(options.wavelength_mm, 633e-6);
+  EXPECT_EQ(options.full_well_electrons, 12000);
+  EXPECT_EQ(options.read_noise_electrons, 5);
   EXPECT_EQ(options.rays_per_pixel, 100);
   EXPECT_EQ(options.noise_sigma_grey_levels, 1.5);
   EXPECT_EQ(options.bits, 16);
@@ -144,7 +156,10 @@ TEST_F(SceneSimulationFileTest, WhatIsLeftOutHasTheDefaultsOfTheOptions) {
   EXPECT_EQ(options.camera.sensor.width_px, 640);
   EXPECT_EQ(options.camera.sensor.principal_point_px, Eigen::Vector2d(321.5, 240));
   EXPECT_FALSE(options.camera.calibration->blur_floor_px);
-  EXPECT_EQ(options.falloff, defaults.falloff);
+  EXPECT_EQ(options.effects.base, EffectChoice::Base::kAuto);
+  EXPECT_EQ(options.effects.without, EffectSet());
+  EXPECT_EQ(options.effects.tolerance.grey_levels, defaults.effects.tolerance.grey_levels);
+  EXPECT_EQ(options.wavelength_mm, defaults.wavelength_mm);
   EXPECT_EQ(options.rays_per_pixel, defaults.rays_per_pixel);
   EXPECT_EQ(options.noise_sigma_grey_levels, 0);
   EXPECT_EQ(options.bits, 8);
@@ -244,7 +259,12 @@ TEST_F(SceneSimulationFileTest, TellsWhatIsWrongAndWhere) {
       {head + kLayers + "views: [5]\n", "a list of 2"},
       {head + kLayers + "views: [5, 200]\n", "views is 5x200"},
       {head + kLayers + "rays_per_pixel: 2\n", "rays_per_pixel is 2"},
-      {head + kLayers + "falloff: 1\n", "true, false"},
+      {head + kLayers + "effects: some\n", "auto, all, none"},
+      {head + kLayers + "effects: [bokeh]\n", "effect \"bokeh\" is unknown"},
+      {head + kLayers + "without: [bokeh]\n", "effect \"bokeh\" is unknown"},
+      {head + kLayers + "tolerance: 3\n", "0.5gl or 0.1px"},
+      {head + kLayers + "wavelength_nm: 0\n", "wavelength_nm"},
+      {head + kLayers + "read_noise_electrons: 3\n", "full_well_electrons > 0"},
   };
   for (const auto& [text, told] : cases) {
     EXPECT_THAT(MessageOf(text), HasSubstr(told)) << text;
@@ -261,7 +281,8 @@ TEST_F(SceneSimulationFileTest, TruthIsWrittenInFull) {
   truth.nearest_depth_mm = 290.5;
   truth.farthest_depth_mm = 310;
   truth.largest_blur_sigma_px = 1.0 / 3;
-  truth.falloff = false;
+  truth.effects = {"defocus", "pixel-box"};
+  truth.left_out = {{"falloff", 0.125}};
   truth.seed = 18446744073709551615u;
   const YamlNode root = YamlNode::Parse(SceneTruthToYaml(truth), "truth.yaml");
   root.RequireSchema("thicklens/scene-truth/1");
@@ -272,7 +293,9 @@ TEST_F(SceneSimulationFileTest, TruthIsWrittenInFull) {
   EXPECT_EQ(root.At("nearest_depth_mm").Number(), 290.5);
   EXPECT_EQ(root.At("farthest_depth_mm").Number(), 310);
   EXPECT_EQ(root.At("largest_blur_sigma_px").Number(), 1.0 / 3);
-  EXPECT_FALSE(root.At("falloff").Boolean());
+  ASSERT_EQ(root.At("effects").Elements().size(), 2U);
+  EXPECT_EQ(root.At("effects").Elements()[1].Text(), "pixel-box");
+  EXPECT_EQ(root.At("left_out_grey_levels").At("falloff").Number(), 0.125);
   EXPECT_EQ(root.At("seed").Text(), "18446744073709551615");
 }
 

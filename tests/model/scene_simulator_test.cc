@@ -92,7 +92,8 @@ SceneSimulationOptions SceneOf(const Camera& camera, std::vector<SceneLayer> lay
   SceneSimulationOptions options;
   options.camera = camera;
   options.layers = std::move(layers);
-  options.falloff = false;
+  options.effects.base = EffectChoice::Base::kAll;
+  options.effects.without = {Effect::kFalloff, Effect::kDiffraction};
   return options;
 }
 
@@ -153,7 +154,7 @@ double LargestDifference(const LinearPicture& a, const LinearPicture& b) {
 TEST(RaySetTest, CarriesTheMomentsAndTransferOfPsfAndPixel) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     for (const double floor_px : {0.0, 0.7}) {
-      const std::vector<PixelRay> rays = PhotographRays(psf, floor_px, 600);
+      const std::vector<PixelRay> rays = PhotographRays({psf, true, floor_px, 0}, 600);
       ASSERT_EQ(rays.size(), 600u);
       Eigen::Array2d mean(0, 0), square(0, 0), offset(0, 0), offset_square(0, 0);
       for (const PixelRay& ray : rays) {
@@ -185,7 +186,7 @@ TEST(RaySetTest, CarriesTheMomentsAndTransferOfPsfAndPixel) {
 }
 
 TEST(RaySetTest, ViewRaysFillThePixelAlone) {
-  const std::vector<PixelRay> rays = ViewRays(0);
+  const std::vector<PixelRay> rays = ViewRays(true, 0);
   // Each of 8 x 8 cells of the pixel gets its share, 89/64 rays, to less than two.
   std::vector<int> cells(64, 0);
   for (const PixelRay& ray : rays) {
@@ -198,7 +199,7 @@ TEST(RaySetTest, ViewRaysFillThePixelAlone) {
   for (const double f : {0.1, 0.3, 0.5}) {
     std::complex<double> sum = 0, floor = 0;
     for (const PixelRay& ray : rays) sum += std::polar(1 / 89.0, 2 * kPi * f * ray.offset_px.y());
-    for (const PixelRay& ray : ViewRays(0.6))
+    for (const PixelRay& ray : ViewRays(true, 0.6))
       floor += std::polar(1 / 89.0, 2 * kPi * f * ray.offset_px.y());
     EXPECT_LT(std::abs(sum - BoxTransfer(f)), 1e-3);
     EXPECT_LT(std::abs(floor - BoxTransfer(f) * GaussTransfer(0.6, f)), 3e-3);
@@ -408,7 +409,7 @@ TEST(SceneSimulatorTest, FallOffIsThatOfTheFormula) {
   constexpr double kFastRadiusMm = 30;
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     SceneSimulationOptions options = SceneOf(MacroCamera(16, 12, psf, 0), {Uniform(330, 1)});
-    options.falloff = true;
+    options.effects.without = {Effect::kDiffraction};
     options.camera.sensor.pixel_pitch_mm = 2;
     options.camera.lens.aperture_radius_mm = kFastRadiusMm;
     const double image_mm = options.camera.image_distance_mm();

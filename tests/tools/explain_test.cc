@@ -6,6 +6,7 @@
 
 #include "explain_table.h"
 #include "thicklens/error.h"
+#include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {
 namespace {
@@ -108,6 +109,38 @@ TEST(ExplainCamera, SaysWhereTheThinLensHasNoPlaneOfFocus) {
   EXPECT_FALSE(known.thin.focus_depth_mm);
   EXPECT_THAT(ExplanationText(known), HasSubstr("nowhere"));
   EXPECT_TRUE(ExplanationJson(known)["thin_counterpart"]["focus_depth_mm"].is_null());
+}
+
+// Where both lenses part by the limit, by their own formulas.
+TEST(ExplainCamera, SaysAtWhichDepthsThinIsAsGoodAsThick) {
+  model::Camera camera = ThickCamera();
+  // With rho = K (1 - f2/f1) both lenses are the same but for that; 0.01 mm are more.
+  camera.lens = {50, 50.01, 50000 / 950.0 * (1 - 50.01 / 50) + 0.01, 10};
+  camera.calibration->image_distance_mm->value = model::ImageDistanceMm(camera.lens, 1000);
+  const model::ThickLens thin = model::ThinCounterpart(camera.lens);
+  const double d1_mm = camera.image_distance_mm();
+  const auto apart_px = [&](double depth_mm) {
+    return 10 / kPitchMm *
+           std::abs(model::DefocusPerAperture(camera.lens, d1_mm, depth_mm) -
+                    model::DefocusPerAperture(thin, d1_mm, depth_mm));
+  };
+  const Explanation known = ExplainCamera(camera, {500, 2000}, 2);
+  ASSERT_TRUE(known.thin.alike);
+  EXPECT_EQ(known.thin.alike->near_mm, 50);  // nearer than f1 nothing has an image
+  EXPECT_NEAR(apart_px(known.thin.alike->far_mm), 0.1, 1e-6);
+  EXPECT_LT(apart_px(0.9 * known.thin.alike->far_mm), 0.1);
+  EXPECT_GT(apart_px(1.1 * known.thin.alike->far_mm), 0.1);
+  EXPECT_THAT(ExplanationText(known), HasSubstr("thin stays within 0.1 px of thick"));
+  EXPECT_FALSE(ExplainCamera(ThickCamera(), {500, 2000}, 2).thin.alike);
+}
+
+TEST(ExplainCamera, HyperfocalDistanceBlursInfinityByOnePixel) {
+  model::Camera camera = ThickCamera();
+  const Explanation known = ExplainCamera(camera, {500, kInfinity}, 2);
+  EXPECT_NEAR(known.working_f_number, (camera.image_distance_mm() - 4) / 20, 1e-12);
+  camera.calibration->image_distance_mm->value =
+      model::ImageDistanceMm(camera.lens, known.hyperfocal_mm);
+  EXPECT_NEAR(ExplainCamera(camera, {500, kInfinity}, 2).rows[1].blur_radius_px, 1, 1e-9);
 }
 
 TEST(ExplainCamera, KnowsAThinLens) {

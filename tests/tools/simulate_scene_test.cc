@@ -110,6 +110,36 @@ TEST_F(SimulateSceneTest, PictureFolderHoldsWhatTheSimulatorMakes) {
   EXPECT_EQ(json["truth"]["blur_ratio"], 0.45);
 }
 
+TEST_F(SimulateSceneTest, EffectsAreChosenAndTold) {
+  const std::string config = folder_.Put("scene.yaml", SceneConfig("without: [falloff]\n"));
+  Succeed({"picture", config, "-o", folder_ / "auto", "--json", folder_ / "auto.json"});
+  const nlohmann::json automatic = JsonOf("auto.json")["effects"];
+  ASSERT_EQ(automatic.size(), 12U);
+  EXPECT_EQ(automatic[1]["name"], "defocus");
+  EXPECT_EQ(automatic[1]["unit"], "px");
+  EXPECT_TRUE(automatic[1]["on"]);
+  EXPECT_GT(automatic[1]["bound_grey_levels"], 5);
+  EXPECT_NEAR(automatic[1]["where"]["depth_mm"], 300, 10);
+  EXPECT_EQ(automatic[3]["name"], "falloff");
+  EXPECT_FALSE(automatic[3]["on"]);
+
+  // The command line goes before the file.
+  const ProgramResult given =
+      Run({"picture", config, "-o", folder_ / "given", "--effects", "defocus,falloff", "--without",
+           "defocus", "--json", folder_ / "given.json"});
+  EXPECT_THAT(given.out, HasSubstr("effects: falloff; left out"));
+  EXPECT_EQ(JsonOf("given.json")["bits"], 16);
+  const model::YamlNode truth = model::YamlNode::LoadFile(folder_ / "given" + "/truth.yaml");
+  ASSERT_EQ(truth.At("effects").Elements().size(), 1U);
+  EXPECT_EQ(truth.At("effects").Elements()[0].Text(), "falloff");
+  EXPECT_EQ(model::ReadCamera(folder_ / "given" + "/camera.yaml").sensor.transfer.Name(), "linear");
+
+  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "c", "--effects", "tilt"}),
+              HasSubstr("effect tilt is not one of this picture's"));
+  EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--without", "bokeh"}).exit_code, 2);
+  EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--tolerance", "1"}).exit_code, 2);
+}
+
 TEST_F(SimulateSceneTest, LightFieldFolderHoldsTheTrueViews) {
   const std::string config = folder_.Put("scene.yaml", SceneConfig("views: [3, 5]\n"));
   Succeed({"light-field", config, "-o", folder_ / "a", "--format", "tiff", "--quiet"});
@@ -161,7 +191,7 @@ TEST_F(SimulateSceneTest, TextureMayBeAPictureFile) {
   }
   folder_.Put("purple.png", EncodePng(texture));
   const std::string config =
-      folder_.Put("scene.yaml", SceneConfig("falloff: false\n")
+      folder_.Put("scene.yaml", SceneConfig("without: [falloff]\n")
                                     .replace(SceneConfig("").find("{kind: dead-leaves}"), 19,
                                              "{kind: picture, picture: purple.png}"));
   Succeed({"picture", config, "-o", folder_ / "out", "--quiet"});

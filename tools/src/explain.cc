@@ -4,9 +4,15 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "commands.h"
+#include "depth_io.h"
+#include "effect_options.h"
+#include "explain_scene.h"
 #include "explain_table.h"
+#include "light_field_options.h"
 #include "option_values.h"
 #include "thicklens/model/camera_file.h"
 
@@ -18,8 +24,13 @@ constexpr int kMaxSteps = 10000;
 struct ExplainOptions {
   CommonOptions common;
   std::string camera_path;
-  std::string depth_range;
+  std::string depth_range, depth_path;  // one of them
+  DepthOptions depth;
   int steps = 9;
+  EffectOptions effects;
+  int bits = 8;
+  double full_well_electrons = 0, read_noise_electrons = 0;
+  bool as_sweep = false;
 };
 
 DepthRange ParseDepthRange(const std::string& text) {
@@ -40,19 +51,84 @@ DepthRange ParseDepthRange(const std::string& text) {
   return range;
 }
 
-CommandResult Explain(const ExplainOptions& options, const DepthRange& range) {
+// What is photographed, as far as it is known.
+struct ExplainedScene {
+  DepthRange range;
+  std::vector<model::EffectPlace> places;
+};
+
+ExplainedScene SceneOf(const ExplainOptions& options, const model::Camera& camera) {
+  if (options.depth_path.empty()) {
+    const DepthRange range = ParseDepthRange(options.depth_range);
+    return {range, model::PlacesBetween(camera, range.near_mm, range.far_mm, !options.as_sweep)};
+  }
+  const model::RawDepthMap map = ReadDepthMap(options.depth_path);
+  const model::Sensor& sensor = camera.sensor;
+  if (map.width_px != sensor.width_px || map.height_px != sensor.height_px) {
+    throw Error(fmt::format(
+        "{}: it is {}x{} px, the camera's sensor {}x{} px: the sizes must be "
+        "equal",
+        options.depth_path, map.width_px, map.height_px, sensor.width_px, sensor.height_px));
+  }
+  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  empty.values.assign(map.values.size(), 0.0F);
+  const model::Scene scene = model::MakeScene(camera, std::move(empty), map,
+                                              ConventionOf(options.depth), options.depth_path);
+  return {{scene.depth.min_mm, scene.depth.max_mm}, PlacesOfDepth(camera, scene)};
+}
+
+model::EffectDecision Decide(const ExplainOptions& options, const model::Camera& camera,
+                             const std::vector<model::EffectPlace>& places) {
+  model::EffectConditions conditions;
+  conditions.camera = camera;
+  conditions.bits = options.bits;
+  conditions.full_well_electrons = options.full_well_electrons;
+  conditions.read_noise_electrons = options.read_noise_electrons;
+  if (options.as_sweep) conditions.bench = model::BenchConditions();
+  model::EffectChoice choice;
+  ApplyEffectOptions(options.effects, &choice);
+  return model::DecideEffects(choice, conditions, places, model::EffectSet::All());
+}
+
+CommandResult Explain(const ExplainOptions& options) {
   const model::Camera camera = model::ReadCamera(options.camera_path);
   TellAssumedFields(camera);
-  const Explanation explanation = ExplainCamera(camera, range, options.steps);
-  PrintResult(options.common, ExplanationText(explanation));
-  return {ExplanationJson(explanation), ""};
+  const ExplainedScene scene = SceneOf(options, camera);
+  const Explanation explanation = ExplainCamera(camera, scene.range, options.steps);
+  const model::EffectDecision decision = Decide(options, camera, scene.places);
+  PrintResult(
+      options.common,
+      ExplanationText(explanation) +
+          "\nwhat each effect can matter here, at most, to edges between black and white\n" +
+          EffectsTable(decision));
+  CommandResult result{ExplanationJson(explanation), ""};
+  result.summary["effects"] = EffectsJson(decision);
+  return result;
+}
+
+// Throws UsageError.
+void CheckUsage(const ExplainOptions& options) {
+  if (options.depth_range.empty() == options.depth_path.empty()) {
+    throw UsageError("one of --depth-range and --depth is needed: depths, or a map of them");
+  }
+  if (!options.depth_path.empty()) {
+    if (ConventionOf(options.depth).kind == model::DepthKind::kDisparity) {
+      throw UsageError(
+          "--depth-kind disparity: disparities refer to views, which a camera alone "
+          "does not have; z or range is expected");
+    }
+    return;
+  }
+  if (!options.depth.kind.empty() || !options.depth.unit.empty()) {
+    throw UsageError("--depth-kind and --depth-unit belong to --depth");
+  }
 }
 
 }  // namespace
 
 void AddExplainCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "explain", "What a calibrated camera does: blur, depth of field, thick against thin");
+      "explain", "What a calibrated camera does: blur, depth of field, which effects matter");
   const auto options = std::make_shared<ExplainOptions>();
   command->add_option("camera", options->camera_path, "A calibrated camera")
       ->required()
@@ -60,18 +136,37 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
   command
       ->add_option("--depth-range", options->depth_range,
                    "Depths from the aperture, in mm; FAR may be inf")
-      ->required()
       ->type_name("NEAR:FAR");
+  command->add_option("--depth", options->depth_path, "A depth map of the scene instead")
+      ->type_name("MAP");
+  AddDepthOptions(command, &options->depth);
   command->add_option("--steps", options->steps, "Depths in the table, equally spaced in 1/depth")
       ->check(CLI::Range(2, kMaxSteps))
       ->capture_default_str()
       ->type_name("N");
+  AddEffectOptions(command, &options->effects);
+  command->add_option("--bits", options->bits, "Of the stored picture")
+      ->check(CLI::Range(1, 32))
+      ->capture_default_str()
+      ->type_name("N");
+  command
+      ->add_option("--full-well", options->full_well_electrons,
+                   "Electrons at full scale, for shot noise; 0: unknown")
+      ->check(NonNegative())
+      ->type_name("ELECTRONS");
+  command->add_option("--read-noise", options->read_noise_electrons, "Of the sensor, sd")
+      ->check(NonNegative())
+      ->type_name("ELECTRONS");
+  command->add_flag("--as-sweep", options->as_sweep,
+                    "The depths are those of a target on a bench, lit from the camera");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {
-      const DepthRange range = ParseDepthRange(options->depth_range);
-      RequireDistinctFiles({options->common.json_path}, {options->camera_path});
-      RunCommand(options->common, [&] { return Explain(*options, range); });
+      CheckUsage(*options);
+      if (options->depth_path.empty()) ParseDepthRange(options->depth_range);
+      RequireDistinctFiles({options->common.json_path},
+                           {options->camera_path, options->depth_path});
+      RunCommand(options->common, [&] { return Explain(*options); });
     };
   });
 }

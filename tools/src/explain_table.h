@@ -42,7 +42,11 @@ struct ThinComparison {
   std::optional<double> focus_depth_mm;  // absent: the sensor is in front of every image
   double scale_ratio = 1;                // magnification, thin over thick, at every depth
   double corner_shift_px = 0;            // what that means at the farthest corner
+  // Depths at which what passes the rim of the aperture lands within kThinTolerancePx of where it
+  // lands behind the thick lens, relative to the chief ray; absent: none. The end may be +inf.
+  std::optional<DepthRange> alike;
 };
+constexpr double kThinTolerancePx = 0.1;
 
 struct Explanation {
   std::string camera_name;
@@ -54,6 +58,8 @@ struct Explanation {
   std::optional<double> blur_floor_px;
   std::vector<DepthRow> rows;
   std::vector<DepthOfFieldRow> depth_of_field;
+  double hyperfocal_mm = 0;     // plane of focus whose blur radius at infinity is 1 px
+  double working_f_number = 0;  // D/(2 r)
   ThinComparison thin;
 };
 

@@ -15,6 +15,7 @@
 
 #include "build_info.h"
 #include "depth_io.h"
+#include "effect_options.h"
 #include "image_io.h"
 #include "interrupt.h"
 #include "light_field_io.h"
@@ -37,6 +38,7 @@ struct SceneOptions {
   std::string config_path;
   std::string output_folder;
   std::optional<std::int64_t> seed;
+  EffectOptions effects;
   ViewsOption views;           // light-field
   std::string format = "png";  // light-field
 };
@@ -44,6 +46,7 @@ struct SceneOptions {
 model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   model::SceneSimulationOptions scene = model::ReadSceneSimulation(options.config_path);
   if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
+  ApplyEffectOptions(options.effects, &scene.effects);
   const auto [u_count, v_count] = ViewCounts(options.views);
   if (u_count > 0) {
     scene.u_count = u_count;
@@ -102,21 +105,25 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   const model::SceneSimulator simulator(scene, ReadTextures(scene));
   const model::RawDepthMap depth = simulator.RenderDepth();
   const model::SceneTruth truth = simulator.Truth(depth);
+  int bits = 0;
   {
     ProgressLine progress("rendering", options.common.quiet);
     const model::LinearPicture picture =
         simulator.RenderNoiseless(RunWith(options.common, &progress));
-    folder.Write("picture.png", EncodePng(simulator.Store(picture)));
+    const model::StoredPicture stored = simulator.Store(picture);
+    bits = stored.bits;
+    folder.Write("picture.png", EncodePng(stored));
   }
   folder.Write("depth.pfm", EncodePfm(depth));
-  folder.Write("camera.yaml", model::CameraToYaml(scene.camera));
+  folder.Write("camera.yaml", model::CameraToYaml(simulator.camera()));
   folder.Write(kPictureMarker, model::SceneTruthToYaml(truth));
   ThrowIfInterrupted();
   folder.Commit();
 
   CommandResult result;
   result.summary = Summary(options, scene, truth, start);
-  result.summary["bits"] = scene.bits;
+  result.summary["bits"] = bits;
+  result.summary["effects"] = EffectsJson(simulator.effects());
   result.summary["rays_per_pixel"] = scene.rays_per_pixel;
   PrintResult(
       options.common,
@@ -124,7 +131,8 @@ CommandResult SimulatePicture(const SceneOptions& options) {
                   "to {:.3g} px, in {:.1f} s: {}\n",
                   scene.camera.sensor.width_px, scene.camera.sensor.height_px,
                   truth.nearest_depth_mm, truth.farthest_depth_mm, truth.largest_blur_sigma_px,
-                  result.summary["seconds"].get<double>(), options.output_folder));
+                  result.summary["seconds"].get<double>(), options.output_folder) +
+          EffectsText(simulator.effects()));
   return result;
 }
 
@@ -169,6 +177,7 @@ CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std
   command->add_option("--seed", options->seed, "Replaces the config's seed")
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N");
+  AddEffectOptions(command, &options->effects);
   AddCommonOptions(command, &options->common);
   return command;
 }

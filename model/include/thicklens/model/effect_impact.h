@@ -76,23 +76,6 @@ std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
                                        const std::vector<EffectPlace>& places,
                                        const EffectSet& effects);
 
-// What the effects that are left out may change, all together.
-struct EffectTolerance {
-  double grey_levels = 0.5;  // > 0; the sum of their bounds, and apart from it the sd of their noise
-  // For effects that are measured in px: instead of grey levels, each on its own. > 0.
-  std::optional<double> px;
-
-  bool IsValid(std::string* why) const;
-};
-// "0.5gl" or "0.1px". Throws Error.
-EffectTolerance EffectToleranceFromText(const std::string& text);
-
-// Those of `effects` that the scene calls for: one after the other the least is left out, while the
-// tolerance allows it. Bounds add up along the way: each is that of taking the effect from a
-// picture that lacks those before it.
-EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
-                        const EffectSet& effects, const EffectTolerance& tolerance);
-
 // Black and white edges in the middle and in the farthest corner of the picture at depths equally
 // spaced in 1/z; with `occlusion` those of the one end before the other. Throws Error unless
 // 0 < near_mm <= far_mm.

@@ -6,9 +6,11 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "thicklens/model/camera.h"
+#include "thicklens/model/effect_choice.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 
@@ -82,15 +84,21 @@ struct SceneLayer {
   std::vector<GlossOptions> gloss;
 };
 
+// What a picture of a scene can have.
+EffectSet PictureEffects();
+
 struct SceneSimulationOptions {
   // Size, pitch, lens; its calibration gives d1, kappa and the lens floor (absent: 0).
   Camera camera;
   std::vector<SceneLayer> layers;  // in any order: along each ray the nearest one is seen
-  bool falloff = true;             // irradiance by (12): cos(alpha) cos^3(beta)
-  int rays_per_pixel = 600;
-  // Standard deviation of the noise of the stored values, in 1/255 of full scale at 8 and 16 bits.
+  EffectChoice effects;            // of PictureEffects()
+  int rays_per_pixel = 600;        // where there is defocus
+  double wavelength_mm = 550e-6;
+  // Noise of the sensor: electrons at full scale (0: no shot noise), and sd of what is read.
+  double full_well_electrons = 0, read_noise_electrons = 0;
+  // Standard deviation of noise of the stored values, in 1/255 of full scale at 8 and 16 bits.
   double noise_sigma_grey_levels = 0;
-  int bits = 8;
+  int bits = 8;                  // 8 or 16
   int u_count = 5, v_count = 5;  // views of the true light field
   std::uint64_t seed = 1;
 
@@ -108,7 +116,9 @@ struct SceneTruth {
   double blur_floor_px = 0;
   double nearest_depth_mm = 0, farthest_depth_mm = 0;  // of the depth map
   double largest_blur_sigma_px = 0;                    // of defocus alone, over the depth map
-  bool falloff = true;
+  std::vector<std::string> effects;                    // that were on, by name
+  // What was left out, by name, with the bound of its own impact in grey levels.
+  std::vector<std::pair<std::string, double>> left_out;
   std::uint64_t seed = 0;
 };
 std::string SceneTruthToYaml(const SceneTruth& truth);  // schema thicklens/scene-truth/1
@@ -130,7 +140,8 @@ struct SceneRun {
 // A pixel of the photograph is the mean over one set of rays for all pixels (Hammersley points)
 // that spreads over the aperture by the camera's PSF (Gaussian of standard deviation kappa r, or
 // disc of radius 2 kappa r; the set's second moment is exactly (kappa r)^2) and over the pixel box
-// widened by the lens floor. At 600 rays its transfer function is off by 0.01 at the highest
+// widened by the lens floor; each effect that is off takes its part of the set with it. At 600 rays
+// its transfer function is off by 0.01 at the highest
 // frequencies and the share of a pixel that an edge hides by 0.005, rms.
 //
 // Everything is RGB. The same options give the same bits on any number of threads.
@@ -138,15 +149,20 @@ class SceneSimulator {
  public:
   // `pictures`: linear light of the layers of kPicture, one entry a layer (empty ones for others).
   // Throws Error if the options are not valid, a ray can miss or meet behind the front focal point
-  // one of the planes, no layer is whole, or a texture cannot be drawn.
+  // one of the planes, no layer is whole, a texture cannot be drawn, or an effect is named that a
+  // picture of a scene cannot have.
   SceneSimulator(const SceneSimulationOptions& options, const std::vector<LinearPicture>& pictures);
   ~SceneSimulator();
   SceneSimulator(const SceneSimulator&) = delete;
   SceneSimulator& operator=(const SceneSimulator&) = delete;
 
+  const EffectDecision& effects() const;
+  // As what Store writes is to be understood: linear if its transfer curve was left out.
+  const Camera& camera() const;
+
   // Linear light before noise and quantisation: 1 for the radiance 1 at the principal point.
   LinearPicture RenderNoiseless(const SceneRun& run) const;
-  // What the camera stores of it: transfer curve, noise, rounding, clipping.
+  // What the camera stores of it: noise, transfer curve, rounding, clipping.
   StoredPicture Store(const LinearPicture& noiseless) const;
 
   // z in mm of what the chief ray of each pixel's centre meets.

@@ -1,0 +1,165 @@
+#include "thicklens/model/effect_choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+#include <utility>
+
+#include "effect_bounds.h"
+#include "thicklens/error.h"
+
+namespace thicklens::model {
+namespace {
+
+// What the effects that have been left out have taken of the tolerance.
+class Spent {
+ public:
+  explicit Spent(const EffectTolerance& tolerance) : tolerance_(tolerance) {}
+
+  bool Allows(const EffectFinding& finding) const {
+    if (finding.impact.grey_levels == 0) return true;
+    const EffectFacts& facts = FactsOf(finding.effect);
+    if (facts.random) {
+      return std::hypot(noise_, finding.impact.grey_levels) <= tolerance_.grey_levels;
+    }
+    if (tolerance_.px && facts.unit == EffectUnit::kPx) {
+      return finding.impact.amount <= *tolerance_.px;
+    }
+    return bounds_ + finding.impact.grey_levels <= tolerance_.grey_levels;
+  }
+
+  void Add(const EffectFinding& finding) {
+    const EffectFacts& facts = FactsOf(finding.effect);
+    if (facts.random) {
+      noise_ = std::hypot(noise_, finding.impact.grey_levels);
+    } else if (!tolerance_.px || facts.unit != EffectUnit::kPx) {
+      bounds_ += finding.impact.grey_levels;
+    }
+  }
+
+ private:
+  const EffectTolerance& tolerance_;
+  double bounds_ = 0, noise_ = 0;
+};
+
+// Whether the bound of another effect is another without this one.
+bool HidesOthers(Effect effect) {
+  return EffectSet{Effect::kDefocus, Effect::kApertureShape, Effect::kFalloff, Effect::kPixelBox,
+                   Effect::kLensFloor}
+      .Has(effect);
+}
+
+}  // namespace
+
+bool EffectTolerance::IsValid(std::string* why) const {
+  const std::array<std::pair<const char*, double>, 2> limits = {
+      {{"grey_levels", grey_levels}, {"px", px.value_or(1)}}};
+  for (const auto& [unit, limit] : limits) {
+    if (limit > 0 && std::isfinite(limit)) continue;
+    if (why != nullptr) {
+      *why = fmt::format("tolerance in {} is {}: it must be finite and > 0", unit, limit);
+    }
+    return false;
+  }
+  return true;
+}
+
+EffectTolerance EffectToleranceFromText(const std::string& text) {
+  const auto fail = [&text] {
+    return Error(fmt::format(
+        "tolerance \"{}\": a number > 0 with its unit is expected, such as 0.5gl or 0.1px", text));
+  };
+  std::size_t end = 0;
+  double number = 0;
+  try {
+    number = std::stod(text, &end);
+  } catch (const std::exception&) {
+    throw fail();
+  }
+  EffectTolerance tolerance;
+  const std::string unit = text.substr(end);
+  if (unit == "gl") {
+    tolerance.grey_levels = number;
+  } else if (unit == "px") {
+    tolerance.px = number;
+  } else {
+    throw fail();
+  }
+  if (!tolerance.IsValid(nullptr)) throw fail();
+  return tolerance;
+}
+
+EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
+                        const EffectSet& effects, const EffectTolerance& tolerance) {
+  std::string why;
+  if (!tolerance.IsValid(&why)) throw Error("effects: " + why);
+  CheckEffects(conditions, places);
+  const EffectOptics optics(conditions);
+  Spent spent(tolerance);
+  EffectSet chosen = effects;
+  std::vector<EffectFinding> findings = FindImpacts(conditions, places, chosen);
+  while (!findings.empty()) {
+    auto least = findings.end();
+    for (auto finding = findings.begin(); finding != findings.end(); ++finding) {
+      if (!spent.Allows(*finding)) continue;
+      if (least == findings.end() || MattersMore(least->impact, finding->impact)) least = finding;
+    }
+    if (least == findings.end()) break;
+    const Effect left_out = least->effect;
+    spent.Add(*least);
+    chosen.Remove(left_out);
+    findings.erase(least);
+    if (!HidesOthers(left_out)) continue;
+    for (EffectFinding& finding : findings) {
+      finding =
+          FindImpact(finding.effect, optics, places, chosen.Without({finding.effect}));
+    }
+  }
+  return chosen;
+}
+
+EffectChoice EffectChoiceFromText(const std::string& effects, const std::string& without,
+                                  const std::string& tolerance) {
+  EffectChoice choice;
+  if (effects == "all") {
+    choice.base = EffectChoice::Base::kAll;
+  } else if (effects != "auto") {
+    choice.base = EffectChoice::Base::kGiven;
+    if (effects != "none") choice.given = EffectSetFromNames(effects);
+  }
+  choice.without = EffectSetFromNames(without);
+  if (!tolerance.empty()) choice.tolerance = EffectToleranceFromText(tolerance);
+  return choice;
+}
+
+EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions& conditions,
+                             const std::vector<EffectPlace>& places, const EffectSet& of_model) {
+  const EffectSet foreign = choice.given.With(choice.without).Without(of_model);
+  if (!foreign.empty()) {
+    throw Error(fmt::format("effect {} is not one of this picture's: it has {}",
+                            JoinedNames(foreign), JoinedNames(of_model)));
+  }
+  EffectDecision decision;
+  decision.findings = FindImpacts(conditions, places, of_model);
+  switch (choice.base) {
+    case EffectChoice::Base::kAll:
+      decision.on = of_model.Without(choice.without);
+      break;
+    case EffectChoice::Base::kGiven:
+      decision.on = choice.given.Without(choice.without);
+      break;
+    case EffectChoice::Base::kAuto:
+      decision.on = ChooseEffects(conditions, places,
+                                  of_model.Without(choice.without).Without(choice.kept),
+                                  choice.tolerance)
+                        .With(choice.kept.Without(choice.without));
+      break;
+  }
+  return decision;
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,113 @@
+#ifndef THICKLENS_MODEL_SRC_SCENE_GEOMETRY_H_
+#define THICKLENS_MODEL_SRC_SCENE_GEOMETRY_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "scene_texture.h"
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::model {
+
+// For messages.
+std::string LayerPlace(std::size_t index, const SceneLayer& layer);
+
+// A ray in front of the lens: where it crosses the aperture, and its slope.
+struct SceneRay {
+  Eigen::Vector2d aperture_mm;
+  Eigen::Vector2d slope;  // mm to the right and down per mm of depth
+
+  Eigen::Vector2d PositionMm(double depth_mm) const { return aperture_mm + depth_mm * slope; }
+};
+
+// z of the ray with z = z0 + g . (A + slope z), derived here: (z0 + g . A)/(1 - g . slope). A plane
+// that has passed CheckPlane is met by every ray.
+inline double HitDepthMm(const PlaneOptions& plane, const SceneRay& ray) {
+  return (plane.depth_mm + plane.slope.dot(ray.aperture_mm)) / (1 - plane.slope.dot(ray.slope));
+}
+
+// What a ray meets.
+struct SceneHit {
+  std::size_t layer = 0;
+  double depth_mm = std::numeric_limits<double>::infinity();
+  Eigen::Vector2d position_mm{0, 0};
+};
+
+// An upright rectangle of the picture, px.
+struct PictureRegion {
+  Eigen::Vector2d low_px, high_px;
+
+  PictureRegion Widened(double margin_px) const {
+    return {low_px.array() - margin_px, high_px.array() + margin_px};
+  }
+  std::array<Eigen::Vector2d, 4> Corners() const {
+    return {{low_px, {high_px.x(), low_px.y()}, {low_px.x(), high_px.y()}, high_px}};
+  }
+};
+
+// Where the rays of a picture run and what they meet: geometry alone, no light.
+class SceneGeometry {
+ public:
+  explicit SceneGeometry(const SceneSimulationOptions& options);
+
+  const Sensor& sensor() const { return sensor_; }
+  const std::vector<SceneLayer>& layers() const { return layers_; }
+  double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
+  double floor_px() const { return floor_px_; }
+
+  // x of a picture position, px; A on the aperture, mm. The slope (x - cx) p/K of the chief ray
+  // less A/zf: all rays of a position meet in the plane of focus.
+  SceneRay RayAt(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm) const {
+    return {aperture_mm,
+            (position_px - sensor_.principal_point_px) / scale_px_ - aperture_mm / focus_depth_mm_};
+  }
+  // Where the picture shows what a point's chief ray meets.
+  Eigen::Vector2d ChiefPositionPx(const Eigen::Vector2d& point_mm, double depth_mm) const {
+    return sensor_.principal_point_px + scale_px_ / depth_mm * point_mm;
+  }
+  // Sigma of the defocus of a depth, px.
+  double DefocusPx(double depth_mm) const;
+
+  bool IsInside(const OutlineOptions& outline, const Eigen::Vector2d& point_mm,
+                double depth_mm) const;
+  // The nearest of all layers along the ray.
+  SceneHit Trace(const SceneRay& ray) const;
+  // The nearest of some.
+  SceneHit Trace(const SceneRay& ray, const std::vector<std::size_t>& layers) const;
+
+  // Of what chief rays through the region meet of the layer: whether its outline holds all of it,
+  // and whether it may hold any of it (false only if it does not).
+  bool Covers(const SceneLayer& layer, const PictureRegion& region) const;
+  bool MayTouch(const SceneLayer& layer, const PictureRegion& region) const;
+
+  // Throws unless every ray meets the plane beyond the front focal point.
+  void CheckPlane(const std::string& place, const PlaneOptions& plane) const;
+  TextureRequest RequestFor(const SceneLayer& layer) const;
+
+ private:
+  using BoxMm = std::pair<Eigen::Vector2d, Eigen::Vector2d>;
+
+  void Consider(const SceneRay& ray, std::size_t layer, SceneHit* nearest) const;
+  PictureRegion WholePicture() const;
+  std::vector<SceneRay> OutermostRays(double deviations) const;
+  double CoarsestPixelMm(const PlaneOptions& plane) const;
+  std::optional<BoxMm> BoxOf(const PlaneOptions& plane, const PictureRegion& region) const;
+  std::optional<BoxMm> OutlineBox(const SceneLayer& layer) const;
+
+  std::vector<SceneLayer> layers_;
+  Sensor sensor_;
+  double focal_mm_ = 0;
+  double scale_px_ = 0;  // K/p
+  double focus_depth_mm_ = 0;
+  double aperture_sigma_mm_ = 0;
+  double floor_px_ = 0;
+};
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SRC_SCENE_GEOMETRY_H_

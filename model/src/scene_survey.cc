@@ -1,0 +1,310 @@
+#include "scene_survey.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ray_irradiance.h"
+
+namespace thicklens::model {
+namespace {
+
+// Of the aperture: no ray of a photograph goes farther from its middle, in standard deviations; and
+// what that is widened by for depths that change along the way.
+constexpr double kReachDeviations = 5;
+constexpr double kReachMargin = 1.1;
+// Blocks around the picture that are looked at, too: blur brings in what lies beside it.
+constexpr int kMostMargin = 16;
+// Samples of a pixel on each axis, and what they can miss of the steepest slope and the sharpest
+// bend between them.
+constexpr int kSamples = 2;
+constexpr float kMissedSlope = 1.35F;
+constexpr float kMissedBend = 1.5F;
+
+constexpr int kBlockSamples = SceneSurvey::kBlockPx * kSamples;
+
+// Of one layer in one block.
+struct Detail {
+  Eigen::Array4f dark = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
+  Eigen::Array4f bright = -dark;
+  Eigen::Array4f slope = Eigen::Array4f::Zero();
+  Eigen::Array4f bend = Eigen::Array4f::Zero();
+
+  void Add(const Detail& other) {
+    dark = dark.min(other.dark);
+    bright = bright.max(other.bright);
+    slope = slope.max(other.slope);
+    bend = bend.max(other.bend);
+  }
+};
+
+// The blocks of the picture and of a margin around it.
+struct BlockGrid {
+  int columns = 0, rows = 0, margin = 0;
+
+  PictureRegion RegionOf(int column, int row) const {
+    constexpr int kPx = SceneSurvey::kBlockPx;
+    const Eigen::Vector2d low(column * kPx - 0.5, row * kPx - 0.5);
+    return {low, low.array() + kPx};
+  }
+  std::size_t count() const {
+    return static_cast<std::size_t>(columns + 2 * margin) *
+           static_cast<std::size_t>(rows + 2 * margin);
+  }
+  std::size_t IndexOf(int column, int row) const {
+    return static_cast<std::size_t>(row + margin) * static_cast<std::size_t>(columns + 2 * margin) +
+           static_cast<std::size_t>(column + margin);
+  }
+};
+
+// What the layer, its outline left out, shows to chief rays in each block.
+class LayerDetail {
+ public:
+  LayerDetail(const SceneGeometry& geometry, const SceneTexture& texture, std::size_t layer,
+              const BlockGrid& grid)
+      : geometry_(geometry), texture_(texture), layer_(layer), grid_(grid), details_(grid.count()) {
+    const int samples = kBlockSamples * (grid.columns + 2 * grid.margin) + 2;
+    for (int row = -grid.margin; row < grid.rows + grid.margin; ++row) LookAtRow(row, samples);
+  }
+
+  // Of all blocks within a distance of one.
+  Detail Around(int column, int row, double distance_px) const {
+    const int reach = static_cast<int>(std::ceil(distance_px / SceneSurvey::kBlockPx));
+    Detail found;
+    for (int j = std::max(row - reach, -grid_.margin);
+         j <= std::min(row + reach, grid_.rows + grid_.margin - 1); ++j) {
+      for (int i = std::max(column - reach, -grid_.margin);
+           i <= std::min(column + reach, grid_.columns + grid_.margin - 1); ++i) {
+        found.Add(details_[grid_.IndexOf(i, j)]);
+      }
+    }
+    return found;
+  }
+
+ private:
+  // A sample for each of a row, from one before the first block on. Where nothing is met: NaN.
+  void Sample(int sample_row, std::vector<Eigen::Array4f>* lights) const {
+    const double y_px = (sample_row + 0.5) / kSamples - 0.5;
+    const int first = -kBlockSamples * grid_.margin - 1;
+    for (std::size_t i = 0; i < lights->size(); ++i) {
+      const double x_px = (first + static_cast<int>(i) + 0.5) / kSamples - 0.5;
+      const SceneRay ray = geometry_.RayAt({x_px, y_px}, {0, 0});
+      const PlaneOptions& plane = geometry_.layers()[layer_].plane;
+      if (!(plane.slope.dot(ray.slope) < 1)) {
+        (*lights)[i].setConstant(std::numeric_limits<float>::quiet_NaN());
+        continue;
+      }
+      (*lights)[i] = LayerLight(geometry_, texture_, layer_, ray,
+                                ray.PositionMm(HitDepthMm(plane, ray)));
+    }
+  }
+
+  void LookAtRow(int row, int samples) {
+    std::vector<Eigen::Array4f> above(static_cast<std::size_t>(samples)), here = above,
+                                                                          below = above;
+    Sample(row * kBlockSamples - 1, &above);
+    Sample(row * kBlockSamples, &here);
+    for (int k = 0; k < kBlockSamples; ++k) {
+      Sample(row * kBlockSamples + k + 1, &below);
+      for (std::size_t i = 1; i + 1 < here.size(); ++i) {
+        const int column = static_cast<int>(i - 1) / kBlockSamples - grid_.margin;
+        const Eigen::Array4f right = here[i + 1] - here[i], left = here[i] - here[i - 1];
+        const Eigen::Array4f down = below[i] - here[i], up = here[i] - above[i];
+        Detail detail;
+        if (!here[i].isFinite().all()) continue;
+        detail.dark = detail.bright = here[i];
+        if ((right + left + down + up).isFinite().all()) {
+          detail.slope = kMissedSlope * kSamples * (right.square() + down.square()).sqrt();
+          detail.bend =
+              kMissedBend * kSamples * kSamples * ((right - left).abs() + (down - up).abs());
+        }
+        details_[grid_.IndexOf(column, row)].Add(detail);
+      }
+      above.swap(here);
+      here.swap(below);
+    }
+  }
+
+  const SceneGeometry& geometry_;
+  const SceneTexture& texture_;
+  const std::size_t layer_;
+  const BlockGrid& grid_;
+  std::vector<Detail> details_;
+};
+
+// How far from a region the chief positions of what its rays meet on a plane may lie, px.
+double ReachPx(const SceneGeometry& geometry, const PlaneOptions& plane,
+               const PictureRegion& region, double landing_px) {
+  double sigma_px = 0;
+  for (const Eigen::Vector2d& corner_px : region.Corners()) {
+    const SceneRay ray = geometry.RayAt(corner_px, {0, 0});
+    if (plane.slope.dot(ray.slope) < 1) {
+      sigma_px = std::max(sigma_px, geometry.DefocusPx(HitDepthMm(plane, ray)));
+    }
+  }
+  return landing_px + kReachMargin * kReachDeviations * sigma_px;
+}
+
+// The most and the least 1/z of the plane over the region; linear there.
+std::pair<double, double> InverseDepths(const SceneGeometry& geometry, const PlaneOptions& plane,
+                                        const PictureRegion& region) {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  for (const Eigen::Vector2d& corner_px : region.Corners()) {
+    const double inverse =
+        (1 - plane.slope.dot(geometry.RayAt(corner_px, {0, 0}).slope)) / plane.depth_mm;
+    least = std::min(least, inverse);
+    most = std::max(most, inverse);
+  }
+  return {least, most};
+}
+
+// The layers that rays through the region can meet: not those that lie behind one that fills it.
+std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
+                                   double landing_px) {
+  struct Candidate {
+    std::size_t layer;
+    double least, most;  // 1/z
+    bool covers;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < geometry.layers().size(); ++i) {
+    const SceneLayer& layer = geometry.layers()[i];
+    const PictureRegion reached =
+        region.Widened(ReachPx(geometry, layer.plane, region, landing_px));
+    if (!geometry.MayTouch(layer, reached)) continue;
+    const auto [least, most] = InverseDepths(geometry, layer.plane, reached);
+    candidates.push_back({i, least, most, geometry.Covers(layer, reached)});
+  }
+  double nearest_cover = -std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : candidates) {
+    if (candidate.covers) nearest_cover = std::max(nearest_cover, candidate.least);
+  }
+  std::vector<std::size_t> met;
+  for (const Candidate& candidate : candidates) {
+    if (candidate.most >= nearest_cover) met.push_back(candidate.layer);
+  }
+  return met;
+}
+
+// The block's pixel that is farthest from the axis.
+Eigen::Vector2d FarthestPx(const SceneBlock& block, const Eigen::Vector2d& axis_px) {
+  const Eigen::Vector2d low_px(block.x0, block.y0), high_px(block.x1 - 1, block.y1 - 1);
+  return ((axis_px - low_px).array().abs() > (high_px - axis_px).array().abs())
+      .select(low_px, high_px);
+}
+
+// Of the fall-off at a position: that of the chief ray, and a little for the others.
+double LeastIrradiance(const Camera& camera, const Eigen::Vector2d& position_px) {
+  constexpr double kOfOthers = 0.98;
+  const Eigen::Vector2d from_axis_px = position_px - camera.sensor.principal_point_px;
+  return kOfOthers * RayIrradiance(from_axis_px / camera.focal_scale_px(),
+                                   camera.sensor.pixel_pitch_mm * from_axis_px, {0, 0},
+                                   camera.image_distance_mm());
+}
+
+// Gloss moves against its layer from ray to ray: wherever it may be seen, all of it is counted.
+double GlossStrength(const SceneLayer& layer) {
+  double strength = 0;
+  for (const GlossOptions& gloss : layer.gloss) strength += gloss.strength;
+  return strength;
+}
+
+}  // namespace
+
+Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& texture,
+                          std::size_t layer, const SceneRay& ray,
+                          const Eigen::Vector2d& position_mm) {
+  Eigen::Array4f light = texture.At(position_mm.x(), position_mm.y());
+  for (const GlossOptions& gloss : geometry.layers()[layer].gloss) {
+    const Eigen::Vector2d from_centre_px =
+        geometry.ChiefPositionPx(ray.PositionMm(gloss.depth_mm), gloss.depth_mm) - gloss.centre_px;
+    light += static_cast<float>(
+        gloss.strength *
+        std::exp(-from_centre_px.squaredNorm() / (2 * gloss.sigma_px * gloss.sigma_px)));
+  }
+  return light;
+}
+
+SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
+                         const std::vector<SceneTexture>& textures, double landing_px) {
+  const Sensor& sensor = geometry.sensor();
+  columns_ = (sensor.width_px + kBlockPx - 1) / kBlockPx;
+  rows_ = (sensor.height_px + kBlockPx - 1) / kBlockPx;
+  BlockGrid grid{columns_, rows_, 0};
+  std::vector<double> reaches;  // block by block, of each of its layers
+  for (int row = 0; row < rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      SceneBlock block;
+      block.x0 = column * kBlockPx;
+      block.y0 = row * kBlockPx;
+      block.x1 = std::min(block.x0 + kBlockPx, sensor.width_px);
+      block.y1 = std::min(block.y0 + kBlockPx, sensor.height_px);
+      const PictureRegion region = grid.RegionOf(column, row);
+      block.layers = MetLayers(geometry, region, landing_px);
+      for (const std::size_t layer : block.layers) {
+        reaches.push_back(ReachPx(geometry, geometry.layers()[layer].plane, region, landing_px));
+      }
+      blocks_.push_back(std::move(block));
+    }
+  }
+  if (!reaches.empty()) {
+    const double farthest_px = *std::max_element(reaches.begin(), reaches.end());
+    grid.margin =
+        static_cast<int>(std::min<double>(std::ceil(farthest_px / kBlockPx), kMostMargin));
+  }
+  std::vector<LayerDetail> details;
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    details.emplace_back(geometry, textures[i], i, grid);
+  }
+
+  auto reach = reaches.begin();
+  for (int row = 0; row < rows_; ++row) {
+    for (int column = 0; column < columns_; ++column) {
+      SceneBlock& block = blocks_[static_cast<std::size_t>(row * columns_ + column)];
+      const Eigen::Vector2d middle_px =
+          (Eigen::Vector2d(block.x0, block.y0) + Eigen::Vector2d(block.x1 - 1, block.y1 - 1)) / 2;
+      const SceneRay chief = geometry.RayAt(middle_px, {0, 0});
+      Detail seen;
+      double gloss = 0, most_blurred_mm = 0;
+      for (const std::size_t i : block.layers) {
+        const SceneLayer& layer = geometry.layers()[i];
+        seen.Add(details[i].Around(column, row, *reach++));
+        gloss += GlossStrength(layer);
+        const double depth_mm = HitDepthMm(layer.plane, chief);
+        const double sigma_px = geometry.DefocusPx(depth_mm);
+        if (most_blurred_mm == 0 || sigma_px > block.sigma_px) most_blurred_mm = depth_mm;
+        block.sigma_px = std::max(block.sigma_px, sigma_px);
+      }
+      EffectPlace place;
+      place.position_px = FarthestPx(block, sensor.principal_point_px);
+      place.depth_mm = most_blurred_mm;
+      // Fall-off makes light darker than radiance, never brighter.
+      const double darkening = LeastIrradiance(camera, place.position_px);
+      double farthest = 0;
+      for (const std::size_t i : block.layers) {
+        const double depth_mm = HitDepthMm(geometry.layers()[i].plane, chief);
+        const double away = std::abs(1 / depth_mm - 1 / most_blurred_mm);
+        if (block.layers.size() > 1 && away >= farthest) place.other_depth_mm = depth_mm;
+        farthest = std::max(farthest, away);
+      }
+      for (int c = 0; c < 3; ++c) {
+        place.dark = darkening * static_cast<double>(seen.dark(c));
+        place.bright = static_cast<double>(seen.bright(c)) + gloss;
+        place.slope = static_cast<double>(seen.slope(c));
+        place.bend = static_cast<double>(seen.bend(c));
+        place.jump = block.layers.size() > 1 ? place.bright - place.dark : 0;
+        block.places[static_cast<std::size_t>(c)] = place;
+      }
+    }
+  }
+}
+
+std::vector<EffectPlace> SceneSurvey::Places() const {
+  std::vector<EffectPlace> places;
+  for (const SceneBlock& block : blocks_) {
+    places.insert(places.end(), block.places.begin(), block.places.end());
+  }
+  return places;
+}
+
+}  // namespace thicklens::model

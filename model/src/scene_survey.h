@@ -1,0 +1,55 @@
+#ifndef THICKLENS_MODEL_SRC_SCENE_SURVEY_H_
+#define THICKLENS_MODEL_SRC_SCENE_SURVEY_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "scene_geometry.h"
+#include "scene_texture.h"
+#include "thicklens/model/effect_impact.h"
+
+namespace thicklens::model {
+
+// Radiance of a ray that meets a layer: its texture and the gloss on it; R, G, B and a number that
+// means nothing.
+Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& texture,
+                          std::size_t layer, const SceneRay& ray,
+                          const Eigen::Vector2d& position_mm);
+
+// A block of a picture's pixels, [x0, x1) x [y0, y1).
+struct SceneBlock {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  std::vector<std::size_t> layers;  // all that its rays can meet
+  double sigma_px = 0;              // the largest defocus of these
+  // What is photographed there, of each channel.
+  std::array<EffectPlace, 3> places;
+};
+
+// What a scene holds where, found before any picture is taken: by one ray for each quarter of a
+// pixel, through the middle of the aperture.
+class SceneSurvey {
+ public:
+  static constexpr int kBlockPx = 8;
+
+  // `landing_px`: how far from its pixel's centre a ray may land.
+  SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
+              const std::vector<SceneTexture>& textures, double landing_px);
+
+  int columns() const { return columns_; }
+  int rows() const { return rows_; }
+  const SceneBlock& block(int column, int row) const {
+    return blocks_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                   static_cast<std::size_t>(column)];
+  }
+  std::vector<EffectPlace> Places() const;
+
+ private:
+  int columns_ = 0, rows_ = 0;
+  std::vector<SceneBlock> blocks_;
+};
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SRC_SCENE_SURVEY_H_

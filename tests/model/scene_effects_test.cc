@@ -1,0 +1,190 @@
+// Effects of simulated pictures: what is left out matters no more than its bound says.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::model {
+namespace {
+
+// A camera and a scene of one to three layers, whatever the draws make of them.
+SceneSimulationOptions RandomScene(unsigned seed) {
+  std::mt19937 engine(seed);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(engine);
+  };
+  const auto pick = [&](int count) { return std::uniform_int_distribution<int>(0, count - 1)(engine); };
+  SceneSimulationOptions options;
+  Camera& camera = options.camera;
+  camera.name = "random";
+  const double focal_mm = std::exp(uniform(std::log(4), std::log(80)));
+  camera.lens = {focal_mm, focal_mm * uniform(0.95, 1.05), focal_mm * uniform(-0.1, 0.2),
+                 focal_mm / (2 * std::exp(uniform(std::log(1.4), std::log(22))))};
+  camera.sensor.width_px = 12;
+  camera.sensor.height_px = 10;
+  camera.sensor.pixel_pitch_mm = std::exp(uniform(std::log(0.0015), std::log(0.02)));
+  // The crop of a sensor of any size.
+  camera.sensor.principal_point_px = {uniform(-1500, 1500), uniform(-1000, 1000)};
+  camera.sensor.transfer = pick(3) == 0 ? TransferCurve::Linear() : TransferCurve::Srgb();
+  camera.psf = pick(2) == 0 ? Psf::kGaussian : Psf::kDisc;
+  const double focus_mm = focal_mm * std::exp(uniform(std::log(3), std::log(300)));
+  const double ratio = uniform(0.3, 0.5);
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(camera.lens, focus_mm), 0};
+  camera.calibration->blur_ratio = Estimate{ratio, 0};
+  camera.calibration->blur_floor_px = Estimate{pick(3) == 0 ? 0 : uniform(0.02, 0.8), 0};
+  const double shift_px =
+      ratio * camera.lens.aperture_radius_mm * camera.focal_scale_px();  // per 1/mm
+  const int layers = 1 + pick(3);
+  for (int i = 0; i < layers; ++i) {
+    SceneLayer layer;
+    // Blurred by up to 4 px, often by much less.
+    const double sigma_px = uniform(-1, 1) * std::pow(10, uniform(-3, 0.6));
+    const double inverse = 1 / focus_mm + sigma_px / shift_px;
+    layer.plane.depth_mm = inverse > 0.1 / focus_mm ? std::max(1 / inverse, 1.2 * focal_mm)
+                                                    : focus_mm * uniform(1, 5);
+    const TextureKind kinds[] = {TextureKind::kUniform, TextureKind::kSine, TextureKind::kNoise,
+                                 TextureKind::kDeadLeaves, TextureKind::kCheckerboard};
+    layer.texture.kind = kinds[pick(5)];
+    // Where a slant is stretched toward its horizon, a sine may have no period to show; every ray
+    // must meet the plane.
+    if (pick(3) == 0 && layer.texture.kind != TextureKind::kSine) {
+      const double steepest = std::min(0.5, 0.2 * camera.focal_scale_px() / 1800);
+      layer.plane.slope = {uniform(-steepest, steepest), uniform(-steepest, steepest)};
+    }
+    layer.texture.colour = {uniform(0.05, 0.5), uniform(0.05, 0.5), uniform(0.05, 0.5)};
+    layer.texture.contrast = uniform(0.05, 1);
+    layer.texture.feature_size_px = uniform(6, 20);
+    if (i > 0) {
+      layer.outline.shape =
+          pick(2) == 0 ? OutlineOptions::Shape::kRectangle : OutlineOptions::Shape::kDisc;
+      layer.outline.centre = {uniform(0, 12), uniform(0, 10)};
+      layer.outline.size = {uniform(2, 12), uniform(2, 12)};
+      layer.outline.radius = uniform(1, 6);
+    }
+    options.layers.push_back(layer);
+  }
+  // Where there are edges, a ray more or less on one side of them must not count.
+  options.rays_per_pixel = layers > 1 ? 3000 : 400;
+  options.seed = seed;
+  return options;
+}
+
+double Stored(float light, const TransferCurve& transfer) {
+  return 255 * transfer.Encode(std::clamp(static_cast<double>(light), 0.0, 1.0));
+}
+
+double LargestChange(const LinearPicture& a, const LinearPicture& b, const SceneSimulator& of_a,
+                     const SceneSimulator& of_b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) {
+    largest =
+        std::max(largest, std::abs(Stored(a.values[i], of_a.camera().sensor.transfer) -
+                                   Stored(b.values[i], of_b.camera().sensor.transfer)));
+  }
+  return largest;
+}
+
+const SceneRun kRun{1, {}};
+// What that many rays leave open, grey levels.
+constexpr double kSampling = 0.15;
+
+void BoundsHold(unsigned first_seed, int scenes) {
+  std::vector<double> looseness;
+  std::map<std::string, std::vector<double>> by_effect;
+  int left_out = 0, kept = 0;
+  for (unsigned seed = first_seed; seed < first_seed + static_cast<unsigned>(scenes); ++seed) {
+    SceneSimulationOptions options = RandomScene(seed);
+    SCOPED_TRACE(seed);
+    options.effects.base = EffectChoice::Base::kAll;
+    const SceneSimulator all(options, {});
+    const LinearPicture with_all = all.RenderNoiseless(kRun);
+
+    SceneSimulationOptions some = options;
+    some.effects.base = EffectChoice::Base::kAuto;
+    const SceneSimulator automatic(some, {});
+    EXPECT_LE(LargestChange(with_all, automatic.RenderNoiseless(kRun), all, automatic),
+              0.5 + kSampling)
+        << "left out: " << JoinedNames(PictureEffects().Without(automatic.effects().on));
+
+    for (const EffectFinding& finding : all.effects().findings) {
+      const EffectFacts& facts = FactsOf(finding.effect);
+      if (facts.random) continue;
+      (automatic.effects().on.Has(finding.effect) ? kept : left_out) += 1;
+      SceneSimulationOptions without = options;
+      without.effects.without = {finding.effect};
+      const SceneSimulator fewer(without, {});
+      const double actual = LargestChange(with_all, fewer.RenderNoiseless(kRun), all, fewer);
+      EXPECT_LE(actual, finding.impact.grey_levels + kSampling) << facts.name;
+      if (actual < kSampling) continue;
+      looseness.push_back(finding.impact.grey_levels / actual);
+      by_effect[facts.name].push_back(looseness.back());
+    }
+  }
+  const auto median = [](std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                     values.end());
+    return values[values.size() / 2];
+  };
+  for (const auto& [name, values] : by_effect) {
+    std::printf("%-16s bound over impact: median %.2f of %zu\n", name.c_str(), median(values),
+                values.size());
+  }
+  std::printf("all: median %.2f; %d left out, %d kept\n", median(looseness), left_out, kept);
+  EXPECT_LT(median(looseness), 5);
+  EXPECT_GT(left_out, scenes);
+  EXPECT_GT(kept, scenes);
+}
+
+TEST(SceneEffectsTest, BoundsHoldAndAreTight) { BoundsHold(1, 25); }
+
+// Five hundred scenes in four parts.
+class SceneEffectsSlowTest : public ::testing::TestWithParam<unsigned> {};
+TEST_P(SceneEffectsSlowTest, BoundsHoldOverManyScenes) { BoundsHold(1000 * GetParam(), 125); }
+INSTANTIATE_TEST_SUITE_P(Quarters, SceneEffectsSlowTest, ::testing::Values(1, 2, 3, 4));
+
+// What is left out takes its part of the work with it, and what is stored follows.
+TEST(SceneEffectsTest, EffectsCanBeLeftOutOneByOne) {
+  SceneSimulationOptions options = RandomScene(3);
+  options.bits = 8;
+  options.full_well_electrons = 5000;
+  options.read_noise_electrons = 4;
+  options.camera.sensor.transfer = TransferCurve::Srgb();
+  options.effects.base = EffectChoice::Base::kGiven;  // a pinhole, sampled at points, in linear light
+  const SceneSimulator bare(options, {});
+  const LinearPicture picture = bare.RenderNoiseless(kRun);
+  const StoredPicture stored = bare.Store(picture);
+  EXPECT_EQ(stored.bits, 16);
+  EXPECT_EQ(bare.camera().sensor.transfer.Name(), "linear");
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    EXPECT_NEAR(stored.values[i], 65535 * std::min(picture.values[i], 1.0F), 0.51);
+  }
+  EXPECT_EQ(bare.Truth(bare.RenderDepth()).effects.size(), 0U);
+  EXPECT_EQ(bare.Truth(bare.RenderDepth()).left_out.size(), 12U);
+
+  options.effects.base = EffectChoice::Base::kAll;
+  options.effects.without = {Effect::kReadNoise, Effect::kQuantisation, Effect::kTransferCurve};
+  const SceneSimulator shot(options, {});
+  const LinearPicture flat{100, 100, 3, std::vector<float>(30000, 0.25F)};
+  double sum = 0, squares = 0;
+  for (const std::uint16_t value : shot.Store(flat).values) {
+    const double electrons = value / 65535.0 * 5000;
+    sum += electrons;
+    squares += electrons * electrons;
+  }
+  const double mean = sum / 30000;
+  EXPECT_NEAR(mean, 1250, 4.5 * std::sqrt(1250.0 / 30000));
+  // Poisson: the variance is the mean, itself known to a relative sqrt(2/n).
+  EXPECT_NEAR((squares / 30000 - mean * mean) / 1250, 1, 4.5 * std::sqrt(2.0 / 30000));
+}
+
+}  // namespace
+}  // namespace thicklens::model

@@ -1,0 +1,32 @@
+#ifndef THICKLENS_TOOLS_EFFECT_OPTIONS_H_
+#define THICKLENS_TOOLS_EFFECT_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "thicklens/model/effect_choice.h"
+
+namespace thicklens::tools {
+
+// --effects, --without, --tolerance of commands with a forward model. What is absent was not given.
+struct EffectOptions {
+  std::optional<std::string> effects, without, tolerance;
+};
+void AddEffectOptions(CLI::App* command, EffectOptions* options);
+// Puts what was given in the place of what `choice` says. Throws UsageError.
+void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice);
+
+// "250 mm, at (0, 479)".
+std::string EffectPlaceText(const model::EffectPlace& place);
+// One entry an effect: name, impact with its unit, bound in grey levels, on, where.
+nlohmann::json EffectsJson(const model::EffectDecision& decision);
+// One line on what was on and what was left out.
+std::string EffectsText(const model::EffectDecision& decision);
+// A line an effect.
+std::string EffectsTable(const model::EffectDecision& decision);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_EFFECT_OPTIONS_H_
