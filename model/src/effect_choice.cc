@@ -115,8 +115,7 @@ EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<Ef
     findings.erase(least);
     if (!HidesOthers(left_out)) continue;
     for (EffectFinding& finding : findings) {
-      finding =
-          FindImpact(finding.effect, optics, places, chosen.Without({finding.effect}));
+      finding = FindImpact(finding.effect, optics, places, chosen.Without({finding.effect}));
     }
   }
   return chosen;
@@ -153,10 +152,10 @@ EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions&
       decision.on = choice.given.Without(choice.without);
       break;
     case EffectChoice::Base::kAuto:
-      decision.on = ChooseEffects(conditions, places,
-                                  of_model.Without(choice.without).Without(choice.kept),
-                                  choice.tolerance)
-                        .With(choice.kept.Without(choice.without));
+      decision.on =
+          ChooseEffects(conditions, places, of_model.Without(choice.without).Without(choice.kept),
+                        choice.tolerance)
+              .With(choice.kept.Without(choice.without));
       break;
   }
   return decision;

@@ -45,8 +45,7 @@ bool SceneGeometry::IsInside(const OutlineOptions& outline, const Eigen::Vector2
   using Shape = OutlineOptions::Shape;
   if (outline.shape == Shape::kWhole) return true;
   const Eigen::Vector2d from_centre =
-      (outline.unit == OutlineOptions::Unit::kPx ? ChiefPositionPx(point_mm, depth_mm)
-                                                 : point_mm) -
+      (outline.unit == OutlineOptions::Unit::kPx ? ChiefPositionPx(point_mm, depth_mm) : point_mm) -
       outline.centre;
   if (outline.shape == Shape::kDisc)
     return from_centre.squaredNorm() <= outline.radius * outline.radius;

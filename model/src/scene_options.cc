@@ -131,9 +131,9 @@ std::string TextureKindName(TextureKind kind) {
 }
 
 EffectSet PictureEffects() {
-  return {Effect::kThickness, Effect::kDefocus,     Effect::kApertureShape, Effect::kFalloff,
-          Effect::kOcclusion, Effect::kPixelBox,    Effect::kLensFloor,     Effect::kDiffraction,
-          Effect::kShotNoise, Effect::kReadNoise,   Effect::kQuantisation,  Effect::kTransferCurve};
+  return {Effect::kThickness, Effect::kDefocus,   Effect::kApertureShape, Effect::kFalloff,
+          Effect::kOcclusion, Effect::kPixelBox,  Effect::kLensFloor,     Effect::kDiffraction,
+          Effect::kShotNoise, Effect::kReadNoise, Effect::kQuantisation,  Effect::kTransferCurve};
 }
 
 bool SceneSimulationOptions::IsValid(std::string* why) const {

@@ -94,8 +94,8 @@ class LayerDetail {
         (*lights)[i].setConstant(std::numeric_limits<float>::quiet_NaN());
         continue;
       }
-      (*lights)[i] = LayerLight(geometry_, texture_, layer_, ray,
-                                ray.PositionMm(HitDepthMm(plane, ray)));
+      (*lights)[i] =
+          LayerLight(geometry_, texture_, layer_, ray, ray.PositionMm(HitDepthMm(plane, ray)));
     }
   }
 
@@ -218,9 +218,8 @@ Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& tex
   for (const GlossOptions& gloss : geometry.layers()[layer].gloss) {
     const Eigen::Vector2d from_centre_px =
         geometry.ChiefPositionPx(ray.PositionMm(gloss.depth_mm), gloss.depth_mm) - gloss.centre_px;
-    light += static_cast<float>(
-        gloss.strength *
-        std::exp(-from_centre_px.squaredNorm() / (2 * gloss.sigma_px * gloss.sigma_px)));
+    light += static_cast<float>(gloss.strength * std::exp(-from_centre_px.squaredNorm() /
+                                                          (2 * gloss.sigma_px * gloss.sigma_px)));
   }
   return light;
 }

@@ -21,7 +21,9 @@ SceneSimulationOptions RandomScene(unsigned seed) {
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(engine);
   };
-  const auto pick = [&](int count) { return std::uniform_int_distribution<int>(0, count - 1)(engine); };
+  const auto pick = [&](int count) {
+    return std::uniform_int_distribution<int>(0, count - 1)(engine);
+  };
   SceneSimulationOptions options;
   Camera& camera = options.camera;
   camera.name = "random";
@@ -49,8 +51,8 @@ SceneSimulationOptions RandomScene(unsigned seed) {
     // Blurred by up to 4 px, often by much less.
     const double sigma_px = uniform(-1, 1) * std::pow(10, uniform(-3, 0.6));
     const double inverse = 1 / focus_mm + sigma_px / shift_px;
-    layer.plane.depth_mm = inverse > 0.1 / focus_mm ? std::max(1 / inverse, 1.2 * focal_mm)
-                                                    : focus_mm * uniform(1, 5);
+    layer.plane.depth_mm =
+        inverse > 0.1 / focus_mm ? std::max(1 / inverse, 1.2 * focal_mm) : focus_mm * uniform(1, 5);
     const TextureKind kinds[] = {TextureKind::kUniform, TextureKind::kSine, TextureKind::kNoise,
                                  TextureKind::kDeadLeaves, TextureKind::kCheckerboard};
     layer.texture.kind = kinds[pick(5)];
@@ -86,9 +88,8 @@ double LargestChange(const LinearPicture& a, const LinearPicture& b, const Scene
                      const SceneSimulator& of_b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) {
-    largest =
-        std::max(largest, std::abs(Stored(a.values[i], of_a.camera().sensor.transfer) -
-                                   Stored(b.values[i], of_b.camera().sensor.transfer)));
+    largest = std::max(largest, std::abs(Stored(a.values[i], of_a.camera().sensor.transfer) -
+                                         Stored(b.values[i], of_b.camera().sensor.transfer)));
   }
   return largest;
 }
@@ -130,8 +131,8 @@ void BoundsHold(unsigned first_seed, int scenes) {
     }
   }
   const auto median = [](std::vector<double> values) {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                     values.end());
+    std::nth_element(values.begin(),
+                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
     return values[values.size() / 2];
   };
   for (const auto& [name, values] : by_effect) {
@@ -158,7 +159,8 @@ TEST(SceneEffectsTest, EffectsCanBeLeftOutOneByOne) {
   options.full_well_electrons = 5000;
   options.read_noise_electrons = 4;
   options.camera.sensor.transfer = TransferCurve::Srgb();
-  options.effects.base = EffectChoice::Base::kGiven;  // a pinhole, sampled at points, in linear light
+  options.effects.base =
+      EffectChoice::Base::kGiven;  // a pinhole, sampled at points, in linear light
   const SceneSimulator bare(options, {});
   const LinearPicture picture = bare.RenderNoiseless(kRun);
   const StoredPicture stored = bare.Store(picture);

@@ -37,7 +37,9 @@ constexpr char kCamera[] =
     "  blur_floor_px: {value: 0.4, sigma: 0}\n"
     "  evidence: {method: assumed}\n";
 // Sigma of defocus, px.
-double SigmaPx(double depth_mm) { return 0.5 * 5 * 60 / 0.005 * std::abs(1 / depth_mm - 1 / 300.0); }
+double SigmaPx(double depth_mm) {
+  return 0.5 * 5 * 60 / 0.005 * std::abs(1 / depth_mm - 1 / 300.0);
+}
 
 class ExplainEffectsTest : public ::testing::Test {
  protected:
@@ -109,8 +111,8 @@ TEST_F(ExplainEffectsTest, ToleranceAndSensorDecideWhatIsOn) {
   const std::string range = std::to_string(near_mm) + ":300";
   EXPECT_TRUE(EffectsOf({"--depth-range", range, "--tolerance", "0.9px"})["defocus"]["on"]);
   EXPECT_FALSE(EffectsOf({"--depth-range", range, "--tolerance", "1.1px"})["defocus"]["on"]);
-  const nlohmann::json noisy = EffectsOf({"--depth-range", "290:310", "--full-well", "4000",
-                                          "--read-noise", "20", "--bits", "4"});
+  const nlohmann::json noisy = EffectsOf(
+      {"--depth-range", "290:310", "--full-well", "4000", "--read-noise", "20", "--bits", "4"});
   for (const char* name : {"shot-noise", "read-noise", "quantisation"}) {
     EXPECT_TRUE(noisy[name]["on"]) << name;
     EXPECT_TRUE(noisy[name]["random"]) << name;
@@ -124,10 +126,10 @@ TEST_F(ExplainEffectsTest, SaysWhatIsWrong) {
   const std::string map = DepthMap(280);
   EXPECT_EQ(Run({}).exit_code, 2);
   EXPECT_THAT(Run({}).err, HasSubstr("one of --depth-range and --depth is needed"));
-  EXPECT_EQ(Run({"--depth-range", "200:300", "--depth", map, "--depth-kind", "z", "--depth-unit",
-                 "mm"})
-                .exit_code,
-            2);
+  EXPECT_EQ(
+      Run({"--depth-range", "200:300", "--depth", map, "--depth-kind", "z", "--depth-unit", "mm"})
+          .exit_code,
+      2);
   EXPECT_EQ(Run({"--depth", map}).exit_code, 2);
   EXPECT_THAT(Run({"--depth", map, "--depth-kind", "disparity"}).err,
               HasSubstr("z or range is expected"));
@@ -135,9 +137,8 @@ TEST_F(ExplainEffectsTest, SaysWhatIsWrong) {
               HasSubstr("belong to --depth"));
   EXPECT_EQ(Run({"--depth-range", "200:300", "--tolerance", "1"}).exit_code, 2);
   model::RawDepthMap small{8, 8, std::vector<float>(64, 300), false};
-  const ProgramResult wrong_size =
-      Run({"--depth", folder_.Put("small.pfm", EncodePfm(small)), "--depth-kind", "z",
-           "--depth-unit", "mm"});
+  const ProgramResult wrong_size = Run({"--depth", folder_.Put("small.pfm", EncodePfm(small)),
+                                        "--depth-kind", "z", "--depth-unit", "mm"});
   EXPECT_EQ(wrong_size.exit_code, 1);
   EXPECT_THAT(wrong_size.err, HasSubstr("it is 8x8 px, the camera's sensor 40x32 px"));
 }

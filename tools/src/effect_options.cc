@@ -45,8 +45,8 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options) {
 
 void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice) {
   if (options.effects) {
-    const model::EffectChoice given = Parsed(
-        "--effects", [&] { return model::EffectChoiceFromText(*options.effects, "", ""); });
+    const model::EffectChoice given =
+        Parsed("--effects", [&] { return model::EffectChoiceFromText(*options.effects, "", ""); });
     choice->base = given.base;
     choice->given = given.given;
   }
@@ -104,11 +104,11 @@ std::string EffectsTable(const model::EffectDecision& decision) {
     const model::EffectFacts& facts = model::FactsOf(finding.effect);
     const std::string unit =
         facts.unit == model::EffectUnit::kGreyLevels ? "levels" : model::EffectUnitName(facts.unit);
-    text += fmt::format("{:<15} {:>22} {:>13}  {:<4} {}\n", facts.name,
-                        fmt::format("{}{:.4g} {}", facts.random ? "sd " : "",
-                                    finding.impact.amount, unit),
-                        BoundText(finding), decision.on.Has(finding.effect) ? "on" : "off",
-                        EffectPlaceText(finding.place));
+    text += fmt::format(
+        "{:<15} {:>22} {:>13}  {:<4} {}\n", facts.name,
+        fmt::format("{}{:.4g} {}", facts.random ? "sd " : "", finding.impact.amount, unit),
+        BoundText(finding), decision.on.Has(finding.effect) ? "on" : "off",
+        EffectPlaceText(finding.place));
   }
   return text;
 }

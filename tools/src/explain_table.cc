@@ -73,23 +73,15 @@ double FarthestCornerPx(const model::Sensor& sensor) {
   return centre_px.cwiseAbs().cwiseMax((last_px - centre_px).cwiseAbs()).norm();
 }
 
-// With c(z) = f1 D/(f2 z) - (D - f2)/f2 and the thin lens's d1/z - (d1 - f1)/f1, both lenses part
-// by r |a/z + b|/p px, a = d1 - f1 D/f2, b = D/f2 - d1/f1: a range of 1/z. Derived here.
-std::optional<DepthRange> ThinRange(const model::Camera& camera, double image_distance_mm) {
+// c(z) is f1 D/(f2 z) - (D - f2)/f2, of the thin lens d1/z - (d1 - f1)/f1, and both are 1 at z =
+// f1: they part by |b| (1 - f1/z), b = D/f2 - d1/f1. Derived here.
+double ThinUpToMm(const model::Camera& camera, double image_distance_mm) {
   const model::ThickLens& lens = camera.lens;
   const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;
-  const double f1_mm = lens.front_focal_length_mm, f2_mm = lens.rear_focal_length_mm;
-  const double a_mm = image_distance_mm - f1_mm * rear_distance_mm / f2_mm;
-  const double b = rear_distance_mm / f2_mm - image_distance_mm / f1_mm;
+  const double apart = std::abs(rear_distance_mm / lens.rear_focal_length_mm -
+                                image_distance_mm / lens.front_focal_length_mm);
   const double limit = kThinTolerancePx * camera.sensor.pixel_pitch_mm / lens.aperture_radius_mm;
-  if (a_mm == 0) {
-    if (!(std::abs(b) <= limit)) return std::nullopt;
-    return DepthRange{f1_mm, kInfinity};
-  }
-  const auto [low, high] = std::minmax({(-limit - b) / a_mm, (limit - b) / a_mm});  // of 1/z
-  // Nothing nearer than the front focal length has an image.
-  if (!(high > 0) || !(low < 1 / f1_mm)) return std::nullopt;
-  return DepthRange{std::max(1 / high, f1_mm), low > 0 ? 1 / low : kInfinity};
+  return apart <= limit ? kInfinity : lens.front_focal_length_mm / (1 - limit / apart);
 }
 
 // The thin lens's magnification at the same d1 is d1/z, the thick one's f1 D/(f2 z): their ratio is
@@ -104,7 +96,7 @@ ThinComparison CompareWithThin(const model::Camera& camera, double image_distanc
     comparison.focus_depth_mm = model::FocusDepthMm(thin, image_distance_mm);
   comparison.scale_ratio = model::ChiefRayMagnification(thin, image_distance_mm, 1) /
                            model::ChiefRayMagnification(lens, image_distance_mm, 1);
-  comparison.alike = ThinRange(camera, image_distance_mm);
+  comparison.alike_up_to_mm = ThinUpToMm(camera, image_distance_mm);
   comparison.corner_shift_px = (comparison.scale_ratio - 1) * FarthestCornerPx(camera.sensor);
   return comparison;
 }
@@ -160,15 +152,6 @@ std::string DepthOfFieldText(const Explanation& known) {
                     known.hyperfocal_mm, known.working_f_number);
 }
 
-std::string AlikeText(const ThinComparison& thin) {
-  if (!thin.alike) return "at no depth, at the rim of the aperture";
-  const std::string rim = ", at the rim of the aperture; the scale comes on top of that";
-  if (!std::isfinite(thin.alike->far_mm)) {
-    return fmt::format("beyond {:.5g} mm{}", thin.alike->near_mm, rim);
-  }
-  return fmt::format("from {:.5g} to {:.5g} mm{}", thin.alike->near_mm, thin.alike->far_mm, rim);
-}
-
 std::string ThinText(const Explanation& known) {
   const ThinComparison& thin = known.thin;
   if (thin.same_lens) return "thick against thin: this lens is a thin one (f1 = f2, thickness 0)\n";
@@ -180,10 +163,13 @@ std::string ThinText(const Explanation& known) {
       "  same image distance: plane of focus {}; picture scale {:+.4f} %, which is {:+.3f} px at "
       "the\n"
       "  farthest corner; its blur radius is in the last column\n"
-      "  thin stays within {} px of thick {}\n",
+      "  there, thin stays within {} px of thick up to {} mm at the rim of the aperture, without "
+      "the\n"
+      "  scale\n",
       thin.focus_depth_mm ? "at " + DepthText(*thin.focus_depth_mm) + " mm"
                           : "nowhere (the sensor is nearer than the focal length)",
-      100 * (thin.scale_ratio - 1), thin.corner_shift_px, kThinTolerancePx, AlikeText(thin));
+      100 * (thin.scale_ratio - 1), thin.corner_shift_px, kThinTolerancePx,
+      DepthText(thin.alike_up_to_mm));
 }
 
 nlohmann::json Number(double value) {
@@ -266,9 +252,7 @@ nlohmann::json ExplanationJson(const Explanation& explanation) {
         {"focus_depth_mm", Number(thin.focus_depth_mm.value_or(kInfinity))},
         {"scale_ratio", thin.scale_ratio},
         {"corner_shift_px", thin.corner_shift_px},
-        {"alike_from_mm", thin.alike ? Number(thin.alike->near_mm) : Number(kInfinity)},
-        {"alike_to_mm", thin.alike ? Number(thin.alike->far_mm) : Number(kInfinity)},
-        {"alike_at_any_depth", thin.alike.has_value()}}},
+        {"alike_up_to_mm", Number(thin.alike_up_to_mm)}}},
       {"hyperfocal_mm", explanation.hyperfocal_mm},
       {"working_f_number", explanation.working_f_number}};
   for (const DepthRow& row : explanation.rows) json["depths"].push_back(RowJson(row));

@@ -42,9 +42,10 @@ struct ThinComparison {
   std::optional<double> focus_depth_mm;  // absent: the sensor is in front of every image
   double scale_ratio = 1;                // magnification, thin over thick, at every depth
   double corner_shift_px = 0;            // what that means at the farthest corner
-  // Depths at which what passes the rim of the aperture lands within kThinTolerancePx of where it
-  // lands behind the thick lens, relative to the chief ray; absent: none. The end may be +inf.
-  std::optional<DepthRange> alike;
+  // From the front focal length up to here what passes the rim of the aperture lands within
+  // kThinTolerancePx of where it lands behind the thick lens, relative to the chief ray; may be
+  // +inf.
+  double alike_up_to_mm = 0;
 };
 constexpr double kThinTolerancePx = 0.1;
 

@@ -12,7 +12,8 @@ namespace thicklens::model {
 
 // What the effects that are left out may change, all together.
 struct EffectTolerance {
-  double grey_levels = 0.5;  // > 0; the sum of their bounds, and apart from it the sd of their noise
+  double grey_levels =
+      0.5;  // > 0; the sum of their bounds, and apart from it the sd of their noise
   // For effects that are measured in px: instead of grey levels, each on its own. > 0.
   std::optional<double> px;
 
