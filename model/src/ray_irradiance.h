@@ -13,7 +13,8 @@ namespace thicklens::model {
 inline double RayIrradiance(const Eigen::Vector2d& slope, const Eigen::Vector2d& landing_mm,
                             const Eigen::Vector2d& aperture_mm, double image_distance_mm) {
   const double tan2_alpha = slope.squaredNorm();
-  const double tan2_beta = ((landing_mm + aperture_mm) / image_distance_mm).squaredNorm();
+  const double tan2_beta =
+      (landing_mm + aperture_mm).squaredNorm() / (image_distance_mm * image_distance_mm);
   return 1 / (std::sqrt((1 + tan2_alpha) * (1 + tan2_beta)) * (1 + tan2_beta));
 }
 

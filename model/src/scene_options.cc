@@ -155,6 +155,7 @@ bool SceneSimulationOptions::IsValid(std::string* why) const {
   }
   const std::pair<const char*, double> amounts[] = {
       {"noise_sigma_grey_levels", noise_sigma_grey_levels},
+      {"sampling_error_grey_levels", sampling_error_grey_levels},
       {"full_well_electrons", full_well_electrons},
       {"read_noise_electrons", read_noise_electrons}};
   for (const auto& [field, value] : amounts) {

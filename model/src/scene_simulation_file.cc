@@ -219,8 +219,9 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "layers", "effects", "without",
-                    "tolerance", "rays_per_pixel", "wavelength_nm", "full_well_electrons",
-                    "read_noise_electrons", "noise_sigma_grey_levels", "bits", "views", "seed"});
+                    "tolerance", "sampling_error_grey_levels", "rays_per_pixel", "wavelength_nm",
+                    "full_well_electrons", "read_noise_electrons", "noise_sigma_grey_levels",
+                    "bits", "views", "seed"});
   constexpr int kAny = std::numeric_limits<int>::max();  // the options' own check is the bound
   SceneSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
@@ -235,6 +236,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   if (const auto wavelength = root.Find("wavelength_nm")) {
     options.wavelength_mm = wavelength->PositiveNumber() * 1e-6;
   }
+  ReadNumber(root, "sampling_error_grey_levels", &options.sampling_error_grey_levels);
   ReadNumber(root, "full_well_electrons", &options.full_well_electrons);
   ReadNumber(root, "read_noise_electrons", &options.read_noise_electrons);
   ReadNumber(root, "noise_sigma_grey_levels", &options.noise_sigma_grey_levels);
@@ -269,6 +271,7 @@ std::string SceneTruthToYaml(const SceneTruth& truth) {
   out << YAML::Key << "left_out_grey_levels" << YAML::Value << YAML::Flow << YAML::BeginMap;
   for (const auto& [name, grey_levels] : truth.left_out) number(name.c_str(), grey_levels);
   out << YAML::EndMap;
+  number("sampling_error_grey_levels", truth.sampling_error_grey_levels);
   out << YAML::Key << "seed" << YAML::Value << truth.seed << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }

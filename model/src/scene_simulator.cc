@@ -6,13 +6,13 @@
 #include <cmath>
 #include <cstddef>
 #include <mutex>
+#include <optional>
 #include <utility>
 
-#include "airy.h"
 #include "random_draws.h"
-#include "ray_irradiance.h"
 #include "ray_set.h"
 #include "scene_geometry.h"
+#include "scene_photograph.h"
 #include "scene_survey.h"
 #include "scene_texture.h"
 #include "thicklens/error.h"
@@ -48,8 +48,9 @@ struct SceneSimulator::Impl {
       : options(Checked(given)), geometry(options) {
     MakeTextures(pictures);
     Decide();
-    MakeRays();
-    MakeExposure();
+    const RaySpread spread = SpreadOf(options, decision.on);
+    view_rays = ViewRays(spread.box, spread.gaussian_px);
+    photograph.emplace(options, geometry, textures, *survey, decision.on, camera.sensor.transfer);
   }
 
   static const SceneSimulationOptions& Checked(const SceneSimulationOptions& given) {
@@ -58,13 +59,9 @@ struct SceneSimulator::Impl {
     return given;
   }
 
-  // A floor that was measured holds the diffraction.
-  double AiryPx() const {
-    return geometry.floor_px() > 0 ? 0 : AiryRadiusPx(options.camera, options.wavelength_mm);
-  }
-
   void Decide() {
-    const double landing_px = 0.5 + kFloorDeviations * geometry.floor_px() + kAiryRadii * AiryPx();
+    const double landing_px =
+        0.5 + kFloorDeviations * geometry.floor_px() + kAiryRadii * AddedAiryPx(options);
     survey.emplace(options.camera, geometry, textures, landing_px);
     EffectChoice choice = options.effects;
     choice.kept.Add(Effect::kQuantisation);  // costs nothing, and makes the file that is asked for
@@ -74,90 +71,6 @@ struct SceneSimulator::Impl {
   }
 
   bool On(Effect effect) const { return decision.on.Has(effect); }
-
-  void MakeRays() {
-    RaySpread spread;
-    if (On(Effect::kDefocus)) {
-      spread.aperture = On(Effect::kApertureShape) ? options.camera.psf : Psf::kGaussian;
-    }
-    spread.box = On(Effect::kPixelBox);
-    if (On(Effect::kLensFloor)) spread.gaussian_px = geometry.floor_px();
-    if (On(Effect::kDiffraction)) {
-      if (options.camera.psf == Psf::kDisc) {
-        spread.airy_px = AiryPx();
-      } else {
-        spread.gaussian_px = std::hypot(spread.gaussian_px, AiryPx() / kGaussianAiryRadius);
-      }
-    }
-    view_rays = ViewRays(spread.box, spread.gaussian_px);
-    photograph_rays = view_rays.size() == 1 && !spread.aperture && spread.airy_px == 0
-                          ? view_rays
-                          : PhotographRays(spread, options.rays_per_pixel);
-    // The thin lens of the same focus has K for its image distance.
-    irradiance_distance_mm =
-        On(Effect::kThickness) ? options.camera.image_distance_mm()
-                               : options.camera.focal_scale_px() * geometry.sensor().pixel_pitch_mm;
-  }
-
-  double RelativeIrradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const {
-    const Sensor& sensor = geometry.sensor();
-    return RayIrradiance(ray.slope,
-                         sensor.pixel_pitch_mm * (position_px - sensor.principal_point_px),
-                         ray.aperture_mm, irradiance_distance_mm);
-  }
-
-  // (12) fixes its constant k by exposure: uniform radiance 1 gives 1 at the principal point.
-  void MakeExposure() {
-    const Eigen::Vector2d& axis_px = geometry.sensor().principal_point_px;
-    double sum = 0;
-    for (const PixelRay& ray : photograph_rays) {
-      sum += RelativeIrradiance(
-          axis_px, geometry.RayAt(axis_px, geometry.aperture_sigma_mm() * ray.aperture));
-    }
-    exposure = static_cast<double>(photograph_rays.size()) / sum;
-  }
-
-  // What a ray brings to a position of the picture.
-  Eigen::Array4f LightAlong(const SceneBlock& block, const SceneRay& ray) const {
-    if (block.layers.size() == 1) return LightOf(block.layers.front(), ray);
-    const SceneHit hit = geometry.Trace(ray, block.layers);
-    return LayerLight(geometry, textures[hit.layer], hit.layer, ray, hit.position_mm);
-  }
-  Eigen::Array4f LightOf(std::size_t layer, const SceneRay& ray) const {
-    const double depth_mm = HitDepthMm(geometry.layers()[layer].plane, ray);
-    return LayerLight(geometry, textures[layer], layer, ray, ray.PositionMm(depth_mm));
-  }
-
-  // Without occlusion: of the surface that the pixel shows, the ray passes a point; what the middle
-  // of the aperture sees there is what the ray sees.
-  Eigen::Array4f LightWithoutOcclusion(const SceneBlock& block, const PlaneOptions& surface,
-                                       const SceneRay& ray) const {
-    const double depth_mm = HitDepthMm(surface, ray);
-    const Eigen::Vector2d point_px = geometry.ChiefPositionPx(ray.PositionMm(depth_mm), depth_mm);
-    return LightOf(geometry.Trace(geometry.RayAt(point_px, {0, 0}), block.layers).layer, ray);
-  }
-
-  Eigen::Array3d PhotographAt(const SceneBlock& block, int x, int y) const {
-    const bool falloff = On(Effect::kFalloff);
-    const bool trace = On(Effect::kOcclusion) || block.layers.size() == 1;
-    const std::size_t shown =
-        geometry.Trace(geometry.RayAt(Eigen::Vector2d(x, y), {0, 0}), block.layers).layer;
-    const PlaneOptions& surface = geometry.layers()[shown].plane;
-    Eigen::Array4d sum(0, 0, 0, 0);
-    for (const PixelRay& sample : photograph_rays) {
-      const Eigen::Vector2d position_px = Eigen::Vector2d(x, y) + sample.offset_px;
-      const SceneRay ray =
-          geometry.RayAt(position_px, geometry.aperture_sigma_mm() * sample.aperture);
-      const Eigen::Array4f light =
-          trace ? LightAlong(block, ray) : LightWithoutOcclusion(block, surface, ray);
-      if (falloff) {
-        sum += exposure * RelativeIrradiance(position_px, ray) * light.cast<double>();
-      } else {
-        sum += light.cast<double>();
-      }
-    }
-    return sum.head<3>() / static_cast<double>(photograph_rays.size());
-  }
 
   Eigen::Array3d ViewAt(int x, int y, const Eigen::Vector2d& aperture_mm) const {
     Eigen::Array4d sum(0, 0, 0, 0);
@@ -182,7 +95,7 @@ struct SceneSimulator::Impl {
     });
   }
 
-  // A picture whose pixels are light(block, x, y).
+  // A picture whose pixels are light(x, y).
   template <typename Light>
   LinearPicture Render(const SceneRun& run, const Light& light) const {
     const Sensor& sensor = geometry.sensor();
@@ -193,9 +106,7 @@ struct SceneSimulator::Impl {
       float* value = picture.values.data() +
                      3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(sensor.width_px);
       for (int x = 0; x < sensor.width_px; ++x) {
-        const SceneBlock& block =
-            survey->block(x / SceneSurvey::kBlockPx, y / SceneSurvey::kBlockPx);
-        const Eigen::Array3d rgb = light(block, x, y);
+        const Eigen::Array3d rgb = light(x, y);
         for (int c = 0; c < 3; ++c) *value++ = static_cast<float>(rgb(c));
       }
     });
@@ -238,9 +149,8 @@ struct SceneSimulator::Impl {
   std::optional<SceneSurvey> survey;
   EffectDecision decision;
   Camera camera;
-  std::vector<PixelRay> photograph_rays, view_rays;
-  double irradiance_distance_mm = 0;
-  double exposure = 1;
+  std::vector<PixelRay> view_rays;
+  std::optional<ScenePhotograph> photograph;
 };
 
 SceneSimulator::SceneSimulator(const SceneSimulationOptions& options,
@@ -254,9 +164,7 @@ const EffectDecision& SceneSimulator::effects() const { return impl_->decision; 
 const Camera& SceneSimulator::camera() const { return impl_->camera; }
 
 LinearPicture SceneSimulator::RenderNoiseless(const SceneRun& run) const {
-  return impl_->Render(run, [this](const SceneBlock& block, int x, int y) {
-    return impl_->PhotographAt(block, x, y);
-  });
+  return impl_->Render(run, [this](int x, int y) { return impl_->photograph->PixelAt(x, y); });
 }
 
 StoredPicture SceneSimulator::Store(const LinearPicture& noiseless) const {
@@ -298,6 +206,7 @@ SceneTruth SceneSimulator::Truth(const RawDepthMap& depth) const {
       truth.left_out.emplace_back(name, finding.impact.grey_levels);
     }
   }
+  truth.sampling_error_grey_levels = impl_->photograph->sampling_error_grey_levels();
   truth.seed = impl_->options.seed;
   const auto [nearest, farthest] = std::minmax_element(depth.values.begin(), depth.values.end());
   truth.nearest_depth_mm = static_cast<double>(*nearest);
@@ -318,9 +227,7 @@ LinearPicture SceneSimulator::RenderView(const Eigen::Vector2d& aperture_mm,
     throw Error(fmt::format("aperture position [{}, {}] mm: both must be from {} to {}",
                             aperture_mm.x(), aperture_mm.y(), -reach_mm, reach_mm));
   }
-  return impl_->Render(run, [&](const SceneBlock& /*block*/, int x, int y) {
-    return impl_->ViewAt(x, y, aperture_mm);
-  });
+  return impl_->Render(run, [&](int x, int y) { return impl_->ViewAt(x, y, aperture_mm); });
 }
 
 LightField SceneSimulator::RenderLightField(int u_count, int v_count, const SceneRun& run) const {

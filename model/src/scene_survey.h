@@ -37,11 +37,11 @@ class SceneSurvey {
   SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
               const std::vector<SceneTexture>& textures, double landing_px);
 
-  int columns() const { return columns_; }
-  int rows() const { return rows_; }
-  const SceneBlock& block(int column, int row) const {
-    return blocks_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                   static_cast<std::size_t>(column)];
+  const std::vector<SceneBlock>& blocks() const { return blocks_; }
+  // Of the block that holds a pixel.
+  std::size_t IndexAt(int x, int y) const {
+    return static_cast<std::size_t>(y / kBlockPx) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(x / kBlockPx);
   }
   std::vector<EffectPlace> Places() const;
 

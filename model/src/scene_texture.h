@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "random_draws.h"
@@ -41,10 +42,10 @@ class SceneTexture {
   Eigen::Array4f TileAt(double x_mm, double y_mm) const {
     const double x = (x_mm - origin_mm_.x()) * per_mm_.x();
     const double y = (y_mm - origin_mm_.y()) * per_mm_.y();
-    const double column = std::floor(x);
-    const double row = std::floor(y);
-    const auto fx = static_cast<float>(x - column);
-    const auto fy = static_cast<float>(y - row);
+    const std::int64_t column = WholeBelow(x);
+    const std::int64_t row = WholeBelow(y);
+    const auto fx = static_cast<float>(x - static_cast<double>(column));
+    const auto fy = static_cast<float>(y - static_cast<double>(row));
     const int left = Wrapped(column, columns_);
     const int right = left + 1 == columns_ ? 0 : left + 1;
     const int above = Wrapped(row, rows_);
@@ -58,11 +59,17 @@ class SceneTexture {
                  static_cast<std::size_t>(column)];
   }
 
+  // As std::floor, which is a call where the processor need not have it.
+  static std::int64_t WholeBelow(double x) {
+    const auto toward_zero = static_cast<std::int64_t>(x);
+    return static_cast<double>(toward_zero) > x ? toward_zero - 1 : toward_zero;
+  }
+
   // A position may be far away where a plane runs to great depths.
-  static int Wrapped(double index, int count) {
+  static int Wrapped(std::int64_t index, int count) {
     if (index >= 0 && index < count) return static_cast<int>(index);
-    const int inside = static_cast<int>(index - count * std::floor(index / count));
-    return inside < count ? inside : 0;
+    const auto inside = static_cast<int>(index % count);
+    return inside < 0 ? inside + count : inside;
   }
 
   Eigen::Array4f colour_{0, 0, 0, 0};

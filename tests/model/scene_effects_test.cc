@@ -74,6 +74,7 @@ SceneSimulationOptions RandomScene(unsigned seed) {
     }
     options.layers.push_back(layer);
   }
+  options.sampling_error_grey_levels = 0;
   // Where there are edges, a ray more or less on one side of them must not count.
   options.rays_per_pixel = layers > 1 ? 3000 : 400;
   options.seed = seed;

@@ -81,6 +81,7 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
            "full_well_electrons: 12000\n"
            "read_noise_electrons: 5\n"
            "rays_per_pixel: 100\n"
+           "sampling_error_grey_levels: 0.05\n"
            "noise_sigma_grey_levels: 1.5\n"
            "bits: 16\n"
            "views: [9, 3]\n"
@@ -101,6 +102,7 @@ TEST_F(SceneSimulationFileTest, ReadsEveryField) {
   EXPECT_EQ(options.full_well_electrons, 12000);
   EXPECT_EQ(options.read_noise_electrons, 5);
   EXPECT_EQ(options.rays_per_pixel, 100);
+  EXPECT_EQ(options.sampling_error_grey_levels, 0.05);
   EXPECT_EQ(options.noise_sigma_grey_levels, 1.5);
   EXPECT_EQ(options.bits, 16);
   EXPECT_EQ(options.u_count, 9);
@@ -161,6 +163,7 @@ TEST_F(SceneSimulationFileTest, WhatIsLeftOutHasTheDefaultsOfTheOptions) {
   EXPECT_EQ(options.effects.tolerance.grey_levels, defaults.effects.tolerance.grey_levels);
   EXPECT_EQ(options.wavelength_mm, defaults.wavelength_mm);
   EXPECT_EQ(options.rays_per_pixel, defaults.rays_per_pixel);
+  EXPECT_EQ(options.sampling_error_grey_levels, defaults.sampling_error_grey_levels);
   EXPECT_EQ(options.noise_sigma_grey_levels, 0);
   EXPECT_EQ(options.bits, 8);
   EXPECT_EQ(options.u_count, defaults.u_count);

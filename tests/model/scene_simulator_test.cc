@@ -93,6 +93,7 @@ SceneSimulationOptions SceneOf(const Camera& camera, std::vector<SceneLayer> lay
   options.camera = camera;
   options.layers = std::move(layers);
   options.effects.base = EffectChoice::Base::kAll;
+  options.sampling_error_grey_levels = 0;
   options.effects.without = {Effect::kFalloff, Effect::kDiffraction};
   return options;
 }

@@ -92,7 +92,10 @@ struct SceneSimulationOptions {
   Camera camera;
   std::vector<SceneLayer> layers;  // in any order: along each ray the nearest one is seen
   EffectChoice effects;            // of PictureEffects()
-  int rays_per_pixel = 600;        // where there is defocus
+  // Rms error that a finite number of rays may leave in stored values, in 1/255 of full scale; 0:
+  // all pixels get as many as may be.
+  double sampling_error_grey_levels = 0.2;
+  int rays_per_pixel = 600;  // at most
   double wavelength_mm = 550e-6;
   // Noise of the sensor: electrons at full scale (0: no shot noise), and sd of what is read.
   double full_well_electrons = 0, read_noise_electrons = 0;
@@ -119,6 +122,7 @@ struct SceneTruth {
   std::vector<std::string> effects;                    // that were on, by name
   // What was left out, by name, with the bound of its own impact in grey levels.
   std::vector<std::pair<std::string, double>> left_out;
+  double sampling_error_grey_levels = 0;  // rms, of the pixels where it is largest
   std::uint64_t seed = 0;
 };
 std::string SceneTruthToYaml(const SceneTruth& truth);  // schema thicklens/scene-truth/1
@@ -140,9 +144,10 @@ struct SceneRun {
 // A pixel of the photograph is the mean over one set of rays for all pixels (Hammersley points)
 // that spreads over the aperture by the camera's PSF (Gaussian of standard deviation kappa r, or
 // disc of radius 2 kappa r; the set's second moment is exactly (kappa r)^2) and over the pixel box
-// widened by the lens floor; each effect that is off takes its part of the set with it. At 600 rays
-// its transfer function is off by 0.01 at the highest
-// frequencies and the share of a pixel that an edge hides by 0.005, rms.
+// widened by the lens floor; each effect that is off takes its part of the set with it. Pixels get
+// as many rays as their blur and their surroundings ask for (see sampling_plan.h). At 600 rays its
+// transfer function is off by 0.01 at the highest frequencies and the share of a pixel that an edge
+// hides by 0.005, rms.
 //
 // Everything is RGB. The same options give the same bits on any number of threads.
 class SceneSimulator {

@@ -1,0 +1,164 @@
+#include "scene_photograph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "airy.h"
+#include "ray_irradiance.h"
+#include "sampling_plan.h"
+
+namespace thicklens::model {
+
+double AddedAiryPx(const SceneSimulationOptions& options) {
+  const auto& floor = options.camera.calibration->blur_floor_px;
+  return floor && floor->value > 0 ? 0 : AiryRadiusPx(options.camera, options.wavelength_mm);
+}
+
+RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on) {
+  const Camera& camera = options.camera;
+  RaySpread spread;
+  if (on.Has(Effect::kDefocus)) {
+    spread.aperture = on.Has(Effect::kApertureShape) ? camera.psf : Psf::kGaussian;
+  }
+  spread.box = on.Has(Effect::kPixelBox);
+  if (on.Has(Effect::kLensFloor) && camera.calibration->blur_floor_px) {
+    spread.gaussian_px = camera.calibration->blur_floor_px->value;
+  }
+  if (on.Has(Effect::kDiffraction)) {
+    const double radius_px = AddedAiryPx(options);
+    if (camera.psf == Psf::kDisc) {
+      spread.airy_px = radius_px;
+    } else {
+      spread.gaussian_px = std::hypot(spread.gaussian_px, radius_px / kGaussianAiryRadius);
+    }
+  }
+  return spread;
+}
+
+ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
+                                 const SceneGeometry& geometry,
+                                 const std::vector<SceneTexture>& textures,
+                                 const SceneSurvey& survey, const EffectSet& on,
+                                 const TransferCurve& stored)
+    : geometry_(geometry), textures_(textures), survey_(survey), on_(on) {
+  // The thin lens of the same focus has K for its image distance.
+  irradiance_distance_mm_ =
+      on.Has(Effect::kThickness)
+          ? options.camera.image_distance_mm()
+          : options.camera.focal_scale_px() * geometry.sensor().pixel_pitch_mm;
+  MakeSets(options, stored);
+}
+
+void ScenePhotograph::MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored) {
+  const RaySpread spread = SpreadOf(options, on_);
+  SamplingSpread sampling;
+  sampling.landing_px = std::sqrt((spread.box ? 1.0 / 12 : 0) + std::pow(spread.gaussian_px, 2) +
+                                  std::pow(spread.airy_px, 2));
+  if (!spread.aperture && sampling.landing_px == 0) {
+    sets_.push_back(Prepared({PixelRay()}));
+    set_of_block_.assign(survey_.blocks().size(), 0);
+    return;
+  }
+  std::map<int, std::size_t> set_of_count;
+  for (const SceneBlock& block : survey_.blocks()) {
+    sampling.defocus_px = spread.aperture ? block.sigma_px : 0;
+    if (spread.aperture && on_.Has(Effect::kFalloff)) sampling.irradiance = IrradianceSd(block);
+    const int rays = RaysWithin(block, sampling, stored, options.sampling_error_grey_levels,
+                                options.rays_per_pixel);
+    sampling_error_ = std::max(sampling_error_, SamplingError(block, sampling, stored, rays));
+    const auto [found, is_new] = set_of_count.emplace(rays, sets_.size());
+    if (is_new) sets_.push_back(Prepared(PhotographRays(spread, rays)));
+    set_of_block_.push_back(found->second);
+  }
+}
+
+// Relative, over the aperture: of points at +-1 standard deviation on both axes.
+double ScenePhotograph::IrradianceSd(const SceneBlock& block) const {
+  const Eigen::Vector2d& position_px = block.places.front().position_px;
+  const double reach_mm = geometry_.aperture_sigma_mm();
+  double sum = 0, squares = 0;
+  for (const double x : {-reach_mm, reach_mm}) {
+    for (const double y : {-reach_mm, reach_mm}) {
+      const double value = Irradiance(position_px, geometry_.RayAt(position_px, {x, y}));
+      sum += value / 4;
+      squares += value * value / 4;
+    }
+  }
+  return std::sqrt(std::max(0.0, squares - sum * sum)) / sum;
+}
+
+ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& rays) const {
+  const Eigen::Vector2d& axis_px = geometry_.sensor().principal_point_px;
+  RaySet set;
+  double sum = 0;
+  for (const PixelRay& ray : rays) {
+    PreparedRay prepared;
+    prepared.offset_px = ray.offset_px;
+    prepared.aperture_mm = geometry_.aperture_sigma_mm() * ray.aperture;
+    prepared.slope = geometry_.RayAt(axis_px + ray.offset_px, prepared.aperture_mm).slope;
+    set.rays.push_back(prepared);
+    // (12) fixes its constant k by exposure: uniform radiance 1 gives 1 at the principal point.
+    sum += Irradiance(axis_px, geometry_.RayAt(axis_px, prepared.aperture_mm));
+  }
+  set.exposure = static_cast<double>(rays.size()) / sum;
+  return set;
+}
+
+double ScenePhotograph::Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const {
+  const Sensor& sensor = geometry_.sensor();
+  return RayIrradiance(ray.slope, sensor.pixel_pitch_mm * (position_px - sensor.principal_point_px),
+                       ray.aperture_mm, irradiance_distance_mm_);
+}
+
+Eigen::Array4f ScenePhotograph::LightAlong(const SceneBlock& block, const SceneRay& ray) const {
+  if (block.layers.size() == 1) return LightOf(block.layers.front(), ray);
+  const SceneHit hit = geometry_.Trace(ray, block.layers);
+  return LayerLight(geometry_, textures_[hit.layer], hit.layer, ray, hit.position_mm);
+}
+
+Eigen::Array4f ScenePhotograph::LightOf(std::size_t layer, const SceneRay& ray) const {
+  const double depth_mm = HitDepthMm(geometry_.layers()[layer].plane, ray);
+  return LayerLight(geometry_, textures_[layer], layer, ray, ray.PositionMm(depth_mm));
+}
+
+// Of the surface that the pixel shows, the ray passes a point; what the middle of the aperture sees
+// there is what the ray sees.
+Eigen::Array4f ScenePhotograph::LightWithoutOcclusion(const SceneBlock& block,
+                                                      const PlaneOptions& surface,
+                                                      const SceneRay& ray) const {
+  const double depth_mm = HitDepthMm(surface, ray);
+  const Eigen::Vector2d point_px = geometry_.ChiefPositionPx(ray.PositionMm(depth_mm), depth_mm);
+  return LightOf(geometry_.Trace(geometry_.RayAt(point_px, {0, 0}), block.layers).layer, ray);
+}
+
+Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
+  const std::size_t index = survey_.IndexAt(x, y);
+  const SceneBlock& block = survey_.blocks()[index];
+  const RaySet& set = sets_[set_of_block_[index]];
+  const Eigen::Vector2d centre_px(x, y);
+  const SceneRay chief = geometry_.RayAt(centre_px, {0, 0});
+  const bool falloff = on_.Has(Effect::kFalloff);
+  const bool trace = on_.Has(Effect::kOcclusion) || block.layers.size() == 1;
+  const PlaneOptions& surface =
+      geometry_.layers()[trace ? 0 : geometry_.Trace(chief, block.layers).layer].plane;
+  // In parts: many numbers are not added up in float.
+  constexpr std::size_t kPart = 32;
+  Eigen::Array4d sum(0, 0, 0, 0);
+  for (std::size_t first = 0; first < set.rays.size(); first += kPart) {
+    Eigen::Array4f part(0, 0, 0, 0);
+    for (std::size_t i = first; i < std::min(first + kPart, set.rays.size()); ++i) {
+      const PreparedRay& prepared = set.rays[i];
+      const SceneRay ray{prepared.aperture_mm, chief.slope + prepared.slope};
+      const Eigen::Array4f light =
+          trace ? LightAlong(block, ray) : LightWithoutOcclusion(block, surface, ray);
+      const auto weight = static_cast<float>(
+          falloff ? Irradiance(centre_px + prepared.offset_px, ray) : 1);
+      part += weight * light;
+    }
+    sum += part.cast<double>();
+  }
+  return (falloff ? set.exposure : 1) * sum.head<3>() / static_cast<double>(set.rays.size());
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,65 @@
+#ifndef THICKLENS_MODEL_SRC_SCENE_PHOTOGRAPH_H_
+#define THICKLENS_MODEL_SRC_SCENE_PHOTOGRAPH_H_
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "ray_set.h"
+#include "scene_geometry.h"
+#include "scene_survey.h"
+#include "scene_texture.h"
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::model {
+
+// Radius, px, of the diffraction that is not in a measured lens floor already.
+double AddedAiryPx(const SceneSimulationOptions& options);
+
+// By what the rays of a pixel miss it, with some effects on.
+RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on);
+
+// The pixels of a photograph, each the mean of as many rays as its block needs.
+class ScenePhotograph {
+ public:
+  // All but the options is kept by reference. `stored`: how light becomes stored values.
+  ScenePhotograph(const SceneSimulationOptions& options, const SceneGeometry& geometry,
+                  const std::vector<SceneTexture>& textures, const SceneSurvey& survey,
+                  const EffectSet& on, const TransferCurve& stored);
+
+  Eigen::Array3d PixelAt(int x, int y) const;
+  // The largest of all blocks, rms, of stored values; 255 at full scale.
+  double sampling_error_grey_levels() const { return sampling_error_; }
+
+ private:
+  struct PreparedRay {
+    Eigen::Vector2d aperture_mm, offset_px;
+    Eigen::Vector2d slope;  // less that of the pixel's centre's chief ray
+  };
+  struct RaySet {
+    std::vector<PreparedRay> rays;
+    double exposure = 1;
+  };
+
+  void MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored);
+  RaySet Prepared(const std::vector<PixelRay>& rays) const;
+  double IrradianceSd(const SceneBlock& block) const;
+  double Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const;
+  Eigen::Array4f LightAlong(const SceneBlock& block, const SceneRay& ray) const;
+  Eigen::Array4f LightOf(std::size_t layer, const SceneRay& ray) const;
+  Eigen::Array4f LightWithoutOcclusion(const SceneBlock& block, const PlaneOptions& surface,
+                                       const SceneRay& ray) const;
+
+  const SceneGeometry& geometry_;
+  const std::vector<SceneTexture>& textures_;
+  const SceneSurvey& survey_;
+  const EffectSet on_;
+  double irradiance_distance_mm_ = 0;
+  std::vector<RaySet> sets_;
+  std::vector<std::size_t> set_of_block_;
+  double sampling_error_ = 0;
+};
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SRC_SCENE_PHOTOGRAPH_H_
