@@ -147,19 +147,27 @@ void CheckView(const SurfacePicture& picture, const ViewSources& view) {
 
 TapRanges TapRangesOf(const SurfacePicture& picture) {
   CheckPicture(picture);
-  TapRanges ranges;
-  for (int y = 0; y < picture.height_px; ++y) {
-    for (int x = 0; x < picture.width_px; ++x) {
-      float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
-      for (int j = std::max(y - 1, 0); j <= std::min(y + 2, picture.height_px - 1); ++j) {
-        for (int i = std::max(x - 1, 0); i <= std::min(x + 2, picture.width_px - 1); ++i) {
-          const float there = (*picture.disparity)[Index(j) * Index(picture.width_px) + Index(i)];
-          lowest = std::min(lowest, there);
-          highest = std::max(highest, there);
-        }
-      }
-      ranges.lowest.push_back(lowest);
-      ranges.highest.push_back(highest);
+  const int width = picture.width_px, height = picture.height_px;
+  TapRanges ranges{std::vector<float>(PixelsOf(picture)), std::vector<float>(PixelsOf(picture))};
+  const auto row_at = [&](int y) {
+    return picture.disparity->data() + Index(std::clamp(y, 0, height - 1)) * Index(width);
+  };
+  // Of the four pixels in each column, then of four columns.
+  std::vector<float> lowest(Index(width)), highest(Index(width));
+  for (int y = 0; y < height; ++y) {
+    const float* const rows[] = {row_at(y - 1), row_at(y), row_at(y + 1), row_at(y + 2)};
+    for (std::size_t x = 0; x < Index(width); ++x) {
+      lowest[x] = std::min({rows[0][x], rows[1][x], rows[2][x], rows[3][x]});
+      highest[x] = std::max({rows[0][x], rows[1][x], rows[2][x], rows[3][x]});
+    }
+    for (int x = 0; x < width; ++x) {
+      const std::size_t i = Index(y) * Index(width) + Index(x);
+      const std::size_t before = Index(std::max(x - 1, 0));
+      const std::size_t next = Index(std::min(x + 1, width - 1));
+      const std::size_t last = Index(std::min(x + 2, width - 1));
+      ranges.lowest[i] = std::min({lowest[before], lowest[Index(x)], lowest[next], lowest[last]});
+      ranges.highest[i] =
+          std::max({highest[before], highest[Index(x)], highest[next], highest[last]});
     }
   }
   return ranges;
