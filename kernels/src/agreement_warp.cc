@@ -26,7 +26,7 @@ std::vector<float> Surfaces(Numbers* numbers) {
 void CompareWarp(Backend* device, Worst* worst) {
   Numbers numbers;
   const std::vector<float> disparity = Surfaces(&numbers);
-  for (const int channels : {1, 3}) {
+  for (const int channels : {1, 3, 6}) {
     const auto values = numbers.Vector<float>(kWidth * kHeight * channels, 0, 1);
     const SurfacePicture picture{kWidth, kHeight, channels, &values, &disparity, 0.3F};
     const std::unique_ptr<ViewWarp> found = device->NewWarp(picture);

@@ -14,6 +14,7 @@ namespace {
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBefore = 1, kAfter = 2;  // pixels of a border that are repeated
+constexpr int kFour = 4;                // channels of a pixel read at once, of more than one
 
 // Surfaces in warp.cl.
 struct SurfacesArgument {
@@ -21,22 +22,37 @@ struct SurfacesArgument {
   cl_float tolerance, limit_px;
 };
 
-// The channels of a picture in planes with repeated borders.
-std::vector<float> PlanesOf(const SurfacePicture& picture) {
-  std::vector<float> planes;
-  planes.reserve(Index(picture.width_px + kBefore + kAfter) *
-                 Index(picture.height_px + kBefore + kAfter) * Index(picture.channels));
-  for (int channel = 0; channel < picture.channels; ++channel) {
+// The pixels of a picture as warp.cl has them.
+std::vector<float> PixelsOf(const SurfacePicture& picture) {
+  const int of_pixel = picture.channels == 1 ? 1 : kFour;
+  const int planes = (picture.channels + of_pixel - 1) / of_pixel;
+  std::vector<float> pixels(Index(picture.width_px + kBefore + kAfter) *
+                            Index(picture.height_px + kBefore + kAfter) * Index(of_pixel) *
+                            Index(planes));
+  float* to = pixels.data();
+  for (int plane = 0; plane < planes; ++plane) {
+    const int first = plane * of_pixel;
+    const int count = std::min(of_pixel, picture.channels - first);
     for (int y = -kBefore; y < picture.height_px + kAfter; ++y) {
       const std::size_t row =
           Index(std::clamp(y, 0, picture.height_px - 1)) * Index(picture.width_px);
-      for (int x = -kBefore; x < picture.width_px + kAfter; ++x) {
+      for (int x = -kBefore; x < picture.width_px + kAfter; ++x, to += of_pixel) {
         const std::size_t pixel = row + Index(std::clamp(x, 0, picture.width_px - 1));
-        planes.push_back((*picture.values)[pixel * Index(picture.channels) + Index(channel)]);
+        std::copy_n(picture.values->data() + pixel * Index(picture.channels) + first, count, to);
       }
     }
   }
-  return planes;
+  return pixels;
+}
+
+// Least, largest, pixel by pixel.
+std::vector<float> PairsOf(const TapRanges& ranges) {
+  std::vector<float> pairs;
+  pairs.reserve(2 * ranges.lowest.size());
+  for (std::size_t i = 0; i < ranges.lowest.size(); ++i) {
+    pairs.insert(pairs.end(), {ranges.lowest[i], ranges.highest[i]});
+  }
+  return pairs;
 }
 
 DeviceMemory Copied(OpenClQueue* queue, const char* what, const std::vector<float>& numbers) {
@@ -52,10 +68,9 @@ class OpenClWarp : public ViewWarp {
       : queue_(std::move(queue)),
         lanes_(lanes),
         picture_(picture),
-        planes_(Copied(queue_.get(), "picture of surfaces", PlanesOf(picture))),
+        pixels_(Copied(queue_.get(), "picture of surfaces", PixelsOf(picture))),
         disparity_(Copied(queue_.get(), "disparity of a picture", *picture.disparity)),
-        lowest_(Copied(queue_.get(), "least disparities", ranges.lowest)),
-        highest_(Copied(queue_.get(), "largest disparities", ranges.highest)) {}
+        ranges_(Copied(queue_.get(), "ranges of disparities", PairsOf(ranges))) {}
 
   void Warp(const ViewSources& view, std::vector<float>* values) override {
     CheckView(picture_, view);
@@ -65,10 +80,9 @@ class OpenClWarp : public ViewWarp {
     values->resize(picture_.values->size());
     OpenClCall(queue_.get(), "WarpView")
         .Value(surfaces)
-        .OnDevice(planes_)
+        .OnDevice(pixels_)
         .OnDevice(disparity_)
-        .OnDevice(lowest_)
-        .OnDevice(highest_)
+        .OnDevice(ranges_)
         .Input("disparity of a view", *view.disparity)
         .Input("sources of a view across", *view.source_x)
         .Input("sources of a view down", *view.source_y)
@@ -80,7 +94,7 @@ class OpenClWarp : public ViewWarp {
   const std::unique_ptr<OpenClQueue> queue_;
   const int lanes_;  // samples of an item
   const SurfacePicture picture_;
-  const DeviceMemory planes_, disparity_, lowest_, highest_;
+  const DeviceMemory pixels_, disparity_, ranges_;
 };
 
 }  // namespace

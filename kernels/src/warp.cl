@@ -3,54 +3,77 @@
 // As the C++ twin: which taps count is decided by numbers that must be the same.
 #pragma OPENCL FP_CONTRACT OFF
 
-// The picture lies in planes of (height_px + 3) rows of (width_px + 3) numbers: its borders are
-// repeated once before and twice after.
+// LANES numbers (filter.cl), which need not be REAL; WHOLE is from radiance.cl.
+#if LANES == 1
+#define FLOATS float
+#define TO_WHOLE convert_int
+#define LOAD_LANES(from) (*(from))
+#define STORE_LANES(numbers, to) (*(to) = (numbers))
+#else
+#define FLOATS JOINED(float, LANES)
+#define TO_WHOLE JOINED(convert_int, LANES)
+#define LOAD_LANES(from) JOINED(vload, LANES)(0, from)
+#define STORE_LANES(numbers, to) JOINED(vstore, LANES)(numbers, 0, to)
+#endif
+
+// Pixels lie in rows of width_px + 3, the rows in planes of height_px + 3: the picture's borders
+// are repeated once before and twice after. A pixel is one number, or, of a picture with more
+// channels than one, a float4 of the next four channels in each plane, 0 beyond the last.
 typedef struct {
   int width_px, height_px, channels;
   float tolerance, limit_px;
 } Surfaces;
 
-// The pixel before the place of a sample on a line, and the rest of the way to the next.
-int PixelBefore(int sample, float source, int count, float limit_px, float* rest) {
-  const float way = clamp(source, -limit_px, limit_px);
-  const float below = floor(way);
-  const int at = sample + (int)below;
-  const int pixel = clamp(at, 0, count - 1);
-  *rest = at == pixel && at < count - 1 ? way - below : 0;
+// The pixels before the places of samples on a line, and the rests of the ways to the next.
+WHOLE PixelsBefore(WHOLE sample, FLOATS source, int count, float limit_px, FLOATS* rest) {
+  const FLOATS way = clamp(source, -limit_px, limit_px);
+  const FLOATS below = floor(way);
+  const WHOLE at = sample + TO_WHOLE(below);
+  const WHOLE pixel = clamp(at, 0, count - 1);
+  *rest = select((FLOATS)0, way - below, at == pixel && at < (WHOLE)(count - 1));
   return pixel;
 }
 
+// Of the pixels at -1, 0, 1 and 2, after Catmull and Rom. Four of the last.
 float4 CatmullRom(float t) {
-  return (float4)(((-0.5f * t + 1) * t - 0.5f) * t, (1.5f * t - 2.5f) * t * t + 1,
-                  ((-1.5f * t + 2) * t + 0.5f) * t, (0.5f * t - 0.5f) * t * t);
+  return mad(mad(mad((float4)(-0.5f, 1.5f, -1.5f, 0.5f), t, (float4)(1, -2.5f, 2, -0.5f)), t,
+                 (float4)(-0.5f, 0, 0.5f, 0)),
+             t, (float4)(0, 1, 0, 0));
+}
+// Each weight for the four channels of a pixel.
+float16 CatmullRomOfFour(float t) {
+  const float16 cubic = (float16)((float4)-0.5f, (float4)1.5f, (float4)-1.5f, (float4)0.5f);
+  const float16 square = (float16)((float4)1, (float4)-2.5f, (float4)2, (float4)-0.5f);
+  const float16 linear = (float16)((float4)-0.5f, (float4)0, (float4)0.5f, (float4)0);
+  const float16 constant_term = (float16)((float4)0, (float4)1, (float4)0, (float4)0);
+  return mad(mad(mad(cubic, t, square), t, linear), t, constant_term);
 }
 
-// One sample, of all channels, at x, y of the view.
-void WarpSample(const Surfaces picture, global const float* planes, global const float* disparity,
-                global const float* lowest, global const float* highest, int sample_x, int sample_y,
-                float d, float source_x, float source_y, global float* values) {
-  float rest_x, rest_y;
-  const int x = PixelBefore(sample_x, source_x, picture.width_px, picture.limit_px, &rest_x);
-  const int y = PixelBefore(sample_y, source_y, picture.height_px, picture.limit_px, &rest_y);
+float BicubicOfOne(global const float* tap, int stride, float4 weight_x, float4 weight_y) {
+  float4 sum = weight_y.s0 * vload4(0, tap);
+  sum = mad(weight_y.s1, vload4(0, tap + stride), sum);
+  sum = mad(weight_y.s2, vload4(0, tap + 2 * stride), sum);
+  sum = weight_x * mad(weight_y.s3, vload4(0, tap + 3 * stride), sum);
+  return (sum.s0 + sum.s1) + (sum.s2 + sum.s3);
+}
+
+float16 FourPixels(global const float4* tap) {
+  return (float16)(tap[0], tap[1], tap[2], tap[3]);
+}
+float4 BicubicOfFour(global const float4* tap, int stride, float16 weight_x, float4 weight_y) {
+  float16 sum = weight_y.s0 * FourPixels(tap);
+  sum = mad((float16)weight_y.s1, FourPixels(tap + stride), sum);
+  sum = mad((float16)weight_y.s2, FourPixels(tap + 2 * stride), sum);
+  sum = weight_x * mad((float16)weight_y.s3, FourPixels(tap + 3 * stride), sum);
+  const float8 half_sum = sum.lo + sum.hi;
+  return half_sum.lo + half_sum.hi;
+}
+
+// The shares of the four pixels around, those of the surface alone.
+float4 Shares(const Surfaces picture, global const float* disparity, int x, int y, float rest_x,
+              float rest_y, float d) {
+  // Past the last pixel the weight is 0.
   const int there = y * picture.width_px + x;
-  const int stride = picture.width_px + 3;
-  const size_t plane = (size_t)stride * (picture.height_px + 3);
-  global const float* tap = planes + (size_t)y * stride + x;  // at -1, -1
-
-  if (fabs(lowest[there] - d) <= picture.tolerance && fabs(highest[there] - d) <= picture.tolerance) {
-    const float4 weight_x = CatmullRom(rest_x);
-    const float4 weight_y = CatmullRom(rest_y);
-    for (int channel = 0; channel < picture.channels; ++channel, tap += plane) {
-      float4 sum = weight_y.s0 * vload4(0, tap);
-      sum = mad(weight_y.s1, vload4(0, tap + stride), sum);
-      sum = mad(weight_y.s2, vload4(0, tap + 2 * stride), sum);
-      sum = weight_x * mad(weight_y.s3, vload4(0, tap + 3 * stride), sum);
-      values[channel] = (sum.s0 + sum.s1) + (sum.s2 + sum.s3);
-    }
-    return;
-  }
-
-  // The four taps around, those of the surface alone. Past the last pixel the weight is 0.
   const int right = min(x + 1, picture.width_px - 1) - x;
   const int below = (min(y + 1, picture.height_px - 1) - y) * picture.width_px;
   const float4 weight = (float4)((1 - rest_x) * (1 - rest_y), rest_x * (1 - rest_y),
@@ -59,39 +82,105 @@ void WarpSample(const Surfaces picture, global const float* planes, global const
                                     disparity[there + below], disparity[there + below + right]) -
                            d);
   const float4 weighed = select(weight, (float4)(0), away > picture.tolerance);
-  const float4 far = select(away, (float4)(INFINITY), weight == 0);
   float sum_of_weights = 0;
   sum_of_weights += weighed.s0;
   sum_of_weights += weighed.s1;
   sum_of_weights += weighed.s2;
   sum_of_weights += weighed.s3;
-  const float closest = fmin(fmin(far.s0, far.s1), fmin(far.s2, far.s3));
+  if (sum_of_weights > 0) return weighed / sum_of_weights;
   // The first of the closest.
-  const float4 alone = far.s0 == closest   ? (float4)(1, 0, 0, 0)
-                       : far.s1 == closest ? (float4)(0, 1, 0, 0)
-                       : far.s2 == closest ? (float4)(0, 0, 1, 0)
-                                           : (float4)(0, 0, 0, 1);
-  const float4 share = sum_of_weights > 0 ? weighed / sum_of_weights : alone;
-  tap += stride + 1;
-  for (int channel = 0; channel < picture.channels; ++channel, tap += plane) {
-    values[channel] = dot(share, (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
+  const float4 far = select(away, (float4)(INFINITY), weight == 0);
+  const float closest = fmin(fmin(far.s0, far.s1), fmin(far.s2, far.s3));
+  return far.s0 == closest   ? (float4)(1, 0, 0, 0)
+         : far.s1 == closest ? (float4)(0, 1, 0, 0)
+         : far.s2 == closest ? (float4)(0, 0, 1, 0)
+                             : (float4)(0, 0, 0, 1);
+}
+
+// The first `count` of four channels.
+void StoreChannels(float4 channels, int count, global float* to) {
+  if (count >= 4) {
+    vstore4(channels, 0, to);
+  } else if (count == 3) {
+    vstore3(channels.xyz, 0, to);
+  } else if (count == 2) {
+    vstore2(channels.xy, 0, to);
+  } else {
+    *to = channels.x;
   }
 }
 
-// One item LANES samples of a row: see filter.cl.
-kernel void WarpView(const Surfaces picture, global const float* planes,
-                     global const float* disparity, global const float* lowest,
-                     global const float* highest, global const float* view_disparity,
-                     global const float* source_x, global const float* source_y,
-                     global float* values) {
+// The first `count` of LANES samples, the last of these repeated.
+FLOATS LoadSamples(global const float* from, int count) {
+  if (count == LANES) return LOAD_LANES(from);
+  float padded[LANES];
+  for (int lane = 0; lane < LANES; ++lane) padded[lane] = from[min(lane, count - 1)];
+  return LOAD_LANES(padded);
+}
+
+// One item LANES samples of a row: see filter.cl. `ranges`: the least and the largest of the
+// disparities around each pixel.
+kernel void WarpView(const Surfaces picture, global const float* pixels,
+                     global const float* disparity, global const float2* ranges,
+                     global const float* view_disparity, global const float* source_x,
+                     global const float* source_y, global float* values) {
   const int items_in_row = (picture.width_px + LANES - 1) / LANES;
-  const int y = (int)get_global_id(0) / items_in_row;
-  if (y >= picture.height_px) return;
+  const int row = (int)get_global_id(0) / items_in_row;
+  if (row >= picture.height_px) return;
   const int first = (int)get_global_id(0) % items_in_row * LANES;
-  const int last = min(first + LANES, picture.width_px);
-  for (int x = first; x < last; ++x) {
-    const int sample = y * picture.width_px + x;
-    WarpSample(picture, planes, disparity, lowest, highest, x, y, view_disparity[sample],
-               source_x[sample], source_y[sample], values + (size_t)sample * picture.channels);
+  const int count = min(LANES, picture.width_px - first);
+  const size_t sample = (size_t)row * picture.width_px + first;
+  view_disparity += sample;
+  values += sample * picture.channels;
+
+  FLOATS rests_x, rests_y;
+  int pixel_x[LANES], pixel_y[LANES];
+  float rest_x[LANES], rest_y[LANES];
+  STORE_LANES(PixelsBefore((WHOLE)first + ORDER, LoadSamples(source_x + sample, count),
+                           picture.width_px, picture.limit_px, &rests_x),
+              pixel_x);
+  STORE_LANES(PixelsBefore((WHOLE)row, LoadSamples(source_y + sample, count), picture.height_px,
+                           picture.limit_px, &rests_y),
+              pixel_y);
+  STORE_LANES(rests_x, rest_x);
+  STORE_LANES(rests_y, rest_y);
+
+  const int stride = picture.width_px + 3;
+  const int plane = stride * (picture.height_px + 3);
+  for (int lane = 0; lane < count; ++lane, values += picture.channels) {
+    const int x = pixel_x[lane];
+    const int y = pixel_y[lane];
+    const float d = view_disparity[lane];
+    const float2 range = ranges[y * picture.width_px + x];
+    const bool is_cubic =
+        fabs(range.s0 - d) <= picture.tolerance && fabs(range.s1 - d) <= picture.tolerance;
+    if (picture.channels == 1) {
+      global const float* tap = pixels + y * stride + x;  // at -1, -1
+      if (is_cubic) {
+        *values = BicubicOfOne(tap, stride, CatmullRom(rest_x[lane]), CatmullRom(rest_y[lane]));
+        continue;
+      }
+      tap += stride + 1;
+      *values = dot(Shares(picture, disparity, x, y, rest_x[lane], rest_y[lane], d),
+                    (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
+      continue;
+    }
+    global const float4* tap = (global const float4*)pixels + y * stride + x;
+    if (is_cubic) {
+      const float16 weight_x = CatmullRomOfFour(rest_x[lane]);
+      const float4 weight_y = CatmullRom(rest_y[lane]);
+      for (int c = 0; c < picture.channels; c += 4, tap += plane) {
+        StoreChannels(BicubicOfFour(tap, stride, weight_x, weight_y), picture.channels - c,
+                      values + c);
+      }
+      continue;
+    }
+    const float4 share = Shares(picture, disparity, x, y, rest_x[lane], rest_y[lane], d);
+    tap += stride + 1;
+    for (int c = 0; c < picture.channels; c += 4, tap += plane) {
+      StoreChannels(share.s0 * tap[0] + share.s1 * tap[1] + share.s2 * tap[stride] +
+                        share.s3 * tap[stride + 1],
+                    picture.channels - c, values + c);
+    }
   }
 }
