@@ -192,29 +192,29 @@ CompactView DisparityRenderer::RenderCompact(double a, double b) const {
 }
 
 ViewDisparity DisparityRenderer::Render(double a, double b) const {
-  return Expanded(RenderCompact(a, b));
+  ViewDisparity view;
+  Expand(RenderCompact(a, b), &view);
+  return view;
 }
 
-ViewDisparity Expanded(CompactView compact) {
-  ViewDisparity view;
-  view.width_px = compact.width_px;
-  view.height_px = compact.height_px;
-  view.disparity = std::move(compact.disparity);
-  view.seen.assign(view.disparity.size(), Seen::kSeen);
-  view.source_x.resize(view.disparity.size());
-  view.source_y.resize(view.disparity.size());
-  for (std::size_t i = 0; i < view.disparity.size(); ++i) {
-    view.source_x[i] = static_cast<float>(compact.shift.x() * view.disparity[i]);
-    view.source_y[i] = static_cast<float>(compact.shift.y() * view.disparity[i]);
+void Expand(const CompactView& compact, ViewDisparity* view) {
+  view->width_px = compact.width_px;
+  view->height_px = compact.height_px;
+  view->disparity = compact.disparity;
+  view->seen.assign(view->disparity.size(), Seen::kSeen);
+  view->source_x.resize(view->disparity.size());
+  view->source_y.resize(view->disparity.size());
+  for (std::size_t i = 0; i < view->disparity.size(); ++i) {
+    view->source_x[i] = static_cast<float>(compact.shift.x() * view->disparity[i]);
+    view->source_y[i] = static_cast<float>(compact.shift.y() * view->disparity[i]);
   }
   for (const CompactView::Hidden& hidden : compact.hidden) {
     const std::size_t i = Index(hidden.index);
-    view.disparity[i] = hidden.disparity;
-    view.seen[i] = Seen::kHidden;
-    view.source_x[i] = hidden.source_x;
-    view.source_y[i] = hidden.source_y;
+    view->disparity[i] = hidden.disparity;
+    view->seen[i] = Seen::kHidden;
+    view->source_x[i] = hidden.source_x;
+    view->source_y[i] = hidden.source_y;
   }
-  return view;
 }
 
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b) {

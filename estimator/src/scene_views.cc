@@ -12,6 +12,28 @@
 namespace thicklens::estimator {
 namespace {
 
+// Objects whose memory can be taken again, by many threads: what is new to the process costs more
+// than a view.
+template <typename T>
+class Spare {
+ public:
+  T Take() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (spare_.empty()) return {};
+    T object = std::move(spare_.back());
+    spare_.pop_back();
+    return object;
+  }
+  void Give(T object) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    spare_.push_back(std::move(object));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<T> spare_;
+};
+
 // Views of one picture, on a device or on the processor; by many threads.
 class ViewMaker {
  public:
@@ -28,11 +50,15 @@ class ViewMaker {
 
   void Make(const CompactView& view, model::LinearPicture* made) {
     if (native_) return native_->Warp(view, made);
-    const ViewDisparity whole = Expanded(view);
+    ViewDisparity whole = spare_.Take();
+    Expand(view, &whole);
     *made = {picture_.width_px, picture_.height_px, picture_.channels, std::move(made->values)};
     made->values.resize(picture_.values.size());
-    const std::lock_guard<std::mutex> lock(mutex_);  // a device has one queue
-    on_device_->Warp({&whole.disparity, &whole.source_x, &whole.source_y}, &made->values);
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);  // a device has one queue
+      on_device_->Warp({&whole.disparity, &whole.source_x, &whole.source_y}, &made->values);
+    }
+    spare_.Give(std::move(whole));
   }
 
  private:
@@ -40,27 +66,7 @@ class ViewMaker {
   std::optional<PictureWarper> native_;
   std::unique_ptr<kernels::ViewWarp> on_device_;
   std::mutex mutex_;
-};
-
-// Pictures whose memory can be taken again, by many threads: what is new to the process costs more
-// than a view.
-class SparePictures {
- public:
-  model::LinearPicture Take() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (spare_.empty()) return {};
-    model::LinearPicture picture = std::move(spare_.back());
-    spare_.pop_back();
-    return picture;
-  }
-  void Give(model::LinearPicture picture) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    spare_.push_back(std::move(picture));
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<model::LinearPicture> spare_;
+  Spare<ViewDisparity> spare_;
 };
 
 }  // namespace
@@ -72,7 +78,7 @@ void ShowInAllViews(const EstimateInput& input, const SolvedScene& solved, int t
   const auto v_count = static_cast<int>(input.weights.rows());
   const DisparityRenderer renderer(input.disparity);
   ViewMaker maker(solved.radiance, input.disparity, backend);
-  SparePictures spare;
+  Spare<model::LinearPicture> spare;
   model::ParallelFor(u_count * v_count, threads, [&](int view) {
     const int k = view % u_count, l = view / u_count;
     const double a = k - (u_count - 1) / 2.0, b = l - (v_count - 1) / 2.0;

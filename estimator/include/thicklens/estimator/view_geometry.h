@@ -82,7 +82,8 @@ struct CompactView {
   std::vector<Hidden> hidden;    // by index
 };
 
-ViewDisparity Expanded(CompactView view);
+// Sets `view`, in the memory that it has where that is enough.
+void Expand(const CompactView& compact, ViewDisparity* view);
 
 // The disparity rendered into the view at (a, b) steps: every 2 x 2 cell of centre pixels whose
 // disparities differ by at most .2 px per view step is two triangles at (x - a d, y - b d), and
