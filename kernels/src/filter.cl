@@ -96,20 +96,12 @@ REAL4 FourOf(global const REAL* x, int plane, int channel, int channels) {
   return values;
 }
 
-// One item a pixel.
-kernel void TakePixels(const Layout layout, const int channel, const int channels,
-                       global const REAL* x, global REAL4* values) {
-  const int p = (int)get_global_id(0);
-  if (p >= layout.plane) return;
-  values[p] = FourOf(x + layout.margin + p, layout.plane, channel, channels);
-}
-
-// One item a row: of its pixel.
-kernel void TakeRows(const Layout layout, const int channel, const int channels, const int rows,
-                     global const int* pixel, global const REAL* y, global REAL4* values) {
-  const int row = (int)get_global_id(0);
-  if (row >= rows) return;
-  values[row] = FourOf(y + layout.margin + pixel[row], layout.plane, channel, channels);
+// One item a pixel of the list.
+kernel void TakePixels(const Layout layout, const int channel, const int channels, const int count,
+                       global const int* pixel, global const REAL* x, global REAL4* values) {
+  const int i = (int)get_global_id(0);
+  if (i >= count) return;
+  values[i] = FourOf(x + layout.margin + pixel[i], layout.plane, channel, channels);
 }
 
 // y(pixel) += sum_e weight_e values(index_e), or that times `picture_weight` of the pixel if it is

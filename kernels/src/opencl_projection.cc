@@ -12,6 +12,26 @@ constexpr int kTogether = 4;  // channels of a row's entry
 // neighbour.
 constexpr int kLeastMargin = 64;
 
+// The pixels that rows read, as places on the plane, ascending; and of each pixel of the picture
+// its place among them.
+struct ReadPixels {
+  std::vector<std::int32_t> pixel, place_of;
+};
+template <typename Real>
+ReadPixels ReadPixelsOf(const PixelRows<Real>& rows, const PackedPlane& plane) {
+  ReadPixels read;
+  const std::vector<std::int32_t> places = PackedPlaces(plane);
+  std::vector<char> is_read(places.size(), 0);
+  for (const std::int32_t index : rows.index) is_read[Index(index)] = 1;
+  read.place_of.assign(places.size(), -1);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (is_read[i] == 0) continue;
+    read.place_of[i] = static_cast<std::int32_t>(read.pixel.size());
+    read.pixel.push_back(places[i]);
+  }
+  return read;
+}
+
 template <typename Plain>
 DeviceMemory Copied(OpenClQueue* queue, const std::string& what, const std::vector<Plain>& array) {
   DeviceMemory memory(queue, what, array.size() * sizeof(Plain));
@@ -81,8 +101,11 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
   layout_.plane = static_cast<cl_int>(plane.size());
   layout_.margin = (reach + 2 * kLeastMargin - 1) / kLeastMargin * kLeastMargin;
 
-  const PackedRows<Real> packed = Pack(rows, PackedPlaces(plane), plane, form.slice, data.threads);
+  const ReadPixels read = ReadPixelsOf(rows, plane);
+  const PackedRows<Real> packed = Pack(rows, read.place_of, plane, form.slice, data.threads);
   rows_ = std::make_unique<Rows>(ToDevice(packed));
+  read_ = std::make_unique<Pixels>(Pixels{static_cast<int>(read.pixel.size()),
+                                          Copied(queue, "pixels that rows read", read.pixel)});
   // Which of the rows a pixel has.
   std::vector<std::int32_t> row_of(Index(data.width_px) * Index(data.height_px), 0);
   for (std::size_t i = 0; i < packed.order.size(); ++i) {
@@ -96,7 +119,7 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
   const std::size_t together = kTogether * sizeof(Real);
   if (rows_->count == 0) return;
   of_pixels_ =
-      std::make_unique<DeviceMemory>(queue, "pixels for rows", together * Index(layout_.plane));
+      std::make_unique<DeviceMemory>(queue, "pixels for rows", together * Index(read_->count));
   of_rows_ =
       std::make_unique<DeviceMemory>(queue, "pixels of rows", together * Index(rows_->count));
 }
@@ -158,6 +181,21 @@ void OpenClProjection<Real>::Add(const Rows& rows, const DeviceMemory& values, i
 }
 
 template <typename Real>
+void OpenClProjection<Real>::Take(const DevicePicture<Real>& from, int channel, int channels,
+                                  int count, const DeviceMemory& pixel, const DeviceMemory& to) {
+  if (count == 0) return;
+  OpenClCall(queue_, "TakePixels")
+      .Value(layout_)
+      .Value(cl_int{channel})
+      .Value(cl_int{channels})
+      .Value(cl_int{count})
+      .OnDevice(pixel)
+      .OnDevice(from.memory())
+      .OnDevice(to)
+      .Enqueue(Index(count));
+}
+
+template <typename Real>
 void OpenClProjection<Real>::Apply(const DevicePicture<Real>& x, int channels,
                                    const DevicePicture<Real>* weight, DevicePicture<Real>* y) {
   if (products_.empty()) y->Clear();
@@ -166,13 +204,7 @@ void OpenClProjection<Real>::Apply(const DevicePicture<Real>& x, int channels,
     Run(products_[i].down, *between_, channels, weight, i > 0, y);
   }
   for (int channel = 0; rows_->count > 0 && channel < channels; channel += kTogether) {
-    OpenClCall(queue_, "TakePixels")
-        .Value(layout_)
-        .Value(cl_int{channel})
-        .Value(cl_int{channels})
-        .OnDevice(x.memory())
-        .OnDevice(*of_pixels_)
-        .Enqueue(Index(layout_.plane));
+    Take(x, channel, channels, read_->count, read_->pixel, *of_pixels_);
     Add(*rows_, *of_pixels_, channel, channels, weight, y);
   }
 }
@@ -186,15 +218,7 @@ void OpenClProjection<Real>::ApplyTransposed(const DevicePicture<Real>& y, int c
     Run(products_[i].across_transposed, *between_, channels, nullptr, i > 0, x);
   }
   for (int channel = 0; rows_->count > 0 && channel < channels; channel += kTogether) {
-    OpenClCall(queue_, "TakeRows")
-        .Value(layout_)
-        .Value(cl_int{channel})
-        .Value(cl_int{channels})
-        .Value(cl_int{rows_->count})
-        .OnDevice(rows_->pixel)
-        .OnDevice(y.memory())
-        .OnDevice(*of_rows_)
-        .Enqueue(Index(rows_->count));
+    Take(y, channel, channels, rows_->count, rows_->pixel, *of_rows_);
     Add(*rows_transposed_, *of_rows_, channel, channels, nullptr, x);
   }
 }

@@ -67,6 +67,10 @@ class OpenClProjection {
     int count = 0;
     DeviceMemory pixel, start, index, weight;
   };
+  struct Pixels {
+    int count = 0;
+    DeviceMemory pixel;
+  };
   Filter ToDevice(const PackedFilter<Real>& packed, int step);
   Rows ToDevice(const PackedRows<Real>& packed);
   void Run(const Filter& filter, const DevicePicture<Real>& x, int channels,
@@ -74,13 +78,18 @@ class OpenClProjection {
   void Add(const Rows& rows, const DeviceMemory& values, int channel, int channels,
            const DevicePicture<Real>* weight, DevicePicture<Real>* y);
 
+  // Four channels of those pixels.
+  void Take(const DevicePicture<Real>& from, int channel, int channels, int count,
+            const DeviceMemory& pixel, const DeviceMemory& to);
+
   OpenClQueue* queue_;
   ItemForm form_;
   PictureLayout layout_;
   std::vector<Product> products_;
   std::unique_ptr<Rows> rows_, rows_transposed_;
+  std::unique_ptr<Pixels> read_;  // by rows
   std::unique_ptr<DevicePicture<Real>> between_;
-  // Four channels beside each other, of all pixels and of the pixels that have rows.
+  // Four channels beside each other, of the pixels that rows read and of those that have rows.
   std::unique_ptr<DeviceMemory> of_pixels_, of_rows_;
 };
 
