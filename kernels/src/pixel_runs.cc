@@ -17,6 +17,7 @@ namespace {
 constexpr std::int64_t kLeastRuns = 1 << 14;
 constexpr int kLeastRowsOfAThread = 512;
 constexpr int kLeastCopiedPx = 16384;  // by a thread
+constexpr int kPartPx = 64;            // parts of a row are made of so many
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
@@ -34,52 +35,93 @@ std::size_t FirstRow(const PixelRuns<Real>& runs, int part, int parts) {
   return static_cast<std::size_t>(row - runs.run.begin());
 }
 
-// A copy of planes with the rows that runs read.
+// A copy of planes in rows as runs read them, of the parts alone that they do read.
 template <typename Real>
 class SpacedPlanes {
  public:
   SpacedPlanes(const PixelRuns<Real>& runs, int channels, int threads)
-      : width_(runs.width_px),
-        height_(runs.height_px),
-        row_(runs.stride_px()),
-        threads_(BandCount(height_, threads, kLeastCopiedPx / std::max(1, width_))),
-        values_(new Real[Index(channels) * Index(stride())]) {}
+      : runs_(runs), row_(runs.stride_px()), values_(new Real[Index(channels) * Index(stride())]) {
+    std::int64_t pixels = 0;
+    for (const auto& part : runs.read) pixels += part.last - part.first;
+    threads_ = static_cast<int>(
+        std::clamp<std::int64_t>(pixels / kLeastCopiedPx, 1, std::max(1, threads)));
+  }
 
-  std::ptrdiff_t stride() const { return std::ptrdiff_t{row_} * height_; }
+  std::ptrdiff_t stride() const { return std::ptrdiff_t{row_} * runs_.height_px; }
   Real* values() { return values_.get(); }
 
   void Copy(const Real* planes, std::ptrdiff_t plane_stride, int channels) {
-    ForRows(channels, [&](int channel, int y, Real* row) {
-      const Real* from = planes + channel * plane_stride + std::ptrdiff_t{y} * width_;
-      std::copy_n(from, width_, row);
-      std::fill(row + width_, row + row_, Real{0});
+    ForParts(channels, [&](int channel, std::ptrdiff_t pixel, int count, int beyond, Real* part) {
+      std::copy_n(planes + channel * plane_stride + pixel, count, part);
+      std::fill_n(part + count, beyond, Real{0});
     });
   }
   void Clear(int channels) {
-    ForRows(channels, [&](int, int, Real* row) { std::fill(row, row + row_, Real{0}); });
+    ForParts(channels, [&](int, std::ptrdiff_t, int count, int beyond, Real* part) {
+      std::fill_n(part, count + beyond, Real{0});
+    });
   }
   void AddTo(Real* planes, std::ptrdiff_t plane_stride, int channels) {
-    ForRows(channels, [&](int channel, int y, const Real* row) {
-      Real* to = planes + channel * plane_stride + std::ptrdiff_t{y} * width_;
-      for (int x = 0; x < width_; ++x) to[x] += row[x];
+    ForParts(channels, [&](int channel, std::ptrdiff_t pixel, int count, int, const Real* part) {
+      Real* to = planes + channel * plane_stride + pixel;
+      for (int i = 0; i < count; ++i) to[i] += part[i];
     });
   }
 
  private:
+  // work(channel, pixel, count, beyond, part): `count` pixels of the picture from `pixel` on, and
+  // `beyond` places past the end of its row.
   template <typename Work>
-  void ForRows(int channels, const Work& work) {
-    ForBands(height_, threads_, [&](int, int first, int last) {
+  void ForParts(int channels, const Work& work) {
+    ForBands(static_cast<int>(runs_.read.size()), threads_, [&](int, int first, int last) {
       for (int channel = 0; channel < channels; ++channel) {
-        for (int y = first; y < last; ++y) {
-          work(channel, y, values() + channel * stride() + std::ptrdiff_t{y} * row_);
+        for (int i = first; i < last; ++i) {
+          const auto& part = runs_.read[Index(i)];
+          const int y = part.first / row_;
+          const int x = part.first % row_;
+          const int places = part.last - part.first;
+          const int count = std::clamp(runs_.width_px - x, 0, places);
+          work(channel, std::ptrdiff_t{y} * runs_.width_px + x, count, places - count,
+               values() + channel * stride() + part.first);
         }
       }
     });
   }
 
-  const int width_, height_, row_, threads_;
+  const PixelRuns<Real>& runs_;
+  const int row_;
+  int threads_ = 1;
   const std::unique_ptr<Real[]> values_;
 };
+
+template <typename Real>
+void SetRead(PixelRuns<Real>* runs) {
+  const int stride = runs->stride_px();
+  const int of_row = (stride + kPartPx - 1) / kPartPx;
+  std::vector<char> is_read(Index(of_row) * Index(runs->height_px), 0);
+  std::int32_t y = 0;
+  for (const std::int32_t index : runs->index) {
+    const std::int32_t x = index - y * stride;
+    if (x < 0 || x >= stride) y = index / stride;
+    char* const row = is_read.data() + std::ptrdiff_t{y} * of_row;
+    row[(index - y * stride) / kPartPx] = 1;
+    row[(index - y * stride + kPixelsOfRun - 1) / kPartPx] = 1;
+  }
+  runs->read.clear();
+  for (y = 0; y < runs->height_px; ++y) {
+    const char* const row = is_read.data() + std::ptrdiff_t{y} * of_row;
+    for (int i = 0; i < of_row; ++i) {
+      if (row[i] == 0) continue;
+      const std::int32_t first = y * stride + i * kPartPx;
+      const std::int32_t last = y * stride + std::min((i + 1) * kPartPx, stride);
+      if (i > 0 && row[i - 1] != 0) {
+        runs->read.back().last = last;
+      } else {
+        runs->read.push_back({first, last});
+      }
+    }
+  }
+}
 
 }  // namespace
 
@@ -108,6 +150,7 @@ void SetBands(PixelRuns<Real>* runs) {
     }
   }
   if (rows > 0) runs->band.push_back(rows);
+  SetRead(runs);
 }
 
 template <typename Real>

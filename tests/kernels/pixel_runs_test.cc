@@ -30,10 +30,11 @@ class PixelRunsTest : public ::testing::Test {
 using Reals = ::testing::Types<float, double>;
 TYPED_TEST_SUITE(PixelRunsTest, Reals);
 
-// Rows with 0 to 12 runs that begin at most `reach` rows above or below their pixel, anywhere in
-// the row; some overlap.
+// Two thirds of the pixels have rows, or few, with 0 to 12 runs that begin at most `reach` rows
+// above or below their pixel, anywhere in the row; some overlap.
 template <typename Real>
-PixelRuns<Real> RandomRuns(int width_px, int height_px, int reach, std::uint32_t seed) {
+PixelRuns<Real> RandomRuns(int width_px, int height_px, int reach, std::uint32_t seed,
+                           bool few = false) {
   PixelRuns<Real> runs;
   runs.width_px = width_px;
   runs.height_px = height_px;
@@ -41,7 +42,7 @@ PixelRuns<Real> RandomRuns(int width_px, int height_px, int reach, std::uint32_t
   std::mt19937 random(seed);
   std::uniform_real_distribution<Real> value(-1, 1);
   for (int p = 0; p < width_px * height_px; ++p) {
-    if (random() % 3 == 0) continue;
+    if (few ? random() % 1000 != 0 : random() % 3 == 0) continue;
     runs.pixel.push_back(p);
     for (auto count = random() % 13; count > 0; --count) {
       const int row = p / width_px - reach + static_cast<int>(random() % (2u * Index(reach) + 1));
@@ -73,10 +74,10 @@ void ForWeights(const PixelRuns<Real>& runs, const Use& use) {
 
 TYPED_TEST(PixelRunsTest, RunsAreThePlainSum) {
   std::uint32_t seed = 100;
-  for (const int width : {1, 5, 8, 63, 64, 130}) {
+  for (const int width : {1, 5, 8, 63, 64, 130, 500}) {
     for (const int channels : {1, 2, 3, 4, 5, 7}) {
       const int pixels = 5 * width;
-      const auto runs = RandomRuns<TypeParam>(width, 5, 2, ++seed);
+      const auto runs = RandomRuns<TypeParam>(width, 5, 2, ++seed, width > 130);
       const auto x = RandomPlanes<TypeParam>(pixels, 1, channels, ++seed);
       Planes<TypeParam> y(pixels, 1, channels, kUntouched);
       Planes<TypeParam> back = y;
@@ -122,6 +123,30 @@ TYPED_TEST(PixelRunsTest, EveryOtherBandReadsOtherPixels) {
     ASSERT_LE(bands.size(), 2u);
     if (!bands.empty()) {
       ASSERT_LE(*bands.rbegin() - *bands.begin(), 1u);
+    }
+  }
+}
+
+TYPED_TEST(PixelRunsTest, TellsWhatIsRead) {
+  for (const bool few : {false, true}) {
+    const auto runs = RandomRuns<TypeParam>(500, 20, 3, 9, few);
+    const int stride = runs.stride_px();
+    std::vector<bool> is_read(Index(stride) * 20, false);
+    std::int32_t end = 0;
+    for (const auto& part : runs.read) {
+      ASSERT_GE(part.first, end);
+      ASSERT_GT(part.last, part.first);
+      ASSERT_EQ(part.first / stride, (part.last - 1) / stride);
+      std::fill(is_read.begin() + part.first, is_read.begin() + part.last, true);
+      end = part.last;
+    }
+    for (const std::int32_t index : runs.index) {
+      for (int i = 0; i < kPixelsOfRun; ++i) ASSERT_TRUE(is_read[Index(index + i)]);
+    }
+    const auto count = std::count(is_read.begin(), is_read.end(), true);
+    if (few) {
+      EXPECT_FALSE(runs.index.empty());
+      EXPECT_LT(count, stride * 20 / 2);
     }
   }
 }

@@ -80,12 +80,17 @@ struct PixelRuns {
   std::vector<Real, UntouchedAllocator<Real>> weight;
   // First rows of bands, and the end: two bands that have one between them read different pixels.
   std::vector<std::size_t> band;
+  // The parts of the copy that runs read, each in one row of it, ascending; some pixels more.
+  struct Part {
+    std::int32_t first = 0, last = 0;  // indices of pixels: [first, last)
+  };
+  std::vector<Part> read;
 
   // Every row has room behind it for a run that begins in it; and an odd number of parts of 64
   // bytes (of floats), so that rows and planes do not meet in one place of a cache.
   int stride_px() const { return ((width_px + kPixelsOfRun + 15) / 16 | 1) * 16; }
 };
-// From all but the bands, which it sets.
+// From all but the bands and the parts that are read, which it sets.
 template <typename Real>
 void SetBands(PixelRuns<Real>* runs);
 // One form from the other: entries that follow each other share a run; weights of 0 are left out.
