@@ -45,6 +45,28 @@ double SpreadOf(const Eigen::ArrayXd& weights) {
 }  // namespace
 
 template <typename Real>
+DataTerm<Real> DataTermOf(const SceneProjection<Real>& projection,
+                          const model::LinearPicture& photograph, int threads) {
+  DataTerm<Real> data;
+  data.width_px = photograph.width_px;
+  data.height_px = photograph.height_px;
+  data.channels = photograph.channels;
+  data.threads = threads;
+  data.projection.apply = [&projection](const Real* x, int channels, Real* y) {
+    projection.Apply(x, channels, y);
+  };
+  data.projection.apply_transposed = [&projection](const Real* y, int channels, Real* x) {
+    projection.ApplyTransposed(y, channels, x);
+  };
+  for (const auto& term : projection.terms) {
+    data.filters.products.push_back({&term.across, &term.down});
+  }
+  data.filters.rows = &projection.rows;
+  data.photograph = Planar<Real>(photograph);
+  return data;
+}
+
+template <typename Real>
 std::vector<Real> Planar(const model::LinearPicture& picture) {
   const std::size_t channels = Index(picture.channels);
   const std::size_t pixels = picture.values.size() / channels;
@@ -142,13 +164,15 @@ StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Re
   return residual;
 }
 
-#define THICKLENS_SCENE_DATA(Real)                                                            \
-  template std::vector<Real> Planar(const model::LinearPicture&);                             \
-  template model::LinearPicture Interleaved(const std::vector<Real>&, int, int, int);         \
-  template std::vector<Real> SquaredRows(const DisparityMap&, const Eigen::ArrayXXd&);        \
-  template std::vector<Real> DataWeights(const std::vector<Real>&, const std::vector<float>&, \
-                                         bool);                                               \
-  template StoredResidual StoredResidualOf(const DataTerm<Real>&, const std::vector<Real>&,   \
+#define THICKLENS_SCENE_DATA(Real)                                                              \
+  template DataTerm<Real> DataTermOf(const SceneProjection<Real>&, const model::LinearPicture&, \
+                                     int);                                                      \
+  template std::vector<Real> Planar(const model::LinearPicture&);                               \
+  template model::LinearPicture Interleaved(const std::vector<Real>&, int, int, int);           \
+  template std::vector<Real> SquaredRows(const DisparityMap&, const Eigen::ArrayXXd&);          \
+  template std::vector<Real> DataWeights(const std::vector<Real>&, const std::vector<float>&,   \
+                                         bool);                                                 \
+  template StoredResidual StoredResidualOf(const DataTerm<Real>&, const std::vector<Real>&,     \
                                            const model::TransferCurve&, int, int);
 THICKLENS_SCENE_DATA(float)
 THICKLENS_SCENE_DATA(double)

@@ -11,6 +11,12 @@
 
 namespace thicklens::estimator {
 
+// H and I of a photograph; weights and squared rows are still to be set. `projection` is kept by
+// reference.
+template <typename Real>
+DataTerm<Real> DataTermOf(const SceneProjection<Real>& projection,
+                          const model::LinearPicture& photograph, int threads);
+
 // Channel after channel, from interleaved pixels, and back.
 template <typename Real>
 std::vector<Real> Planar(const model::LinearPicture& picture);

@@ -105,21 +105,7 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph, Dispar
   projection_ = MakeSceneProjection<Real>(disparity_, run_.input.weights, projection);
   ReturnFreedMemory();
 
-  data_.width_px = photograph.width_px;
-  data_.height_px = photograph.height_px;
-  data_.channels = photograph.channels;
-  data_.threads = run_.threads;
-  data_.projection.apply = [this](const Real* x, int channels, Real* y) {
-    projection_.Apply(x, channels, y);
-  };
-  data_.projection.apply_transposed = [this](const Real* y, int channels, Real* x) {
-    projection_.ApplyTransposed(y, channels, x);
-  };
-  for (const auto& term : projection_.terms) {
-    data_.filters.products.push_back({&term.across, &term.down});
-  }
-  data_.filters.rows = &projection_.rows;
-  data_.photograph = Planar<Real>(photograph);
+  data_ = DataTermOf(projection_, photograph, run_.threads);
   slope_squared_ = SlopeSquared(photograph);
   data_.weight = DataWeights(slope_squared_, projection_.hidden_share, run_.options.hidden_weights);
   data_.squared_row = SquaredRows<Real>(disparity_, run_.input.weights);

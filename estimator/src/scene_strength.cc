@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <random>
 
 namespace thicklens::estimator {
@@ -26,9 +27,14 @@ std::vector<Real> Probe(std::size_t count) {
 
 }  // namespace
 
+double ValidationScore(double misfit, double trace) {
+  const double left = 1 - kTraceFactor * trace;
+  return left > 0 ? misfit / (left * left) : std::numeric_limits<double>::infinity();
+}
+
 template <typename Real>
-double CrossValidation(const DataTerm<Real>& data, const std::vector<Real>& radiance,
-                       const RadianceLimits& limits, SceneSystem<Real>* system, int* iterations) {
+std::vector<Real> ProbedTrace(const DataTerm<Real>& data, const RadianceLimits& limits,
+                              SceneSystem<Real>* system, int* iterations) {
   const std::vector<Real> probe = Probe<Real>(data.pixels());
   CgLimits cg;
   cg.tolerance = kProbeTolerance;
@@ -37,14 +43,19 @@ double CrossValidation(const DataTerm<Real>& data, const std::vector<Real>& radi
   std::vector<Real> answer, shown(data.pixels());
   *iterations += system->SolveWhitened(probe, cg, &answer).iterations;
   data.projection.apply(answer.data(), 1, shown.data());
-  double trace = 0;
   for (std::size_t i = 0; i < probe.size(); ++i) {
-    trace += static_cast<double>(probe[i]) * std::sqrt(static_cast<double>(data.weight[i])) *
-             static_cast<double>(shown[i]);
+    shown[i] *= probe[i] * std::sqrt(data.weight[i]);
   }
-  const double left = 1 - kTraceFactor * trace / static_cast<double>(data.pixels());
-  if (!(left > 0)) return std::numeric_limits<double>::infinity();
-  return system->DataMisfit(radiance) / static_cast<double>(radiance.size()) / (left * left);
+  return shown;
+}
+
+template <typename Real>
+double CrossValidation(const DataTerm<Real>& data, const std::vector<Real>& radiance,
+                       const RadianceLimits& limits, SceneSystem<Real>* system, int* iterations) {
+  const std::vector<Real> of_pixels = ProbedTrace(data, limits, system, iterations);
+  const double trace = std::accumulate(of_pixels.begin(), of_pixels.end(), 0.0);
+  return ValidationScore(system->DataMisfit(radiance) / static_cast<double>(radiance.size()),
+                         trace / static_cast<double>(data.pixels()));
 }
 
 template <typename Real>
@@ -74,6 +85,10 @@ StrengthSearch SearchStrength(Prior prior, double start, const DataTerm<Real>& d
   return search;
 }
 
+template std::vector<float> ProbedTrace(const DataTerm<float>&, const RadianceLimits&,
+                                        SceneSystem<float>*, int*);
+template std::vector<double> ProbedTrace(const DataTerm<double>&, const RadianceLimits&,
+                                         SceneSystem<double>*, int*);
 template double CrossValidation(const DataTerm<float>&, const std::vector<float>&,
                                 const RadianceLimits&, SceneSystem<float>*, int*);
 template double CrossValidation(const DataTerm<double>&, const std::vector<double>&,
