@@ -525,5 +525,49 @@ TEST_F(EstimateSceneTest, ThreadsDoNotChangeTheViews) {
   EXPECT_EQ(views_with("1"), views_with("3"));
 }
 
+// Waves of 6 px, of which five views 1.2 px apart show nothing in the mean, beside a flat part.
+TEST_F(EstimateSceneTest, ChecksTheBlurWhereItIsAskedTo) {
+  constexpr int kWide = 192, kHigh = 128;
+  model::StoredPicture waves{kWide, kHigh, 1, 8, {}};
+  model::RawDepthMap map{kWide, kHigh, std::vector<float>(kWide * kHigh, 1.2F), false};
+  std::mt19937 engine(3);
+  std::normal_distribution<double> noise(0, 1);
+  for (int i = 0; i < kWide * kHigh; ++i) {
+    const int x = i % kWide;
+    const double wave = x < kWide / 3 ? 0 : 50 * std::sin(2 * 3.14159265 * x / 6);
+    waves.values.push_back(static_cast<std::uint16_t>(std::lround(120 + wave + noise(engine))));
+  }
+  const Arguments sharp = {folder_.Put("waves.png", EncodePng(waves)),
+                           folder_.Put("plane.pfm", EncodePfm(map)),
+                           "--depth-kind",
+                           "disparity",
+                           "--views",
+                           "5x5",
+                           "--threads",
+                           "1"};
+  EXPECT_TRUE(Summary(sharp).at("blur_check").is_null());
+  ProgramResult result;
+  const json summary = Summary(With(sharp, {"--check-blur"}), &result);
+  EXPECT_THAT(result.out, HasSubstr("blur check   "));
+  const json& check = summary.at("blur_check");
+  EXPECT_EQ(check.at("size"), json({kWide, kHigh}));
+  EXPECT_GE(check.at("unexplained_blocks").get<int>(), 16);
+  const json& proposal = check.at("proposal").at("narrower_blur");
+  EXPECT_LT(proposal.at("disparity_scale").get<double>(), 0.9);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("is sharper than"), HasSubstr("--disparity-scale 0.")));
+  EXPECT_THAT(summary.at("warnings").dump(), HasSubstr("is sharper than"));
+  // Proposed, not applied.
+  EXPECT_NEAR(summary.at("disparity").at("max_px").get<double>(), 1.2, 1e-6);
+
+  const json right = Summary(With(Usual(), {"--check-blur"}), &result);
+  EXPECT_TRUE(right.at("blur_check").at("proposal").is_null());
+  EXPECT_THAT(result.err, Not(HasSubstr("sharper")));
+  fs::remove_all(Output());
+  for (const std::string solver : {"blocks", "functional", "grid"}) {
+    EXPECT_THAT(Refusal(With(sharp, {"--check-blur", "--solver", solver}), 2),
+                HasSubstr("--check-blur is of --solver scene"));
+  }
+}
+
 }  // namespace
 }  // namespace thicklens::tools

@@ -69,6 +69,17 @@ estimator::SceneOptions SceneSettings(const EstimateOptions& options,
   return settings;
 }
 
+void CheckBlur(const EstimateOptions& options, const estimator::EstimateInput& input,
+               EstimateOutcome* outcome) {
+  ProgressLine line("checking the blur", options.common.quiet);
+  estimator::BlurCheckOptions settings = BlurCheckOptionsOf(options, [&line](int done, int total) {
+    ThrowIfInterrupted();
+    line.Show(done, total);
+  });
+  if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
+  outcome->blur.emplace(estimator::CheckBlur(input, settings), input, options.depth);
+}
+
 // Views go to the writer as they are made, unless a page is to show them.
 void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& input,
                 const Progress& progress, LightFieldWriter* writer, EstimateOutcome* outcome) {
@@ -78,6 +89,7 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
       ThrowIfInterrupted);
   spdlog::debug("device: {}", backend->description());
   const estimator::SceneOptions settings = SceneSettings(options, input, progress);
+  if (options.check_blur) CheckBlur(options, input, outcome);
   estimator::SceneSummary scene;
   if (!options.report_folder.empty()) {
     outcome->light_field =

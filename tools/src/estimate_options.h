@@ -9,6 +9,7 @@
 
 #include "commands.h"
 #include "light_field_options.h"
+#include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/scene_solver.h"
@@ -37,6 +38,7 @@ struct EstimateOptions {
   std::string format = "png";
   // Of some solvers, as the help says.
   std::optional<std::string> prior, strength;
+  bool check_blur = false;
   std::optional<double> tolerance;
   std::optional<int> max_iterations;
   bool double_precision = false;
@@ -57,6 +59,7 @@ void CheckEstimateUsage(const EstimateOptions& options);
 // What is given, and the solver's defaults else. Throws Error where that is not valid.
 using Progress = std::function<void(int done, int total)>;
 estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress progress);
+estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options, Progress progress);
 estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress progress);
 estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options, Progress progress);
 

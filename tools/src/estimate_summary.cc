@@ -77,7 +77,9 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
                {"hidden_share", scene.hidden_share},
                {"residual_rms", scene.residual_rms},
                {"residual_patches", PatchesJson(outcome.patches)},
-               {"unexplained_share", nullptr}});
+               {"unexplained_share", nullptr},
+               {"blur_check", nullptr}});
+  if (outcome.blur) (*out)["blur_check"] = outcome.blur->Json();
   if (outcome.unexplained_share) (*out)["unexplained_share"] = *outcome.unexplained_share;
 }
 
@@ -265,6 +267,8 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
             ? "are --disparity-scale and --disparity-offset right?"
             : "are the depth's unit, and the camera's aperture and focus, right?"));
   }
+  const std::string blur = outcome.blur ? outcome.blur->Warning() : "";
+  if (!blur.empty()) warnings.push_back(blur);
   return warnings;
 }
 
@@ -333,6 +337,7 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
   text += fmt::format("device       {}, {} thread(s)\n", summary["device"].get<std::string>(),
                       summary["threads"].get<int>());
   text += AccuracyText(outcome);
+  if (outcome.blur) text += fmt::format("blur check   {}\n", outcome.blur->Summary());
   text += ConfidenceText(outcome.confidence);
   text += fmt::format(
       "time         {:.2f} s: set-up {:.2f}, solve {:.2f}, views {:.2f}, files {:.2f}\n",

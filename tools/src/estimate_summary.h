@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "blur_proposal.h"
 #include "estimate_input.h"
 #include "estimate_options.h"
 #include "thicklens/estimator/estimate.h"
@@ -32,6 +33,7 @@ struct EstimateOutcome {
   estimator::SceneMaps maps;  // of `scene`
   std::optional<estimator::EstimateSummary> blocks;
   std::optional<estimator::FunctionalSummary> functional;  // `grid`, too
+  std::optional<BlurProposal> blur;                        // of `scene`, if it was asked for
   EstimateSeconds seconds;
   double clipped_fraction = 0;             // of the values, by the views' files
   estimator::ConfidenceShares confidence;  // of all rays
