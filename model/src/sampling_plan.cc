@@ -27,10 +27,9 @@ double ErrorAt(const EffectPlace& place, const SamplingSpread& spread,
                std::pow(fall, 0.7);
   }
   const double slope = stored_per_light * place.slope;
-  return of_irradiance +
-         std::hypot(0.016 * slope * spread.landing_px,
-                    std::min(0.05 * slope * spread.defocus_px, 0.025 * range)) *
-             std::pow(fall, 0.85);
+  return of_irradiance + std::hypot(0.016 * slope * spread.landing_px,
+                                    std::min(0.05 * slope * spread.defocus_px, 0.025 * range)) *
+                             std::pow(fall, 0.85);
 }
 
 }  // namespace
@@ -44,8 +43,8 @@ double SamplingError(const SceneBlock& block, const SamplingSpread& spread,
   return largest;
 }
 
-int RaysWithin(const SceneBlock& block, const SamplingSpread& spread,
-               const TransferCurve& transfer, double limit, int most) {
+int RaysWithin(const SceneBlock& block, const SamplingSpread& spread, const TransferCurve& transfer,
+               double limit, int most) {
   if (!(limit > 0)) return most;
   for (int rays = kFewest; rays < most; rays *= 2) {
     if (SamplingError(block, spread, transfer, rays) <= limit) return rays;

@@ -24,8 +24,8 @@ double SamplingError(const SceneBlock& block, const SamplingSpread& spread,
 
 // The fewest of 16, 32, 64, .. and `most` whose error is within `limit`; `most` where none is, or
 // the limit is 0.
-int RaysWithin(const SceneBlock& block, const SamplingSpread& spread,
-               const TransferCurve& transfer, double limit, int most);
+int RaysWithin(const SceneBlock& block, const SamplingSpread& spread, const TransferCurve& transfer,
+               double limit, int most);
 
 }  // namespace thicklens::model
 

@@ -43,10 +43,9 @@ ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
                                  const TransferCurve& stored)
     : geometry_(geometry), textures_(textures), survey_(survey), on_(on) {
   // The thin lens of the same focus has K for its image distance.
-  irradiance_distance_mm_ =
-      on.Has(Effect::kThickness)
-          ? options.camera.image_distance_mm()
-          : options.camera.focal_scale_px() * geometry.sensor().pixel_pitch_mm;
+  irradiance_distance_mm_ = on.Has(Effect::kThickness) ? options.camera.image_distance_mm()
+                                                       : options.camera.focal_scale_px() *
+                                                             geometry.sensor().pixel_pitch_mm;
   MakeSets(options, stored);
 }
 
@@ -152,8 +151,8 @@ Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
       const SceneRay ray{prepared.aperture_mm, chief.slope + prepared.slope};
       const Eigen::Array4f light =
           trace ? LightAlong(block, ray) : LightWithoutOcclusion(block, surface, ray);
-      const auto weight = static_cast<float>(
-          falloff ? Irradiance(centre_px + prepared.offset_px, ray) : 1);
+      const auto weight =
+          static_cast<float>(falloff ? Irradiance(centre_px + prepared.offset_px, ray) : 1);
       part += weight * light;
     }
     sum += part.cast<double>();
