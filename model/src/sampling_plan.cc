@@ -14,7 +14,7 @@ double ErrorAt(const EffectPlace& place, const SamplingSpread& spread,
   const double bright = std::clamp(place.bright, dark, 1.0);
   const double fall = static_cast<double>(kFewest) / rays;
   const double of_irradiance =
-      0.05 * 255 *
+      0.06 * 255 *
       (transfer.Encode(bright) - transfer.Encode(bright * (1 - std::min(spread.irradiance, 1.0)))) *
       std::pow(fall, 0.85);
   if (!(bright > dark)) return of_irradiance;
@@ -23,13 +23,14 @@ double ErrorAt(const EffectPlace& place, const SamplingSpread& spread,
   if (place.jump > 0) {
     const double jump = stored_per_light * place.jump;
     return of_irradiance +
-           std::hypot(0.02 * range, std::min(0.05 * jump * spread.defocus_px, 0.06 * range)) *
+           std::hypot(0.026 * range, std::min(0.065 * jump * spread.defocus_px, 0.08 * range)) *
                std::pow(fall, 0.7);
   }
   const double slope = stored_per_light * place.slope;
-  return of_irradiance + std::hypot(0.016 * slope * spread.landing_px,
-                                    std::min(0.05 * slope * spread.defocus_px, 0.025 * range)) *
-                             std::pow(fall, 0.85);
+  const double aside = std::min(0.1 * slope * spread.airy_px, 0.05 * range);
+  const double through = std::min(0.06 * slope * spread.defocus_px, 0.04 * range);
+  return of_irradiance +
+         std::hypot(0.02 * slope * spread.landing_px, through, aside) * std::pow(fall, 0.85);
 }
 
 }  // namespace

@@ -52,9 +52,9 @@ ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
 void ScenePhotograph::MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored) {
   const RaySpread spread = SpreadOf(options, on_);
   SamplingSpread sampling;
-  sampling.landing_px = std::sqrt((spread.box ? 1.0 / 12 : 0) + std::pow(spread.gaussian_px, 2) +
-                                  std::pow(spread.airy_px, 2));
-  if (!spread.aperture && sampling.landing_px == 0) {
+  sampling.landing_px = std::sqrt((spread.box ? 1.0 / 12 : 0) + std::pow(spread.gaussian_px, 2));
+  sampling.airy_px = spread.airy_px;
+  if (!spread.aperture && sampling.landing_px == 0 && spread.airy_px == 0) {
     sets_.push_back(Prepared({PixelRay()}));
     set_of_block_.assign(survey_.blocks().size(), 0);
     return;
@@ -88,14 +88,25 @@ double ScenePhotograph::IrradianceSd(const SceneBlock& block) const {
 }
 
 ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& rays) const {
-  const Eigen::Vector2d& axis_px = geometry_.sensor().principal_point_px;
+  const Sensor& sensor = geometry_.sensor();
+  const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+  const auto count = static_cast<Eigen::Index>(rays.size());
   RaySet set;
+  set.slope_x.resize(count);
+  set.slope_y.resize(count);
+  set.behind_x.resize(count);
+  set.behind_y.resize(count);
   double sum = 0;
   for (const PixelRay& ray : rays) {
+    const auto i = static_cast<Eigen::Index>(set.rays.size());
     PreparedRay prepared;
-    prepared.offset_px = ray.offset_px;
     prepared.aperture_mm = geometry_.aperture_sigma_mm() * ray.aperture;
     prepared.slope = geometry_.RayAt(axis_px + ray.offset_px, prepared.aperture_mm).slope;
+    const Eigen::Vector2d behind_mm = sensor.pixel_pitch_mm * ray.offset_px + prepared.aperture_mm;
+    set.slope_x(i) = static_cast<float>(prepared.slope.x());
+    set.slope_y(i) = static_cast<float>(prepared.slope.y());
+    set.behind_x(i) = static_cast<float>(behind_mm.x());
+    set.behind_y(i) = static_cast<float>(behind_mm.y());
     set.rays.push_back(prepared);
     // (12) fixes its constant k by exposure: uniform radiance 1 gives 1 at the principal point.
     sum += Irradiance(axis_px, geometry_.RayAt(axis_px, prepared.aperture_mm));
@@ -108,6 +119,20 @@ double ScenePhotograph::Irradiance(const Eigen::Vector2d& position_px, const Sce
   const Sensor& sensor = geometry_.sensor();
   return RayIrradiance(ray.slope, sensor.pixel_pitch_mm * (position_px - sensor.principal_point_px),
                        ray.aperture_mm, irradiance_distance_mm_);
+}
+
+// RayIrradiance of all of them at once.
+Eigen::ArrayXf ScenePhotograph::Weights(const RaySet& set, const Eigen::Vector2d& centre_px) const {
+  const Sensor& sensor = geometry_.sensor();
+  const Eigen::Vector2f slope = geometry_.RayAt(centre_px, {0, 0}).slope.cast<float>();
+  const Eigen::Vector2f landing_mm =
+      (sensor.pixel_pitch_mm * (centre_px - sensor.principal_point_px)).cast<float>();
+  const auto per_distance2 =
+      static_cast<float>(1 / (irradiance_distance_mm_ * irradiance_distance_mm_));
+  const auto alpha = 1 + (set.slope_x + slope.x()).square() + (set.slope_y + slope.y()).square();
+  const Eigen::ArrayXf beta = 1 + per_distance2 * ((set.behind_x + landing_mm.x()).square() +
+                                                   (set.behind_y + landing_mm.y()).square());
+  return static_cast<float>(set.exposure) / ((alpha * beta).sqrt() * beta);
 }
 
 Eigen::Array4f ScenePhotograph::LightAlong(const SceneBlock& block, const SceneRay& ray) const {
@@ -141,6 +166,8 @@ Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
   const bool trace = on_.Has(Effect::kOcclusion) || block.layers.size() == 1;
   const PlaneOptions& surface =
       geometry_.layers()[trace ? 0 : geometry_.Trace(chief, block.layers).layer].plane;
+  Eigen::ArrayXf weights;
+  if (falloff) weights = Weights(set, centre_px);
   // In parts: many numbers are not added up in float.
   constexpr std::size_t kPart = 32;
   Eigen::Array4d sum(0, 0, 0, 0);
@@ -151,13 +178,11 @@ Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
       const SceneRay ray{prepared.aperture_mm, chief.slope + prepared.slope};
       const Eigen::Array4f light =
           trace ? LightAlong(block, ray) : LightWithoutOcclusion(block, surface, ray);
-      const auto weight =
-          static_cast<float>(falloff ? Irradiance(centre_px + prepared.offset_px, ray) : 1);
-      part += weight * light;
+      part += falloff ? weights(static_cast<Eigen::Index>(i)) * light : light;
     }
     sum += part.cast<double>();
   }
-  return (falloff ? set.exposure : 1) * sum.head<3>() / static_cast<double>(set.rays.size());
+  return sum.head<3>() / static_cast<double>(set.rays.size());
 }
 
 }  // namespace thicklens::model

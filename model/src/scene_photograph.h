@@ -32,19 +32,23 @@ class ScenePhotograph {
   double sampling_error_grey_levels() const { return sampling_error_; }
 
  private:
+  // Less what the pixel's centre's chief ray has.
   struct PreparedRay {
-    Eigen::Vector2d aperture_mm, offset_px;
-    Eigen::Vector2d slope;  // less that of the pixel's centre's chief ray
+    Eigen::Vector2d aperture_mm, slope;
   };
   struct RaySet {
     std::vector<PreparedRay> rays;
     double exposure = 1;
+    // Of each ray, for its irradiance: slope in front of the lens, and behind it, times d1.
+    Eigen::ArrayXf slope_x, slope_y, behind_x, behind_y;
   };
 
   void MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored);
   RaySet Prepared(const std::vector<PixelRay>& rays) const;
   double IrradianceSd(const SceneBlock& block) const;
   double Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const;
+  // Of all rays of a pixel, 1 in the mean at the principal point.
+  Eigen::ArrayXf Weights(const RaySet& set, const Eigen::Vector2d& centre_px) const;
   Eigen::Array4f LightAlong(const SceneBlock& block, const SceneRay& ray) const;
   Eigen::Array4f LightOf(std::size_t layer, const SceneRay& ray) const;
   Eigen::Array4f LightWithoutOcclusion(const SceneBlock& block, const PlaneOptions& surface,

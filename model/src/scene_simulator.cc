@@ -44,10 +44,10 @@ EffectConditions ConditionsOf(const SceneSimulationOptions& options) {
 }  // namespace
 
 struct SceneSimulator::Impl {
-  Impl(const SceneSimulationOptions& given, const std::vector<LinearPicture>& pictures)
+  Impl(const SceneSimulationOptions& given, const std::vector<LinearPicture>& pictures, int threads)
       : options(Checked(given)), geometry(options) {
-    MakeTextures(pictures);
-    Decide();
+    MakeTextures(pictures, threads);
+    Decide(threads);
     const RaySpread spread = SpreadOf(options, decision.on);
     view_rays = ViewRays(spread.box, spread.gaussian_px);
     photograph.emplace(options, geometry, textures, *survey, decision.on, camera.sensor.transfer);
@@ -59,10 +59,10 @@ struct SceneSimulator::Impl {
     return given;
   }
 
-  void Decide() {
+  void Decide(int threads) {
     const double landing_px =
         0.5 + kFloorDeviations * geometry.floor_px() + kAiryRadii * AddedAiryPx(options);
-    survey.emplace(options.camera, geometry, textures, landing_px);
+    survey.emplace(options.camera, geometry, textures, landing_px, threads);
     EffectChoice choice = options.effects;
     choice.kept.Add(Effect::kQuantisation);  // costs nothing, and makes the file that is asked for
     decision = DecideEffects(choice, ConditionsOf(options), survey->Places(), PictureEffects());
@@ -113,21 +113,24 @@ struct SceneSimulator::Impl {
     return picture;
   }
 
-  void MakeTextures(const std::vector<LinearPicture>& pictures) {
+  void MakeTextures(const std::vector<LinearPicture>& pictures, int threads) {
     const LinearPicture none;
-    for (std::size_t i = 0; i < options.layers.size(); ++i) {
+    std::vector<std::optional<SceneTexture>> drawn(options.layers.size());
+    ParallelFor(static_cast<int>(drawn.size()), threads, [&](int index) {
+      const auto i = static_cast<std::size_t>(index);
       const SceneLayer& layer = options.layers[i];
       const std::string place = LayerPlace(i, layer);
       geometry.CheckPlane(place, layer.plane);
       RandomDraws draws(options.seed, RandomDraws::Purpose::kTexture,
                         static_cast<std::uint32_t>(i));
       try {
-        textures.emplace_back(layer.texture, geometry.RequestFor(layer),
-                              i < pictures.size() ? pictures[i] : none, &draws);
+        drawn[i].emplace(layer.texture, geometry.RequestFor(layer),
+                         i < pictures.size() ? pictures[i] : none, &draws);
       } catch (const Error& error) {
         throw Error(place + ": " + error.what());
       }
-    }
+    });
+    for (std::optional<SceneTexture>& texture : drawn) textures.push_back(std::move(*texture));
   }
 
   // Electrons: Poisson of the mean light times full well, plus the reading's Gaussian.
@@ -154,8 +157,8 @@ struct SceneSimulator::Impl {
 };
 
 SceneSimulator::SceneSimulator(const SceneSimulationOptions& options,
-                               const std::vector<LinearPicture>& pictures)
-    : impl_(std::make_unique<Impl>(options, pictures)) {}
+                               const std::vector<LinearPicture>& pictures, int threads)
+    : impl_(std::make_unique<Impl>(options, pictures, threads)) {}
 
 SceneSimulator::~SceneSimulator() = default;
 

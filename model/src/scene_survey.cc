@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "ray_irradiance.h"
+#include "thicklens/model/parallel.h"
 
 namespace thicklens::model {
 namespace {
@@ -61,10 +62,11 @@ struct BlockGrid {
 class LayerDetail {
  public:
   LayerDetail(const SceneGeometry& geometry, const SceneTexture& texture, std::size_t layer,
-              const BlockGrid& grid)
+              const BlockGrid& grid, int threads)
       : geometry_(geometry), texture_(texture), layer_(layer), grid_(grid), details_(grid.count()) {
     const int samples = kBlockSamples * (grid.columns + 2 * grid.margin) + 2;
-    for (int row = -grid.margin; row < grid.rows + grid.margin; ++row) LookAtRow(row, samples);
+    ParallelFor(grid.rows + 2 * grid.margin, threads,
+                [&](int i) { LookAtRow(i - grid.margin, samples); });
   }
 
   // Of all blocks within a distance of one.
@@ -225,7 +227,8 @@ Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& tex
 }
 
 SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
-                         const std::vector<SceneTexture>& textures, double landing_px) {
+                         const std::vector<SceneTexture>& textures, double landing_px,
+                         int threads) {
   const Sensor& sensor = geometry.sensor();
   columns_ = (sensor.width_px + kBlockPx - 1) / kBlockPx;
   rows_ = (sensor.height_px + kBlockPx - 1) / kBlockPx;
@@ -253,7 +256,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
   }
   std::vector<LayerDetail> details;
   for (std::size_t i = 0; i < textures.size(); ++i) {
-    details.emplace_back(geometry, textures[i], i, grid);
+    details.emplace_back(geometry, textures[i], i, grid, threads);
   }
 
   auto reach = reaches.begin();

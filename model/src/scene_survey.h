@@ -35,7 +35,7 @@ class SceneSurvey {
 
   // `landing_px`: how far from its pixel's centre a ray may land.
   SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
-              const std::vector<SceneTexture>& textures, double landing_px);
+              const std::vector<SceneTexture>& textures, double landing_px, int threads);
 
   const std::vector<SceneBlock>& blocks() const { return blocks_; }
   // Of the block that holds a pixel.

@@ -125,9 +125,10 @@ double SincSquared(double x) {
 // transfer is sinc^2(spacing f) on each axis, will take.
 void LimitBand(double coarsest_pixel_mm, Canvas* canvas) {
   const auto gain = [&](double fx_per_mm, double fy_per_mm) {
-    const double f = std::hypot(fx_per_mm, fy_per_mm) * coarsest_pixel_mm;
-    if (f >= kHighestFrequency) return 0.0;
-    return std::exp(-2 * kPi * kPi * kSoftnessPx * kSoftnessPx * f * f) /
+    const double f2 =
+        (fx_per_mm * fx_per_mm + fy_per_mm * fy_per_mm) * coarsest_pixel_mm * coarsest_pixel_mm;
+    if (f2 >= kHighestFrequency * kHighestFrequency) return 0.0;
+    return std::exp(-2 * kPi * kPi * kSoftnessPx * kSoftnessPx * f2) /
            (SincSquared(fx_per_mm * canvas->spacing_mm.x()) *
             SincSquared(fy_per_mm * canvas->spacing_mm.y()));
   };

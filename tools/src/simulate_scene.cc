@@ -102,7 +102,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   model::OutputFolder folder(options.output_folder, kPictureMarker,
                              {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker});
 
-  const model::SceneSimulator simulator(scene, ReadTextures(scene));
+  const model::SceneSimulator simulator(scene, ReadTextures(scene), options.common.threads);
   const model::RawDepthMap depth = simulator.RenderDepth();
   const model::SceneTruth truth = simulator.Truth(depth);
   int bits = 0;
@@ -141,7 +141,7 @@ CommandResult SimulateLightField(const SceneOptions& options) {
   const model::SceneSimulationOptions scene = ReadConfig(options);
   model::OutputFolder folder(options.output_folder, kLightFieldMarker, LightFieldEntries());
 
-  const model::SceneSimulator simulator(scene, ReadTextures(scene));
+  const model::SceneSimulator simulator(scene, ReadTextures(scene), options.common.threads);
   std::size_t clipped = 0;
   {
     ProgressLine progress("rendering", options.common.quiet);

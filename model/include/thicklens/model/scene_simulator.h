@@ -155,8 +155,9 @@ class SceneSimulator {
   // `pictures`: linear light of the layers of kPicture, one entry a layer (empty ones for others).
   // Throws Error if the options are not valid, a ray can miss or meet behind the front focal point
   // one of the planes, no layer is whole, a texture cannot be drawn, or an effect is named that a
-  // picture of a scene cannot have.
-  SceneSimulator(const SceneSimulationOptions& options, const std::vector<LinearPicture>& pictures);
+  // picture of a scene cannot have. `threads` (0: one per core) draw the layers.
+  SceneSimulator(const SceneSimulationOptions& options, const std::vector<LinearPicture>& pictures,
+                 int threads = 0);
   ~SceneSimulator();
   SceneSimulator(const SceneSimulator&) = delete;
   SceneSimulator& operator=(const SceneSimulator&) = delete;
