@@ -55,16 +55,20 @@ template <typename Next>
 void TryOn(int most, bool must_be_there, const Next& next, BlurTrials* trials, BlurCheck* check,
            IterationProgress* progress) {
   constexpr int kPatience = 2;
-  double best = 1;
+  double best = 1, best_score = 1;
   int worse = 0;
   for (int i = 1; i <= most && worse < kPatience; ++i) {
     const auto [scale, offset_px] = next(i);
     check->trials.push_back(trials->Try(scale, offset_px));
     progress->Count();
     const double left = check->trials.back().unexplained;
+    const double score = check->trials.back().score;
+    // Where all is explained, the score alone tells one from the other.
+    const bool better = left < best || (left == best && score < best_score);
     const bool waits = must_be_there && !(std::min(best, left) < kMostLeft);
-    worse = left < best || waits ? 0 : worse + 1;
+    worse = better || waits ? 0 : worse + 1;
     best = std::min(best, left);
+    best_score = std::min(best_score, score);
   }
 }
 
@@ -75,15 +79,17 @@ std::optional<BlurTrial> BestOf(const std::vector<BlurTrial>& trials, std::size_
   for (std::size_t i = first; i < trials.size(); ++i) left = std::min(left, trials[i].unexplained);
   if (!(left < 1)) return std::nullopt;
   const auto explains = [left](const BlurTrial& trial) {
-    return trial.unexplained <= AboutAsMuch(left);
+    return trial.unexplained <= AboutAsMuch(left) && std::isfinite(trial.score);
   };
   for (std::size_t i = first; i < trials.size(); ++i) {
     if (explains(trials[i]) && (score == 0 || trials[i].score < score)) score = trials[i].score;
   }
-  return *std::find_if(trials.begin() + static_cast<std::ptrdiff_t>(first), trials.end(),
-                       [&](const BlurTrial& trial) {
-                         return explains(trial) && trial.score <= kAboutTheScore * score;
-                       });
+  const auto widest =
+      std::find_if(trials.begin() + static_cast<std::ptrdiff_t>(first), trials.end(),
+                   [&](const BlurTrial& trial) {
+                     return explains(trial) && trial.score <= kAboutTheScore * score;
+                   });
+  return widest == trials.end() ? std::nullopt : std::optional(*widest);
 }
 
 // Of the best of either kind, what explains enough.
@@ -103,6 +109,8 @@ void Search(double spread, BlurTrials* trials, BlurCheck* check, IterationProgre
       kMostNarrower, true, [](int i) { return std::pair(std::exp2(-0.25 * i), 0.0); }, trials,
       check, progress);
   check->narrower_blur = BestOf(check->trials, 1);
+  check->narrower_blur_at_end =
+      check->narrower_blur && check->narrower_blur->blur_scale <= std::exp2(-0.25 * kMostNarrower);
   for (const double step_px : {-kOffsetSigmaPx / spread, kOffsetSigmaPx / spread}) {
     const std::size_t first = check->trials.size();
     TryOn(
@@ -111,6 +119,8 @@ void Search(double spread, BlurTrials* trials, BlurCheck* check, IterationProgre
     const std::optional<BlurTrial> focus = BestOf(check->trials, first);
     if (focus && (!check->other_focus || focus->unexplained < check->other_focus->unexplained)) {
       check->other_focus = focus;
+      check->other_focus_at_end =
+          std::abs(focus->focus_offset_px) >= (kMostOffsets - 0.5) * std::abs(step_px);
     }
   }
   KeepProposals(check);
@@ -158,11 +168,16 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   if (!options.IsValid(&why)) throw Error("blur check: " + why);
   CheckInput(input);
   const auto start = Clock::now();
+  const double spread = SpreadOf(input.weights);
+  BlurCheck check;
+  if (!(spread > 0)) {
+    check.message = "one view has no blur that could be checked";
+    return check;
+  }
   const int threads = model::ResolveThreads(options.threads);
   IterationProgress progress(options.progress, kMostTrials);
   progress.Tell();
   BlurPicture looked = BlurPictureOf(input, options.falloff, threads);
-  BlurCheck check;
   check.halvings = looked.halvings;
   const std::optional<double> noise = StoredNoiseSigma(looked.picture, input.transfer);
   check.noise_sigma = std::max(noise.value_or(kUsualNoise), kLeastNoise);
@@ -187,7 +202,7 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   check.unexplained_blocks = trials.unexplained_blocks();
   check.trials.push_back(trials.given());
   if (check.unexplained_blocks >= std::max<double>(kLeastBlocks, kLeastShare * check.blocks)) {
-    Search(SpreadOf(input.weights), &trials, &check, &progress);
+    Search(spread, &trials, &check, &progress);
   }
   ToPhotographPx(&check);
   progress.SkipTo(kMostTrials);

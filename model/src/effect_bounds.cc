@@ -13,13 +13,18 @@ double Range(const EffectPlace& place) { return std::max(0.0, place.bright - pla
 
 }  // namespace
 
-EffectOptics::EffectOptics(const EffectConditions& given)
+EffectOptics::EffectOptics(const EffectConditions& given, const EffectSet& of_picture)
     : conditions_(given),
       inverse_focus_(1 / given.camera.focus_depth_mm()),
       aperture_sigma_mm_(given.camera.blur_ratio() * given.camera.lens.aperture_radius_mm),
       scale_px_(given.camera.focal_scale_px()) {
   const auto& floor = given.camera.calibration->blur_floor_px;
   if (floor) floor_px_ = floor->value;
+  image_distance_mm_ = of_picture.Has(Effect::kThickness)
+                           ? given.camera.image_distance_mm()
+                           : scale_px_ * given.camera.sensor.pixel_pitch_mm;
+  transfer_ = of_picture.Has(Effect::kTransferCurve) ? given.camera.sensor.transfer
+                                                     : TransferCurve::Linear();
 }
 
 double EffectOptics::DefocusPx(double depth_mm) const {
@@ -36,8 +41,8 @@ EffectOptics::Smoothing EffectOptics::SmoothingBy(const EffectSet& effects,
   if (!effects.Has(Effect::kDefocus)) return smoothing;
   const double here_px = DefocusPx(place.depth_mm);
   const double there_px = DefocusPx(place.other_depth_mm.value_or(place.depth_mm));
-  const double sigma_px =
-      here_px * there_px > 0 ? std::min(std::abs(here_px), std::abs(there_px)) : 0;
+  double sigma_px = here_px * there_px > 0 ? std::min(std::abs(here_px), std::abs(there_px)) : 0;
+  if (place.sharpest_depth_mm) sigma_px = std::abs(DefocusPx(*place.sharpest_depth_mm));
   if (is_disc() && effects.Has(Effect::kApertureShape)) {
     smoothing.disc_px = 2 * sigma_px;
   } else {
@@ -95,7 +100,7 @@ double ShiftChange(const EffectPlace& place, double shift_px,
 
 // Transfer curves are concave: the same change counts most where it is dark.
 double StoredChange(const EffectOptics& optics, const EffectPlace& place, double change) {
-  const TransferCurve& transfer = optics.camera().sensor.transfer;
+  const TransferCurve& transfer = optics.transfer();
   const double dark = std::clamp(place.dark, 0.0, 1.0);
   const double lit = std::min(dark + change, std::clamp(place.bright, dark, 1.0));
   return 255 * (transfer.Encode(lit) - transfer.Encode(dark));
@@ -103,17 +108,16 @@ double StoredChange(const EffectOptics& optics, const EffectPlace& place, double
 
 // Encode(L) - Encode(L (1 - e)) grows with L for curves that are powers of light, or straight.
 double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative) {
-  const TransferCurve& transfer = optics.camera().sensor.transfer;
+  const TransferCurve& transfer = optics.transfer();
   const double bright = std::clamp(place.bright, 0.0, 1.0);
   const double other = std::clamp(bright * (1 - std::abs(relative)), 0.0, 1.0);
   return 255 * (transfer.Encode(bright) - transfer.Encode(other));
 }
 
-double StoredSlope(const EffectOptics& optics, const EffectPlace& place) {
-  constexpr double kStep = 1e-4;
-  const TransferCurve& transfer = optics.camera().sensor.transfer;
+double StoredSigma(const EffectOptics& optics, const EffectPlace& place, double sigma) {
+  const TransferCurve& transfer = optics.transfer();
   const double dark = std::clamp(place.dark, 0.0, 1.0);
-  return 255 * (transfer.Encode(dark + kStep) - transfer.Encode(dark)) / kStep;
+  return 255 * (transfer.Encode(dark + sigma) - transfer.Encode(dark - sigma)) / 2;
 }
 
 }  // namespace thicklens::model

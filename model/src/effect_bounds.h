@@ -7,10 +7,10 @@
 
 namespace thicklens::model {
 
-// What the bounds of effects need of a camera, computed once.
+// What the bounds of effects need of a camera and of the effects of a picture, computed once.
 class EffectOptics {
  public:
-  explicit EffectOptics(const EffectConditions& given);
+  EffectOptics(const EffectConditions& given, const EffectSet& of_picture);
 
   const EffectConditions& conditions() const { return conditions_; }
   const Camera& camera() const { return conditions_.camera; }
@@ -18,6 +18,10 @@ class EffectOptics {
   double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
   double scale_px() const { return scale_px_; }                    // K/p
   double floor_px() const { return floor_px_; }
+  double image_distance_mm() const {
+    return image_distance_mm_;
+  }                                                            // of the thin lens without thickness
+  const TransferCurve& transfer() const { return transfer_; }  // linear without its effect
   bool is_disc() const { return conditions_.camera.psf == Psf::kDisc; }
 
   // c(z) kappa r/p: displacement on the sensor, px, per standard deviation of the aperture; its
@@ -36,6 +40,8 @@ class EffectOptics {
  private:
   const EffectConditions& conditions_;
   double inverse_focus_ = 0, aperture_sigma_mm_ = 0, scale_px_ = 0, floor_px_ = 0;
+  double image_distance_mm_ = 0;
+  TransferCurve transfer_;
 };
 
 // Bounds of changes in linear light.
@@ -52,14 +58,15 @@ double ShiftChange(const EffectPlace& place, double shift_px, const EffectOptics
 double StoredChange(const EffectOptics& optics, const EffectPlace& place, double change);
 // Of light that is (1 + relative) times as strong.
 double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative);
-// The largest slope of the transfer curve between dark and bright, times 255.
-double StoredSlope(const EffectOptics& optics, const EffectPlace& place);
+// What a standard deviation in linear light is in stored values where the place is darkest; curves
+// are continued as odd functions below black, as TransferCurve::Encode has it.
+double StoredSigma(const EffectOptics& optics, const EffectPlace& place, double sigma);
 
 // Throws Error if the conditions are not valid or there is no place.
 void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places);
 bool MattersMore(const EffectImpact& a, const EffectImpact& b);
-// Where it matters most of all places.
-EffectFinding FindImpact(Effect effect, const EffectOptics& optics,
+// Where it matters most of all places, in a picture with `others`.
+EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
                          const std::vector<EffectPlace>& places, const EffectSet& others);
 
 // The sections: one function an effect.

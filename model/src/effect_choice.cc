@@ -27,7 +27,8 @@ class Spent {
       return std::hypot(noise_, finding.impact.grey_levels) <= tolerance_.grey_levels;
     }
     if (tolerance_.px && facts.unit == EffectUnit::kPx) {
-      return finding.impact.amount <= *tolerance_.px;
+      return finding.impact.amount <= *tolerance_.px &&
+             bounds_ + finding.impact.aside_grey_levels <= tolerance_.grey_levels;
     }
     return bounds_ + finding.impact.grey_levels <= tolerance_.grey_levels;
   }
@@ -36,7 +37,9 @@ class Spent {
     const EffectFacts& facts = FactsOf(finding.effect);
     if (facts.random) {
       noise_ = std::hypot(noise_, finding.impact.grey_levels);
-    } else if (!tolerance_.px || facts.unit != EffectUnit::kPx) {
+    } else if (tolerance_.px && facts.unit == EffectUnit::kPx) {
+      bounds_ += finding.impact.aside_grey_levels;
+    } else {
       bounds_ += finding.impact.grey_levels;
     }
   }
@@ -48,8 +51,8 @@ class Spent {
 
 // Whether the bound of another effect is another without this one.
 bool HidesOthers(Effect effect) {
-  return EffectSet{Effect::kDefocus, Effect::kApertureShape, Effect::kFalloff, Effect::kPixelBox,
-                   Effect::kLensFloor}
+  return EffectSet{Effect::kThickness, Effect::kDefocus,   Effect::kApertureShape, Effect::kFalloff,
+                   Effect::kPixelBox,  Effect::kLensFloor, Effect::kTransferCurve}
       .Has(effect);
 }
 
@@ -98,7 +101,6 @@ EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<Ef
   std::string why;
   if (!tolerance.IsValid(&why)) throw Error("effects: " + why);
   CheckEffects(conditions, places);
-  const EffectOptics optics(conditions);
   Spent spent(tolerance);
   EffectSet chosen = effects;
   std::vector<EffectFinding> findings = FindImpacts(conditions, places, chosen);
@@ -115,7 +117,7 @@ EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<Ef
     findings.erase(least);
     if (!HidesOthers(left_out)) continue;
     for (EffectFinding& finding : findings) {
-      finding = FindImpact(finding.effect, optics, places, chosen.Without({finding.effect}));
+      finding = FindImpact(finding.effect, conditions, places, chosen.Without({finding.effect}));
     }
   }
   return chosen;
@@ -137,13 +139,19 @@ EffectChoice EffectChoiceFromText(const std::string& effects, const std::string&
 
 EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions& conditions,
                              const std::vector<EffectPlace>& places, const EffectSet& of_model) {
+  CheckEffects(conditions, places);
   const EffectSet foreign = choice.given.With(choice.without).Without(of_model);
   if (!foreign.empty()) {
     throw Error(fmt::format("effect {} is not one of this picture's: it has {}",
                             JoinedNames(foreign), JoinedNames(of_model)));
   }
   EffectDecision decision;
-  decision.findings = FindImpacts(conditions, places, of_model);
+  // What the user takes out is not among the others of the rest.
+  EffectSet base = of_model.Without(choice.without);
+  if (choice.base == EffectChoice::Base::kGiven) base = base.Both(choice.given);
+  for (const Effect effect : of_model.Effects()) {
+    decision.findings.push_back(FindImpact(effect, conditions, places, base.Without({effect})));
+  }
   switch (choice.base) {
     case EffectChoice::Base::kAll:
       decision.on = of_model.Without(choice.without);

@@ -72,9 +72,10 @@ void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPl
   if (places.empty()) throw Error("effects: there is no place to look at: at least one is needed");
 }
 
-EffectFinding FindImpact(Effect effect, const EffectOptics& optics,
+EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
                          const std::vector<EffectPlace>& places, const EffectSet& others) {
   const Section section = SectionOf(effect);
+  const EffectOptics optics(conditions, others.With({effect}));
   EffectFinding finding{effect, section(optics, places.front(), others), places.front()};
   for (const EffectPlace& place : places) {
     const EffectImpact impact = section(optics, place, others);
@@ -131,17 +132,17 @@ bool EffectConditions::IsValid(std::string* why) const {
 EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectPlace& place,
                       const EffectSet& others) {
   CheckEffects(conditions, {place});
-  return SectionOf(effect)(EffectOptics(conditions), place, others.Without({effect}));
+  return SectionOf(effect)(EffectOptics(conditions, others.With({effect})), place,
+                           others.Without({effect}));
 }
 
 std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
                                        const std::vector<EffectPlace>& places,
                                        const EffectSet& effects) {
   CheckEffects(conditions, places);
-  const EffectOptics optics(conditions);
   std::vector<EffectFinding> findings;
   for (const Effect effect : effects.Effects()) {
-    findings.push_back(FindImpact(effect, optics, places, effects.Without({effect})));
+    findings.push_back(FindImpact(effect, conditions, places, effects.Without({effect})));
   }
   return findings;
 }
@@ -157,7 +158,8 @@ std::vector<EffectPlace> PlacesBetween(const Camera& camera, double near_mm, dou
   constexpr int kSteps = 33;
   const Sensor& sensor = camera.sensor;
   const Eigen::Vector2d last_px(sensor.width_px - 1, sensor.height_px - 1);
-  const Eigen::Vector2d& middle_px = sensor.principal_point_px;
+  const Eigen::Vector2d middle_px =
+      sensor.principal_point_px.cwiseMax(0).cwiseMin(last_px).array().round();
   const Eigen::Vector2d corner_px = (2 * middle_px.array() > last_px.array())
                                         .select(Eigen::Array2d::Zero(), last_px.array())
                                         .matrix();

@@ -27,7 +27,7 @@ std::string EffectUnitName(EffectUnit unit) {
 const std::vector<EffectFacts>& AllEffects() {
   static const std::vector<EffectFacts> facts = {
       {Effect::kThickness, "thickness", "two principal planes, f1 and f2: against the thin lens f1",
-       "the thin lens of focal length f1, focused on the same plane", EffectUnit::kPx, false},
+       "the thin lens of focal length f1, focused on the same plane", EffectUnit::kRelative, false},
       {Effect::kDefocus, "defocus", "blur of what is not in the plane of focus",
        "a pinhole in the middle of the aperture", EffectUnit::kPx, false},
       {Effect::kApertureShape, "aperture-shape", "the edge of a disc-shaped aperture",
@@ -106,7 +106,12 @@ std::vector<std::string> EffectSet::Names() const {
 EffectSet EffectSetFromNames(const std::string& names) {
   EffectSet effects;
   std::istringstream stream(names);
-  for (std::string name; std::getline(stream, name, ',');) effects.Add(EffectFromName(name));
+  for (std::string name; std::getline(stream, name, ',');) {
+    const std::size_t first = name.find_first_not_of(' ');
+    const std::size_t last = name.find_last_not_of(' ');
+    effects.Add(
+        EffectFromName(first == std::string::npos ? "" : name.substr(first, last - first + 1)));
+  }
   return effects;
 }
 

@@ -115,7 +115,7 @@ double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aper
 double FalloffOfAperture(const EffectOptics& optics, const EffectPlace& place,
                          const EffectSet& others, Aperture aperture) {
   if (!others.Has(Effect::kFalloff)) return 0;
-  const double distance_mm = optics.camera().image_distance_mm();
+  const double distance_mm = optics.image_distance_mm();
   const Irradiance whole = IrradianceAt(optics, place.position_px, distance_mm, aperture);
   const Irradiance middle =
       IrradianceAt(optics, place.position_px, distance_mm, Aperture::kPinhole);
@@ -130,7 +130,7 @@ double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
                       const EffectSet& others) {
   if (!others.Has(Effect::kFalloff)) return 0;
   constexpr double kNotShared = 0.587;
-  const double distance_mm = optics.camera().image_distance_mm();
+  const double distance_mm = optics.image_distance_mm();
   const Irradiance disc = IrradianceAt(optics, place.position_px, distance_mm, Aperture::kDisc);
   const Irradiance gaussian =
       IrradianceAt(optics, place.position_px, distance_mm, Aperture::kGaussian);
@@ -145,7 +145,7 @@ double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
 // f1 D/f2 = K = f1 zf/(zf - f1): the thin lens f1 that is focused on the same plane puts every ray
 // in the same place. Its image distance is another, K instead of d1, and with it cos(beta).
 // Bound: the ratio of both irradiances, and of their weights of the rays. Enters: the camera is
-// replaced by its thin counterpart.
+// replaced by its thin counterpart. Amount: the ratio's distance from 1; no ray is displaced.
 EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   if (!others.Has(Effect::kFalloff)) return {};
@@ -157,8 +157,9 @@ EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& plac
   for (std::size_t i = 0; i < thin.over_mean.size(); ++i) {
     thick.over_mean[i] += 1 - thin.over_mean[i];
   }
-  return {0, StoredScaling(optics, place, thin.mean / thick.mean - 1) +
-                 WeighingChange(optics, place, aperture, thick.over_mean, others)};
+  const double change = thin.mean / thick.mean - 1;
+  return {std::abs(change), StoredScaling(optics, place, change) +
+                                WeighingChange(optics, place, aperture, thick.over_mean, others)};
 }
 
 // Defocus. Formula: sigma = kappa r |c(z)|/p, (25), (26). Bound: BlurChange of its variance, and
@@ -170,8 +171,8 @@ EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
   const double change = BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
   EffectSet all = others;
   all.Add(Effect::kDefocus);
-  return {sigma_px, StoredChange(optics, place, change) +
-                        FalloffOfAperture(optics, place, others, ApertureOf(optics, all))};
+  const double of_falloff = FalloffOfAperture(optics, place, others, ApertureOf(optics, all));
+  return {sigma_px, StoredChange(optics, place, change) + of_falloff, of_falloff};
 }
 
 // Aperture shape. Formula: a disc of radius 2 sigma against a Gaussian of sigma, the same second
@@ -196,8 +197,9 @@ EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& 
                      optics.SmoothingBy(others.Without({Effect::kDefocus}), place));
   const double change = std::min(
       {kNotShared * (place.bright - place.dark), smooth + 2 * kEdge * place.jump, blurred});
-  return {kEdge * std::sqrt(2 * kPi) * sigma_px,
-          StoredChange(optics, place, change) + FalloffOfShape(optics, place, others)};
+  const double of_falloff = FalloffOfShape(optics, place, others);
+  return {kEdge * std::sqrt(2 * kPi) * sigma_px, StoredChange(optics, place, change) + of_falloff,
+          of_falloff};
 }
 
 // Fall-off. Formula: (12), cos(alpha) cos^3(beta), 1 at the principal point by exposure. Bound:
@@ -207,7 +209,7 @@ EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
                            const EffectSet& others) {
   const Aperture aperture = ApertureOf(optics, others);
   const Irradiance irradiance =
-      IrradianceAt(optics, place.position_px, optics.camera().image_distance_mm(), aperture);
+      IrradianceAt(optics, place.position_px, optics.image_distance_mm(), aperture);
   const double loss = 1 - irradiance.mean;
   return {std::abs(loss),
           StoredScaling(optics, place, loss) +

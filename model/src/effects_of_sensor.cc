@@ -37,18 +37,23 @@ EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place
 }
 
 // Lens floor. Formula: a Gaussian of the measured sigma, in quadrature with defocus. Bound:
-// BlurChange. Enters: where rays land.
+// BlurChange, and that of diffraction, which comes forth without the floor that holds it. Enters:
+// where rays land.
 EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   const double floor_px = optics.floor_px();
   const double change = BlurChange(place, floor_px * floor_px, optics.SmoothingBy(others, place));
-  return {floor_px, StoredChange(optics, place, change)};
+  const double of_diffraction =
+      others.Has(Effect::kDiffraction)
+          ? DiffractionImpact(optics, place, others.Without({Effect::kLensFloor})).grey_levels
+          : 0;
+  return {floor_px, StoredChange(optics, place, change) + of_diffraction};
 }
 
 // Diffraction. Formula: airy.h. A lens floor that was measured holds it already: then it is not
 // added once more, and its impact is 0. Bound: of the Gaussian BlurChange; of a disc's pattern,
 // which has no variance, the mean of min(R, |d| slope) + J min(1, sqrt(2) |d_n|/2) over its
-// displacements d. Enters: where rays land.
+// displacements d; without the box, half of J. Enters: where rays land.
 EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& place,
                                const EffectSet& others) {
   const double radius_px = AiryRadiusPx(optics.camera(), optics.conditions().wavelength_mm);
@@ -65,7 +70,8 @@ EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& pl
   double change = 0;
   for (const double airy_radius : airy_radii) {
     const double distance_px = radius_px * airy_radius;
-    const double past_edge = std::sqrt(2.0) * distance_px * kMeanOfComponent / 2;
+    const double past_edge =
+        others.Has(Effect::kPixelBox) ? std::sqrt(2.0) * distance_px * kMeanOfComponent / 2 : 0.5;
     change += (std::min(range, distance_px * place.slope) + place.jump * std::min(1.0, past_edge)) /
               kQuantiles;
   }
@@ -73,8 +79,8 @@ EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& pl
 }
 
 // Shot noise. Formula: Poisson of L n electrons, n at full scale: sd sqrt(L/n) in linear light.
-// Bound: times the slope of the transfer curve, which together grow where the curve is straight,
-// near black, and fall where it is a power of at most 1/2; looked at where these meet, too. Enters:
+// Bound: what that is in stored values, which grows where the transfer curve is straight, near
+// black, and falls where it is a power of at most 1/2; looked at where these meet, too. Enters:
 // after the picture is formed.
 EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& /*others*/) {
@@ -83,24 +89,26 @@ EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& plac
   constexpr double kKnee = 0.0031308;  // of sRGB
   double largest = 0;
   EffectPlace level = place;
-  for (const double light :
-       {place.dark, place.bright, std::clamp(kKnee, place.dark, place.bright)}) {
-    level.dark = std::max(light, 1e-6);
-    largest = std::max(largest, std::sqrt(level.dark / full_well) * StoredSlope(optics, level));
+  for (const double light : {place.dark, place.bright,
+                             std::clamp(kKnee, place.dark, std::max(place.dark, place.bright))}) {
+    // Less than one electron is the same as one.
+    level.dark = std::max(light, 1 / full_well);
+    largest = std::max(largest, StoredSigma(optics, level, std::sqrt(level.dark / full_well)));
   }
   return {largest, largest};
 }
 
 // Read noise. Formula: normal, in electrons before the transfer curve or in stored values after
-// it. Bound: the former times the curve's slope where it is dark; both in quadrature. Enters: after
-// the picture is formed.
+// it. Bound: what the former is in stored values where it is dark; both in quadrature. Enters:
+// after the picture is formed.
 EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& /*others*/) {
   const EffectConditions& conditions = optics.conditions();
   double sigma = conditions.stored_noise_grey_levels;
   if (conditions.full_well_electrons > 0) {
-    sigma = std::hypot(sigma, conditions.read_noise_electrons / conditions.full_well_electrons *
-                                  StoredSlope(optics, place));
+    sigma = std::hypot(
+        sigma, StoredSigma(optics, place,
+                           conditions.read_noise_electrons / conditions.full_well_electrons));
   }
   return {sigma, sigma};
 }

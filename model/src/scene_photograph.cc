@@ -10,11 +10,6 @@
 
 namespace thicklens::model {
 
-double AddedAiryPx(const SceneSimulationOptions& options) {
-  const auto& floor = options.camera.calibration->blur_floor_px;
-  return floor && floor->value > 0 ? 0 : AiryRadiusPx(options.camera, options.wavelength_mm);
-}
-
 RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on) {
   const Camera& camera = options.camera;
   RaySpread spread;
@@ -25,12 +20,13 @@ RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on) {
   if (on.Has(Effect::kLensFloor) && camera.calibration->blur_floor_px) {
     spread.gaussian_px = camera.calibration->blur_floor_px->value;
   }
-  if (on.Has(Effect::kDiffraction)) {
-    const double radius_px = AddedAiryPx(options);
+  // A floor that was measured holds the diffraction.
+  if (on.Has(Effect::kDiffraction) && !(spread.gaussian_px > 0)) {
+    const double radius_px = AiryRadiusPx(camera, options.wavelength_mm);
     if (camera.psf == Psf::kDisc) {
       spread.airy_px = radius_px;
     } else {
-      spread.gaussian_px = std::hypot(spread.gaussian_px, radius_px / kGaussianAiryRadius);
+      spread.gaussian_px = radius_px / kGaussianAiryRadius;
     }
   }
   return spread;

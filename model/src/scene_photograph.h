@@ -13,9 +13,6 @@
 
 namespace thicklens::model {
 
-// Radius, px, of the diffraction that is not in a measured lens floor already.
-double AddedAiryPx(const SceneSimulationOptions& options);
-
 // By what the rays of a pixel miss it, with some effects on.
 RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on);
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "airy.h"
 #include "random_draws.h"
 #include "ray_set.h"
 #include "scene_geometry.h"
@@ -29,6 +30,9 @@ constexpr double kFarthestDeviations = 6;
 // pattern.
 constexpr double kFloorDeviations = 5;
 constexpr double kAiryRadii = 50;
+constexpr int kAiryViewRays = 256;
+
+const EffectSet kOfViews = {Effect::kPixelBox, Effect::kLensFloor, Effect::kDiffraction};
 
 EffectConditions ConditionsOf(const SceneSimulationOptions& options) {
   EffectConditions conditions;
@@ -48,8 +52,7 @@ struct SceneSimulator::Impl {
       : options(Checked(given)), geometry(options) {
     MakeTextures(pictures, threads);
     Decide(threads);
-    const RaySpread spread = SpreadOf(options, decision.on);
-    view_rays = ViewRays(spread.box, spread.gaussian_px);
+    MakeViewRays();
     photograph.emplace(options, geometry, textures, *survey, decision.on, camera.sensor.transfer);
   }
 
@@ -59,15 +62,40 @@ struct SceneSimulator::Impl {
     return given;
   }
 
+  // Whatever of box, floor and diffraction will be on.
+  double FarthestLandingPx() const {
+    const double floor_px = geometry.floor_px();
+    const EffectChoice& choice = options.effects;
+    const bool without_floor =
+        choice.without.Has(Effect::kLensFloor) ||
+        (choice.base == EffectChoice::Base::kGiven && !choice.given.Has(Effect::kLensFloor));
+    const double airy_px = AiryRadiusPx(options.camera, options.wavelength_mm);
+    if (floor_px > 0 && !without_floor) return 0.5 + kFloorDeviations * floor_px;
+    if (options.camera.psf == Psf::kDisc) return 0.5 + kAiryRadii * airy_px;
+    return 0.5 + kFloorDeviations * airy_px / kGaussianAiryRadius;
+  }
+
   void Decide(int threads) {
-    const double landing_px =
-        0.5 + kFloorDeviations * geometry.floor_px() + kAiryRadii * AddedAiryPx(options);
+    const double landing_px = FarthestLandingPx();
     survey.emplace(options.camera, geometry, textures, landing_px, threads);
     EffectChoice choice = options.effects;
-    choice.kept.Add(Effect::kQuantisation);  // costs nothing, and makes the file that is asked for
+    // They cost nothing, and make the file that is asked for.
+    choice.kept = choice.kept.With({Effect::kQuantisation, Effect::kTransferCurve});
     decision = DecideEffects(choice, ConditionsOf(options), survey->Places(), PictureEffects());
     camera = options.camera;
     if (!On(Effect::kTransferCurve)) camera.sensor.transfer = TransferCurve::Linear();
+  }
+
+  // Views are seen through a point of the aperture: what blurs the photograph does not hide there
+  // what box, floor and diffraction do, which cost nothing.
+  void MakeViewRays() {
+    of_views = decision.on.Both(kOfViews);
+    if (options.effects.base == EffectChoice::Base::kAuto) {
+      of_views = kOfViews.Without(options.effects.without);
+    }
+    const RaySpread spread = SpreadOf(options, of_views);
+    view_rays = spread.airy_px > 0 ? PhotographRays(spread, kAiryViewRays)
+                                   : ViewRays(spread.box, spread.gaussian_px);
   }
 
   bool On(Effect effect) const { return decision.on.Has(effect); }
@@ -152,6 +180,7 @@ struct SceneSimulator::Impl {
   std::optional<SceneSurvey> survey;
   EffectDecision decision;
   Camera camera;
+  EffectSet of_views;
   std::vector<PixelRay> view_rays;
   std::optional<ScenePhotograph> photograph;
 };
@@ -163,6 +192,12 @@ SceneSimulator::SceneSimulator(const SceneSimulationOptions& options,
 SceneSimulator::~SceneSimulator() = default;
 
 const EffectDecision& SceneSimulator::effects() const { return impl_->decision; }
+
+const EffectSet& SceneSimulator::effects_of_views() const { return impl_->of_views; }
+
+double SceneSimulator::sampling_error_grey_levels() const {
+  return impl_->photograph->sampling_error_grey_levels();
+}
 
 const Camera& SceneSimulator::camera() const { return impl_->camera; }
 
@@ -238,13 +273,11 @@ LightField SceneSimulator::RenderLightField(int u_count, int v_count, const Scen
   const LightFieldGrid grid = DefaultGrid(camera, u_count, v_count);
   LightField light_field = MakeLightField(grid.s_count, grid.t_count, u_count, v_count, 3);
   light_field.weights = ApertureWeights(ApertureShapeOf(camera.psf), u_count, v_count);
-  light_field.transfer = camera.sensor.transfer;
+  light_field.transfer = impl_->camera.sensor.transfer;
   light_field.grid = grid;
-  light_field.camera = camera;
+  light_field.camera = impl_->camera;
   light_field.origin.method = "simulated";
-  light_field.origin.effects =
-      impl_->decision.on.Both({Effect::kPixelBox, Effect::kLensFloor, Effect::kDiffraction})
-          .Names();
+  light_field.origin.effects = impl_->of_views.Names();
   // Sample (i, j) of the plane of focus lies on the ray of pixel (i, j), whatever the view: Q = 0.
   Impl::ForRows(u_count * v_count * grid.t_count, run, [&](int row) {
     const int y = row % grid.t_count;

@@ -67,11 +67,16 @@ class LayerDetail {
     const int samples = kBlockSamples * (grid.columns + 2 * grid.margin) + 2;
     ParallelFor(grid.rows + 2 * grid.margin, threads,
                 [&](int i) { LookAtRow(i - grid.margin, samples); });
+    anything_.dark = texture.Darkest();
+    anything_.bright = texture.Brightest();
+    for (const Detail& detail : details_) anything_.Add(detail);
   }
 
-  // Of all blocks within a distance of one.
+  // Of all blocks within a distance of one. What lies beyond those that were looked at may be
+  // anything that the texture has, as steep as the steepest seen.
   Detail Around(int column, int row, double distance_px) const {
     const int reach = static_cast<int>(std::ceil(distance_px / SceneSurvey::kBlockPx));
+    if (reach > kMostMargin) return anything_;
     Detail found;
     for (int j = std::max(row - reach, -grid_.margin);
          j <= std::min(row + reach, grid_.rows + grid_.margin - 1); ++j) {
@@ -132,12 +137,18 @@ class LayerDetail {
   const std::size_t layer_;
   const BlockGrid& grid_;
   std::vector<Detail> details_;
+  Detail anything_;
 };
 
-// How far from a region the chief positions of what its rays meet on a plane may lie, px.
-double ReachPx(const SceneGeometry& geometry, const PlaneOptions& plane,
-               const PictureRegion& region, double landing_px) {
+// How far from a region the chief positions of what its rays meet on a layer, or in its gloss, may
+// lie, px.
+double ReachPx(const SceneGeometry& geometry, const SceneLayer& layer, const PictureRegion& region,
+               double landing_px) {
+  const PlaneOptions& plane = layer.plane;
   double sigma_px = 0;
+  for (const GlossOptions& gloss : layer.gloss) {
+    sigma_px = std::max(sigma_px, geometry.DefocusPx(gloss.depth_mm));
+  }
   for (const Eigen::Vector2d& corner_px : region.Corners()) {
     const SceneRay ray = geometry.RayAt(corner_px, {0, 0});
     if (plane.slope.dot(ray.slope) < 1) {
@@ -171,8 +182,7 @@ std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureR
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < geometry.layers().size(); ++i) {
     const SceneLayer& layer = geometry.layers()[i];
-    const PictureRegion reached =
-        region.Widened(ReachPx(geometry, layer.plane, region, landing_px));
+    const PictureRegion reached = region.Widened(ReachPx(geometry, layer, region, landing_px));
     if (!geometry.MayTouch(layer, reached)) continue;
     const auto [least, most] = InverseDepths(geometry, layer.plane, reached);
     candidates.push_back({i, least, most, geometry.Covers(layer, reached)});
@@ -195,21 +205,76 @@ Eigen::Vector2d FarthestPx(const SceneBlock& block, const Eigen::Vector2d& axis_
       .select(low_px, high_px);
 }
 
-// Of the fall-off at a position: that of the chief ray, and a little for the others.
+// Of the fall-off at a position, with thickness or without: that of the chief ray, and a little for
+// the others.
 double LeastIrradiance(const Camera& camera, const Eigen::Vector2d& position_px) {
   constexpr double kOfOthers = 0.98;
   const Eigen::Vector2d from_axis_px = position_px - camera.sensor.principal_point_px;
-  return kOfOthers * RayIrradiance(from_axis_px / camera.focal_scale_px(),
-                                   camera.sensor.pixel_pitch_mm * from_axis_px, {0, 0},
-                                   camera.image_distance_mm());
+  const auto at = [&](double image_distance_mm) {
+    return RayIrradiance(from_axis_px / camera.focal_scale_px(),
+                         camera.sensor.pixel_pitch_mm * from_axis_px, {0, 0}, image_distance_mm);
+  };
+  return kOfOthers * std::min(at(camera.image_distance_mm()),
+                              at(camera.focal_scale_px() * camera.sensor.pixel_pitch_mm));
 }
 
-// Gloss moves against its layer from ray to ray: wherever it may be seen, all of it is counted.
-double GlossStrength(const SceneLayer& layer) {
-  double strength = 0;
-  for (const GlossOptions& gloss : layer.gloss) strength += gloss.strength;
-  return strength;
+// Gloss moves against its layer from ray to ray: wherever it may be seen, all of it is counted, its
+// steepest slope s exp(-1/2)/sigma and its sharpest bend 2 s/sigma^2, in its middle.
+Detail GlossOf(const SceneLayer& layer) {
+  Detail detail;
+  detail.dark = detail.bright = Eigen::Array4f::Zero();
+  for (const GlossOptions& gloss : layer.gloss) {
+    detail.bright += static_cast<float>(gloss.strength);
+    detail.slope += static_cast<float>(gloss.strength * std::exp(-0.5) / gloss.sigma_px);
+    detail.bend += static_cast<float>(2 * gloss.strength / (gloss.sigma_px * gloss.sigma_px));
+  }
+  return detail;
 }
+
+// The depths from which blur spreads to a block.
+class BlurDepths {
+ public:
+  BlurDepths(const SceneGeometry& geometry, double inverse_focus)
+      : geometry_(geometry), inverse_focus_(inverse_focus) {}
+
+  // Of one thing, by its least and most 1/z.
+  void Add(double least, double most) {
+    const bool least_is_farther =
+        std::abs(least - inverse_focus_) > std::abs(most - inverse_focus_);
+    ends_.push_back(least_is_farther ? least : most);
+    least_ = std::min(least_, least);
+    most_ = std::max(most_, most);
+  }
+
+  double sigma_px() const { return geometry_.DefocusPx(1 / MostBlurred()); }
+  void Fill(EffectPlace* place) const {
+    const double here = MostBlurred();
+    place->depth_mm = 1 / here;
+    place->sharpest_depth_mm = 1 / std::clamp(inverse_focus_, least_, most_);
+    if (ends_.size() < 2) return;
+    double there = here;
+    for (const double end : ends_) {
+      if (std::abs(end - here) >= std::abs(there - here)) there = end;
+    }
+    place->other_depth_mm = 1 / there;
+  }
+
+ private:
+  double MostBlurred() const {
+    double most_blurred = ends_.front();
+    for (const double end : ends_) {
+      if (std::abs(end - inverse_focus_) > std::abs(most_blurred - inverse_focus_)) {
+        most_blurred = end;
+      }
+    }
+    return most_blurred;
+  }
+
+  const SceneGeometry& geometry_;
+  const double inverse_focus_;
+  std::vector<double> ends_;
+  double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
+};
 
 }  // namespace
 
@@ -244,7 +309,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
       const PictureRegion region = grid.RegionOf(column, row);
       block.layers = MetLayers(geometry, region, landing_px);
       for (const std::size_t layer : block.layers) {
-        reaches.push_back(ReachPx(geometry, geometry.layers()[layer].plane, region, landing_px));
+        reaches.push_back(ReachPx(geometry, geometry.layers()[layer], region, landing_px));
       }
       blocks_.push_back(std::move(block));
     }
@@ -263,37 +328,33 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
       SceneBlock& block = blocks_[static_cast<std::size_t>(row * columns_ + column)];
-      const Eigen::Vector2d middle_px =
-          (Eigen::Vector2d(block.x0, block.y0) + Eigen::Vector2d(block.x1 - 1, block.y1 - 1)) / 2;
-      const SceneRay chief = geometry.RayAt(middle_px, {0, 0});
-      Detail seen;
-      double gloss = 0, most_blurred_mm = 0;
+      Detail seen, gloss;
+      gloss.dark = gloss.bright = Eigen::Array4f::Zero();
+      BlurDepths depths(geometry, 1 / camera.focus_depth_mm());
       for (const std::size_t i : block.layers) {
         const SceneLayer& layer = geometry.layers()[i];
         seen.Add(details[i].Around(column, row, *reach++));
-        gloss += GlossStrength(layer);
-        const double depth_mm = HitDepthMm(layer.plane, chief);
-        const double sigma_px = geometry.DefocusPx(depth_mm);
-        if (most_blurred_mm == 0 || sigma_px > block.sigma_px) most_blurred_mm = depth_mm;
-        block.sigma_px = std::max(block.sigma_px, sigma_px);
+        const auto [least, most] = InverseDepths(geometry, layer.plane, grid.RegionOf(column, row));
+        depths.Add(least, most);
+        for (const GlossOptions& image : layer.gloss) {
+          depths.Add(1 / image.depth_mm, 1 / image.depth_mm);
+        }
+        const Detail of_layer = GlossOf(layer);
+        gloss.bright += of_layer.bright;
+        gloss.slope += of_layer.slope;
+        gloss.bend += of_layer.bend;
       }
+      block.sigma_px = depths.sigma_px();
       EffectPlace place;
       place.position_px = FarthestPx(block, sensor.principal_point_px);
-      place.depth_mm = most_blurred_mm;
+      depths.Fill(&place);
       // Fall-off makes light darker than radiance, never brighter.
       const double darkening = LeastIrradiance(camera, place.position_px);
-      double farthest = 0;
-      for (const std::size_t i : block.layers) {
-        const double depth_mm = HitDepthMm(geometry.layers()[i].plane, chief);
-        const double away = std::abs(1 / depth_mm - 1 / most_blurred_mm);
-        if (block.layers.size() > 1 && away >= farthest) place.other_depth_mm = depth_mm;
-        farthest = std::max(farthest, away);
-      }
       for (int c = 0; c < 3; ++c) {
         place.dark = darkening * static_cast<double>(seen.dark(c));
-        place.bright = static_cast<double>(seen.bright(c)) + gloss;
-        place.slope = static_cast<double>(seen.slope(c));
-        place.bend = static_cast<double>(seen.bend(c));
+        place.bright = static_cast<double>(seen.bright(c) + gloss.bright(c));
+        place.slope = static_cast<double>(seen.slope(c) + gloss.slope(c));
+        place.bend = static_cast<double>(seen.bend(c) + gloss.bend(c));
         place.jump = block.layers.size() > 1 ? place.bright - place.dark : 0;
         block.places[static_cast<std::size_t>(c)] = place;
       }

@@ -366,6 +366,11 @@ SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& 
                          std::max(canvas.light[2].at<float>(i, j), 0.0F), 0.0F);
     }
   }
+  darkest_ = brightest_ = tile_.front();
+  for (const Eigen::Array4f& sample : tile_) {
+    darkest_ = darkest_.min(sample);
+    brightest_ = brightest_.max(sample);
+  }
 }
 
 }  // namespace thicklens::model

@@ -30,6 +30,14 @@ class SceneTexture {
   SceneTexture(const TextureOptions& options, const TextureRequest& request,
                const LinearPicture& picture, RandomDraws* draws);
 
+  // Bounds of R, G and B.
+  Eigen::Array4f Darkest() const {
+    return tile_.empty() ? colour_ * static_cast<float>(1 - amplitude_) : darkest_;
+  }
+  Eigen::Array4f Brightest() const {
+    return tile_.empty() ? colour_ * static_cast<float>(1 + amplitude_) : brightest_;
+  }
+
   // R, G, B and a 0.
   Eigen::Array4f At(double x_mm, double y_mm) const {
     if (!tile_.empty()) return TileAt(x_mm, y_mm);
@@ -76,6 +84,7 @@ class SceneTexture {
   double amplitude_ = 0;              // of a sine
   Eigen::Vector2d wave_{0, 0};        // radians per mm
   std::vector<Eigen::Array4f> tile_;  // empty: closed form
+  Eigen::Array4f darkest_{0, 0, 0, 0}, brightest_{0, 0, 0, 0};
   int columns_ = 0, rows_ = 0;
   Eigen::Vector2d origin_mm_{0, 0};  // of the sample (0, 0)
   Eigen::Vector2d per_mm_{0, 0};     // samples per mm

@@ -101,7 +101,8 @@ TEST(EffectsTest, ThinLensOfTheSameFocusPutsRaysInTheSamePlace) {
   }
   const EffectImpact impact =
       ImpactAt(Effect::kThickness, ConditionsOf(camera), PlaceAt(0, 0, 250), EffectSet::All());
-  EXPECT_EQ(impact.amount, 0);
+  EXPECT_EQ(FactsOf(Effect::kThickness).unit, EffectUnit::kRelative);
+  EXPECT_GT(impact.amount, 0);
   EXPECT_GT(impact.grey_levels, 0);
   EXPECT_EQ(ImpactAt(Effect::kThickness, ConditionsOf(camera), PlaceAt(0, 0, 250),
                      EffectSet::All().Without({Effect::kFalloff}))
@@ -360,6 +361,15 @@ TEST(EffectsTest, ToleranceInPxJudgesDisplacements) {
   EXPECT_EQ(ChooseEffects(conditions, places, optics, EffectToleranceFromText("0.19px")), optics);
   EXPECT_EQ(ChooseEffects(conditions, places, optics, EffectToleranceFromText("0.21px")),
             EffectSet({Effect::kLensFloor}));
+  // What displaces nothing is judged by its grey levels.
+  EffectConditions wide = conditions;
+  wide.camera.lens.lens_thickness_mm = 20;
+  wide.camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(wide.camera.lens, 300), 0};
+  wide.camera.sensor.pixel_pitch_mm = 0.05;
+  const EffectSet both{Effect::kThickness, Effect::kFalloff};
+  const std::vector<EffectPlace> at_focus = PlacesBetween(wide.camera, 300, 300, false);
+  ASSERT_GT(ImpactAt(Effect::kThickness, wide, at_focus.back(), both).grey_levels, 0.5);
+  EXPECT_EQ(ChooseEffects(wide, at_focus, both, EffectToleranceFromText("5px")), both);
 }
 
 TEST(EffectsTest, ChoiceIsReadAndFollowed) {

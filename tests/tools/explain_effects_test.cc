@@ -89,6 +89,12 @@ TEST_F(ExplainEffectsTest, TellsTheLargestImpactOfEachAndWhere) {
   EXPECT_TRUE(sweep["magnification"]["on"]);
   EXPECT_NEAR(sweep["lamp-falloff"]["impact"], std::pow(300 / 250.0, 2) - 1, 1e-9);
   EXPECT_FALSE(sweep["occlusion"]["on"]);
+  const nlohmann::json bench =
+      EffectsOf({"--depth-range", "250:330", "--as-sweep", "--drift", "0.3", "--flicker", "0.02",
+                 "--tilt", "2", "--reading-error", "0.1", "--uv-depth", "20"});
+  for (const char* name : {"drift", "flicker", "tilt", "reading-error", "vignetting"}) {
+    EXPECT_GT(bench[name]["impact"], 0) << name;
+  }
 }
 
 TEST_F(ExplainEffectsTest, TakesADepthMap) {
@@ -110,7 +116,8 @@ TEST_F(ExplainEffectsTest, ToleranceAndSensorDecideWhatIsOn) {
   ASSERT_NEAR(SigmaPx(near_mm), 1, 1e-9);
   const std::string range = std::to_string(near_mm) + ":300";
   EXPECT_TRUE(EffectsOf({"--depth-range", range, "--tolerance", "0.9px"})["defocus"]["on"]);
-  EXPECT_FALSE(EffectsOf({"--depth-range", range, "--tolerance", "1.1px"})["defocus"]["on"]);
+  EXPECT_FALSE(EffectsOf(
+      {"--depth-range", range, "--tolerance", "1.1px", "--without", "falloff"})["defocus"]["on"]);
   const nlohmann::json noisy = EffectsOf(
       {"--depth-range", "290:310", "--full-well", "4000", "--read-noise", "20", "--bits", "4"});
   for (const char* name : {"shot-noise", "read-noise", "quantisation"}) {
@@ -135,6 +142,11 @@ TEST_F(ExplainEffectsTest, SaysWhatIsWrong) {
               HasSubstr("z or range is expected"));
   EXPECT_THAT(Run({"--depth-range", "200:300", "--depth-unit", "mm"}).err,
               HasSubstr("belong to --depth"));
+  EXPECT_THAT(Run({"--depth-range", "200:300", "--read-noise", "3"}).err,
+              HasSubstr("needs --full-well"));
+  EXPECT_THAT(Run({"--depth-range", "200:300", "--drift", "0.2"}).err,
+              HasSubstr("belong to --as-sweep"));
+  EXPECT_EQ(Run({"--depth-range", "200:300", "--effects", ""}).exit_code, 2);
   EXPECT_EQ(Run({"--depth-range", "200:300", "--tolerance", "1"}).exit_code, 2);
   model::RawDepthMap small{8, 8, std::vector<float>(64, 300), false};
   const ProgramResult wrong_size = Run({"--depth", folder_.Put("small.pfm", EncodePfm(small)),

@@ -129,7 +129,7 @@ TEST(ExplainCamera, SaysAtWhichDepthsThinIsAsGoodAsThick) {
   EXPECT_NEAR(apart_px(up_to_mm), 0.1, 1e-6);
   EXPECT_LT(apart_px(0.9 * up_to_mm), 0.1);
   EXPECT_GT(apart_px(1.1 * up_to_mm), 0.1);
-  EXPECT_THAT(ExplanationText(known), HasSubstr("thin stays within 0.1 px of thick"));
+  EXPECT_THAT(ExplanationText(known), HasSubstr("within 0.1 px of that of thick up to"));
   camera.lens.lens_thickness_mm -= 0.009;
   camera.calibration->image_distance_mm->value -= 0.009;
   EXPECT_EQ(ExplainCamera(camera, {500, 2000}, 2).thin.alike_up_to_mm, kInfinity);

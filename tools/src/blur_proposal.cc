@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "thicklens/model/light_field_grid.h"
@@ -58,8 +59,9 @@ std::string BlurProposal::NarrowerBlur() const {
                 "a blur_ratio of {:.3g} instead of {:.3g}, or an aperture as much "
                 "smaller",
                 narrower_ratio_, blur_ratio_);
-  return fmt::format("a blur about {:.2g} times as wide ({}) leaves {:.0f} % of that", scale,
-                     change, 100 * check_.narrower_blur->unexplained);
+  return fmt::format("a blur at most about {:.2g} times as wide{} ({}) leaves {:.0f} % of that",
+                     scale, check_.narrower_blur_at_end ? ", the least that was tried" : "", change,
+                     100 * check_.narrower_blur->unexplained);
 }
 
 std::string BlurProposal::OtherFocus() const {
@@ -67,10 +69,13 @@ std::string BlurProposal::OtherFocus() const {
   const std::string change =
       in_disparity_
           ? fmt::format("--disparity-offset {:.4g}", depth_.disparity_offset_px + offset_px)
-          : fmt::format("a plane of focus at {:.4g} mm instead of {:.4g} mm", other_depth_mm_,
+          : fmt::format("a plane of focus at {} instead of {:.4g} mm",
+                        std::isfinite(other_depth_mm_) ? fmt::format("{:.4g} mm", other_depth_mm_)
+                                                       : "infinity",
                         focus_depth_mm_);
-  return fmt::format("{} ({:+.2g} px of disparity per view step) leaves {:.0f} % of it", change,
-                     offset_px, 100 * check_.other_focus->unexplained);
+  return fmt::format("{}{} ({:+.2g} px of disparity per view step) leaves {:.0f} % of it", change,
+                     check_.other_focus_at_end ? ", the farthest that was tried," : "", offset_px,
+                     100 * check_.other_focus->unexplained);
 }
 
 std::string BlurProposal::Warning() const {
@@ -108,6 +113,7 @@ json BlurProposal::Json() const {
   for (const BlurTrial& trial : check_.trials) out["evaluations"].push_back(TrialJson(trial));
   if (check_.narrower_blur) {
     json blur = TrialJson(*check_.narrower_blur);
+    blur["at_end"] = check_.narrower_blur_at_end;
     if (in_disparity_) {
       blur["disparity_scale"] = blur["blur_scale"].get<double>() * depth_.disparity_scale;
       blur["disparity_offset_px"] = blur["blur_scale"].get<double>() * depth_.disparity_offset_px;
@@ -118,6 +124,7 @@ json BlurProposal::Json() const {
   }
   if (check_.other_focus) {
     json focus = TrialJson(*check_.other_focus);
+    focus["at_end"] = check_.other_focus_at_end;
     if (in_disparity_) {
       focus["disparity_offset_px"] =
           depth_.disparity_offset_px + check_.other_focus->focus_offset_px;

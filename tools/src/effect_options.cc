@@ -44,6 +44,9 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options) {
 }
 
 void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice) {
+  if (options.effects && options.effects->empty()) {
+    throw UsageError("--effects: auto, all, none or names between commas are expected, found ''");
+  }
   if (options.effects) {
     const model::EffectChoice given =
         Parsed("--effects", [&] { return model::EffectChoiceFromText(*options.effects, "", ""); });
@@ -104,11 +107,15 @@ std::string EffectsTable(const model::EffectDecision& decision) {
     const model::EffectFacts& facts = model::FactsOf(finding.effect);
     const std::string unit =
         facts.unit == model::EffectUnit::kGreyLevels ? "levels" : model::EffectUnitName(facts.unit);
+    const std::string on = decision.on.Has(finding.effect) ? "on" : "off";
+    if (finding.impact.amount == 0 && finding.impact.grey_levels == 0) {
+      text += fmt::format("{:<15} {:>22} {:>13}  {}\n", facts.name, "none here", "0", on);
+      continue;
+    }
     text += fmt::format(
         "{:<15} {:>22} {:>13}  {:<4} {}\n", facts.name,
         fmt::format("{}{:.4g} {}", facts.random ? "sd " : "", finding.impact.amount, unit),
-        BoundText(finding), decision.on.Has(finding.effect) ? "on" : "off",
-        EffectPlaceText(finding.place));
+        BoundText(finding), on, EffectPlaceText(finding.place));
   }
   return text;
 }

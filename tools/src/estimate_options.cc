@@ -137,7 +137,7 @@ void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
   command->add_flag("--check-blur", options->check_blur,
                     "Of scene: look whether the photograph asks for a narrower blur, or another "
                     "plane of focus, than camera and depth say, and propose it; costs one more "
-                    "solve at half the size, and about ten where something is found");
+                    "solve at half the size, and seven to seventeen where something may be wrong");
 }
 
 void AddFunctionalOptions(CLI::App* command, EstimateOptions* options) {

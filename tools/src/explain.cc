@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +32,8 @@ struct ExplainOptions {
   int bits = 8;
   double full_well_electrons = 0, read_noise_electrons = 0;
   bool as_sweep = false;
+  model::BenchConditions bench;       // with as_sweep
+  std::optional<double> uv_depth_mm;  // of the plane UV of a light field
 };
 
 DepthRange ParseDepthRange(const std::string& text) {
@@ -84,8 +87,13 @@ model::EffectDecision Decide(const ExplainOptions& options, const model::Camera&
   conditions.bits = options.bits;
   conditions.full_well_electrons = options.full_well_electrons;
   conditions.read_noise_electrons = options.read_noise_electrons;
-  if (options.as_sweep) conditions.bench = model::BenchConditions();
+  if (options.as_sweep) conditions.bench = options.bench;
+  if (options.uv_depth_mm) {
+    conditions.planes = {*options.uv_depth_mm, camera.focus_depth_mm() - *options.uv_depth_mm};
+  }
   model::EffectChoice choice;
+  // As a simulated picture has it.
+  choice.kept = {model::Effect::kQuantisation, model::Effect::kTransferCurve};
   ApplyEffectOptions(options.effects, &choice);
   return model::DecideEffects(choice, conditions, places, model::EffectSet::All());
 }
@@ -110,6 +118,14 @@ CommandResult Explain(const ExplainOptions& options) {
 void CheckUsage(const ExplainOptions& options) {
   if (options.depth_range.empty() == options.depth_path.empty()) {
     throw UsageError("one of --depth-range and --depth is needed: depths, or a map of them");
+  }
+  if (options.read_noise_electrons > 0 && !(options.full_well_electrons > 0)) {
+    throw UsageError("--read-noise: noise in electrons needs --full-well, electrons at full scale");
+  }
+  const model::BenchConditions& bench = options.bench;
+  if (!options.as_sweep && (bench.flicker > 0 || bench.drift_sigma_px > 0 ||
+                            bench.reading_sigma_mm > 0 || bench.tilt_deg != 0)) {
+    throw UsageError("--flicker, --drift, --tilt and --reading-error belong to --as-sweep");
   }
   if (!options.depth_path.empty()) {
     if (ConventionOf(options.depth).kind == model::DepthKind::kDisparity) {
@@ -154,11 +170,30 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
                    "Electrons at full scale, for shot noise; 0: unknown")
       ->check(NonNegative())
       ->type_name("ELECTRONS");
-  command->add_option("--read-noise", options->read_noise_electrons, "Of the sensor, sd")
+  command
+      ->add_option("--read-noise", options->read_noise_electrons,
+                   "Of the sensor, sd; needs --full-well")
       ->check(NonNegative())
       ->type_name("ELECTRONS");
   command->add_flag("--as-sweep", options->as_sweep,
                     "The depths are those of a target on a bench, lit from the camera");
+  command->add_option("--flicker", options->bench.flicker, "Of the lamp, relative sd")
+      ->check(NonNegative())
+      ->type_name("SHARE");
+  command->add_option("--drift", options->bench.drift_sigma_px, "Of the target, sd at focus")
+      ->check(NonNegative())
+      ->type_name("PX");
+  command->add_option("--tilt", options->bench.tilt_deg, "Of the target")
+      ->check(Between(-89, 89, "degrees"))
+      ->type_name("DEG");
+  command->add_option("--reading-error", options->bench.reading_sigma_mm, "Of the bench, sd")
+      ->check(NonNegative())
+      ->type_name("MM");
+  command
+      ->add_option("--uv-depth", options->uv_depth_mm,
+                   "Depth of a light field's plane UV, whose ST lies in the plane of focus")
+      ->check(Finite())
+      ->type_name("MM");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {

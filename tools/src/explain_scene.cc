@@ -13,7 +13,9 @@ constexpr int kBlockPx = 8;
 class DepthBlocks {
  public:
   DepthBlocks(const model::Camera& camera, const model::Scene& scene)
-      : scene_(scene), focus_(1 / camera.focus_depth_mm()) {}
+      : scene_(scene),
+        focus_(1 / camera.focus_depth_mm()),
+        axis_px_(camera.sensor.principal_point_px) {}
 
   // Nothing where all of the block are holes.
   std::optional<model::EffectPlace> PlaceOf(int x0, int y0) const {
@@ -25,8 +27,11 @@ class DepthBlocks {
         const double here = InverseDepth(x, y);
         if (std::isnan(here)) continue;
         if (!found || std::abs(here - focus_) > std::abs(1 / place.depth_mm - focus_)) {
-          place.position_px = {x, y};
           place.depth_mm = 1 / here;
+        }
+        const Eigen::Vector2d at_px(x, y);
+        if (!found || (at_px - axis_px_).norm() > (place.position_px - axis_px_).norm()) {
+          place.position_px = at_px;
         }
         found = true;
         steepest = std::max({steepest, Step(here, x + 1, y), Step(here, x, y + 1)});
@@ -55,6 +60,7 @@ class DepthBlocks {
 
   const model::Scene& scene_;
   const double focus_;
+  const Eigen::Vector2d axis_px_;
 };
 
 }  // namespace

@@ -163,13 +163,15 @@ std::string ThinText(const Explanation& known) {
       "  same image distance: plane of focus {}; picture scale {:+.4f} %, which is {:+.3f} px at "
       "the\n"
       "  farthest corner; its blur radius is in the last column\n"
-      "  there, thin stays within {} px of thick up to {} mm at the rim of the aperture, without "
-      "the\n"
-      "  scale\n",
+      "  with that image distance, the blur of thin is within {} px of that of thick up to {} "
+      "mm{}\n",
       thin.focus_depth_mm ? "at " + DepthText(*thin.focus_depth_mm) + " mm"
                           : "nowhere (the sensor is nearer than the focal length)",
       100 * (thin.scale_ratio - 1), thin.corner_shift_px, kThinTolerancePx,
-      DepthText(thin.alike_up_to_mm));
+      DepthText(thin.alike_up_to_mm),
+      thin.alike_up_to_mm < 1.1 * known.front_focal_length_mm
+          ? ",\n  just beyond the front focal length: nowhere, that is"
+          : "");
 }
 
 nlohmann::json Number(double value) {
@@ -206,6 +208,7 @@ Explanation ExplainCamera(const model::Camera& camera, const DepthRange& range, 
   Explanation known;
   known.camera_name = camera.name;
   known.image_distance_mm = camera.image_distance_mm();
+  known.front_focal_length_mm = camera.lens.front_focal_length_mm;
   known.blur_ratio = camera.blur_ratio();
   known.image_distance_sigma_mm = camera.calibration->image_distance_mm->sigma;
   known.blur_ratio_sigma = camera.calibration->blur_ratio->sigma;

@@ -51,6 +51,7 @@ constexpr double kThinTolerancePx = 0.1;
 
 struct Explanation {
   std::string camera_name;
+  double front_focal_length_mm = 0;
   double image_distance_mm = 0;
   double image_distance_sigma_mm = 0;
   double focus_depth_mm = 0;  // may be +inf

@@ -96,6 +96,17 @@ nlohmann::json Summary(const SceneOptions& options, const model::SceneSimulation
           {"seconds", seconds.count()}};
 }
 
+std::string SamplingText(const model::SceneSimulationOptions& scene,
+                         const model::SceneSimulator& simulator) {
+  const double error = simulator.sampling_error_grey_levels();
+  const double asked = scene.sampling_error_grey_levels;
+  return fmt::format("sampling error where it is largest: about {:.2g} grey levels rms{}\n", error,
+                     error > asked && asked > 0
+                         ? fmt::format(", above the {:.2g} asked for: rays_per_pixel is {}", asked,
+                                       scene.rays_per_pixel)
+                         : "");
+}
+
 CommandResult SimulatePicture(const SceneOptions& options) {
   const auto start = Clock::now();
   const model::SceneSimulationOptions scene = ReadConfig(options);
@@ -124,6 +135,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   result.summary = Summary(options, scene, truth, start);
   result.summary["bits"] = bits;
   result.summary["effects"] = EffectsJson(simulator.effects());
+  result.summary["sampling_error_grey_levels"] = simulator.sampling_error_grey_levels();
   result.summary["rays_per_pixel"] = scene.rays_per_pixel;
   PrintResult(
       options.common,
@@ -132,7 +144,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
                   scene.camera.sensor.width_px, scene.camera.sensor.height_px,
                   truth.nearest_depth_mm, truth.farthest_depth_mm, truth.largest_blur_sigma_px,
                   result.summary["seconds"].get<double>(), options.output_folder) +
-          EffectsText(simulator.effects()));
+          EffectsText(simulator.effects()) + SamplingText(scene, simulator));
   return result;
 }
 
@@ -159,11 +171,14 @@ CommandResult SimulateLightField(const SceneOptions& options) {
   result.summary = Summary(options, scene, simulator.Truth(simulator.RenderDepth()), start);
   result.summary["views"] = {scene.u_count, scene.v_count};
   result.summary["clipped_values"] = clipped;
+  result.summary["effects_of_views"] = simulator.effects_of_views().Names();
   PrintResult(
       options.common,
       fmt::format("{} x {} views of {} x {} px in {:.1f} s: {}\n", scene.u_count, scene.v_count,
                   scene.camera.sensor.width_px, scene.camera.sensor.height_px,
-                  result.summary["seconds"].get<double>(), options.output_folder));
+                  result.summary["seconds"].get<double>(), options.output_folder) +
+          fmt::format("effects of the views: {}\n",
+                      model::JoinedNames(simulator.effects_of_views())));
   return result;
 }
 

@@ -56,6 +56,8 @@ struct BlurCheck {
   // Of the trials, the widest blur and the smallest offset that do about as well as the best. Both:
   // the photograph does not tell which of them it is.
   std::optional<BlurTrial> narrower_blur, other_focus;
+  // Nothing beyond was tried.
+  bool narrower_blur_at_end = false, other_focus_at_end = false;
   int width_px = 0, height_px = 0;  // that were looked at, of the picture at its halved size
   int halvings = 0;                 // of that size
   int iterations = 0;

@@ -49,8 +49,8 @@ EffectChoice EffectChoiceFromText(const std::string& effects, const std::string&
 // What became of it.
 struct EffectDecision {
   EffectSet on;
-  // Of each effect of the forward model: what taking it alone from a picture with all of them
-  // would change at most.
+  // Of each effect of the forward model: what it alone would change at most in a picture with all
+  // the others that the user does not exclude.
   std::vector<EffectFinding> findings;
 };
 // `of_model`: what the forward model has. Throws Error for effects that are named and that it does

@@ -45,6 +45,9 @@ struct EffectPlace {
   double depth_mm = 0;                // from Ap; may be +inf
   // Of what is most different in 1/z of all that blur spreads to here past an edge of depth.
   std::optional<double> other_depth_mm;
+  // Of what is least blurred of all that blur spreads to here; absent: the nearest to the plane of
+  // focus between the two above.
+  std::optional<double> sharpest_depth_mm;
   // Radiance in linear light of what blur spreads to here: bounds, the highest jump between
   // neighbours, and of what lies between jumps the steepest slope per px and the largest
   // |d2L/dx2| + |d2L/dy2| per px^2.
@@ -57,6 +60,8 @@ struct EffectImpact {
   // Bound of the change of stored values, 255 at full scale; of random effects their standard
   // deviation. Wherever the place's radiance is what it is said to be.
   double grey_levels = 0;
+  // The part of it that is none of the amount's: of effects in px what they do to the fall-off.
+  double aside_grey_levels = 0;
 };
 
 // What the effect does at a place to a picture that has the effects `others`, too. Effects of a

@@ -162,7 +162,10 @@ class SceneSimulator {
   SceneSimulator(const SceneSimulator&) = delete;
   SceneSimulator& operator=(const SceneSimulator&) = delete;
 
-  const EffectDecision& effects() const;
+  const EffectDecision& effects() const;      // of the photograph
+  const EffectSet& effects_of_views() const;  // pixel box, lens floor, diffraction, as chosen
+  // Rms of the photograph's pixels where it is largest, of stored values, in 1/255.
+  double sampling_error_grey_levels() const;
   // As what Store writes is to be understood: linear if its transfer curve was left out.
   const Camera& camera() const;
 
@@ -175,8 +178,8 @@ class SceneSimulator {
   RawDepthMap RenderDepth() const;
   SceneTruth Truth(const RawDepthMap& depth) const;
 
-  // Radiance as seen from one aperture position, mm: pixel box and lens floor, neither defocus
-  // nor fall-off.
+  // Radiance as seen from one aperture position, mm: with effects_of_views(), neither defocus nor
+  // fall-off.
   LinearPicture RenderView(const Eigen::Vector2d& aperture_mm, const SceneRun& run) const;
   // Such views at the samples of DefaultGrid(camera, u_count, v_count).
   LightField RenderLightField(int u_count, int v_count, const SceneRun& run) const;
