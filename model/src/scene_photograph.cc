@@ -132,7 +132,6 @@ Eigen::ArrayXf ScenePhotograph::Weights(const RaySet& set, const Eigen::Vector2d
 }
 
 Eigen::Array4f ScenePhotograph::LightAlong(const SceneBlock& block, const SceneRay& ray) const {
-  if (block.layers.size() == 1) return LightOf(block.layers.front(), ray);
   const SceneHit hit = geometry_.Trace(ray, block.layers);
   return LayerLight(geometry_, textures_[hit.layer], hit.layer, ray, hit.position_mm);
 }
@@ -152,16 +151,11 @@ Eigen::Array4f ScenePhotograph::LightWithoutOcclusion(const SceneBlock& block,
   return LightOf(geometry_.Trace(geometry_.RayAt(point_px, {0, 0}), block.layers).layer, ray);
 }
 
-Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
-  const std::size_t index = survey_.IndexAt(x, y);
-  const SceneBlock& block = survey_.blocks()[index];
-  const RaySet& set = sets_[set_of_block_[index]];
-  const Eigen::Vector2d centre_px(x, y);
-  const SceneRay chief = geometry_.RayAt(centre_px, {0, 0});
+template <typename Light>
+Eigen::Array3d ScenePhotograph::MeanOf(const RaySet& set, const Eigen::Vector2d& centre_px,
+                                       const Light& light) const {
+  const Eigen::Vector2d slope = geometry_.RayAt(centre_px, {0, 0}).slope;
   const bool falloff = on_.Has(Effect::kFalloff);
-  const bool trace = on_.Has(Effect::kOcclusion) || block.layers.size() == 1;
-  const PlaneOptions& surface =
-      geometry_.layers()[trace ? 0 : geometry_.Trace(chief, block.layers).layer].plane;
   Eigen::ArrayXf weights;
   if (falloff) weights = Weights(set, centre_px);
   // In parts: many numbers are not added up in float.
@@ -171,14 +165,38 @@ Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
     Eigen::Array4f part(0, 0, 0, 0);
     for (std::size_t i = first; i < std::min(first + kPart, set.rays.size()); ++i) {
       const PreparedRay& prepared = set.rays[i];
-      const SceneRay ray{prepared.aperture_mm, chief.slope + prepared.slope};
-      const Eigen::Array4f light =
-          trace ? LightAlong(block, ray) : LightWithoutOcclusion(block, surface, ray);
-      part += falloff ? weights(static_cast<Eigen::Index>(i)) * light : light;
+      const float weight = falloff ? weights(static_cast<Eigen::Index>(i)) : 1;
+      part += weight * light(SceneRay{prepared.aperture_mm, slope + prepared.slope});
     }
     sum += part.cast<double>();
   }
   return sum.head<3>() / static_cast<double>(set.rays.size());
+}
+
+Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
+  const std::size_t index = survey_.IndexAt(x, y);
+  const SceneBlock& block = survey_.blocks()[index];
+  const RaySet& set = sets_[set_of_block_[index]];
+  const Eigen::Vector2d centre_px(x, y);
+  if (block.layers.size() == 1) {
+    const std::size_t only = block.layers.front();
+    const SceneLayer& layer = geometry_.layers()[only];
+    if (!layer.gloss.empty()) {
+      return MeanOf(set, centre_px, [&](const SceneRay& ray) { return LightOf(only, ray); });
+    }
+    const SceneTexture& texture = textures_[only];
+    return MeanOf(set, centre_px, [&](const SceneRay& ray) {
+      const Eigen::Vector2d at_mm = ray.PositionMm(HitDepthMm(layer.plane, ray));
+      return texture.At(at_mm.x(), at_mm.y());
+    });
+  }
+  if (on_.Has(Effect::kOcclusion)) {
+    return MeanOf(set, centre_px, [&](const SceneRay& ray) { return LightAlong(block, ray); });
+  }
+  const SceneHit shown = geometry_.Trace(geometry_.RayAt(centre_px, {0, 0}), block.layers);
+  const PlaneOptions& surface = geometry_.layers()[shown.layer].plane;
+  return MeanOf(set, centre_px,
+                [&](const SceneRay& ray) { return LightWithoutOcclusion(block, surface, ray); });
 }
 
 }  // namespace thicklens::model

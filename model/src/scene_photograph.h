@@ -46,6 +46,10 @@ class ScenePhotograph {
   double Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const;
   // Of all rays of a pixel, 1 in the mean at the principal point.
   Eigen::ArrayXf Weights(const RaySet& set, const Eigen::Vector2d& centre_px) const;
+  // Of light(ray), weighed.
+  template <typename Light>
+  Eigen::Array3d MeanOf(const RaySet& set, const Eigen::Vector2d& centre_px,
+                        const Light& light) const;
   Eigen::Array4f LightAlong(const SceneBlock& block, const SceneRay& ray) const;
   Eigen::Array4f LightOf(std::size_t layer, const SceneRay& ray) const;
   Eigen::Array4f LightWithoutOcclusion(const SceneBlock& block, const PlaneOptions& surface,
