@@ -86,8 +86,7 @@ SceneSimulationOptions RandomScene(unsigned seed) {
     options.layers.push_back(layer);
   }
   options.sampling_error_grey_levels = 0;
-  // Where there are edges, a ray more or less on one side of them must not count.
-  options.rays_per_pixel = layers > 1 ? 3000 : 1500;
+  options.rays_per_pixel = layers > 1 ? 1000 : 500;
   options.seed = seed;
   return options;
 }
@@ -107,8 +106,16 @@ double LargestChange(const LinearPicture& a, const LinearPicture& b, const Scene
 }
 
 const SceneRun kRun{1, {}};
-// What that many rays leave open, grey levels.
+// What many rays leave open, grey levels.
 constexpr double kSampling = 0.15;
+
+// The same with many times as many rays: a few more or less on one side of an edge do not count.
+double CarefulChange(SceneSimulationOptions a, SceneSimulationOptions b) {
+  a.rays_per_pixel *= 20;
+  b.rays_per_pixel = a.rays_per_pixel;
+  const SceneSimulator of_a(a, {}), of_b(b, {});
+  return LargestChange(of_a.RenderNoiseless(kRun), of_b.RenderNoiseless(kRun), of_a, of_b);
+}
 
 void BoundsHold(unsigned first_seed, int scenes) {
   std::vector<double> looseness;
@@ -127,8 +134,9 @@ void BoundsHold(unsigned first_seed, int scenes) {
     SceneSimulationOptions some = options;
     some.effects.base = EffectChoice::Base::kAuto;
     const SceneSimulator automatic(some, {});
-    EXPECT_LE(LargestChange(with_all, automatic.RenderNoiseless(kRun), all, automatic),
-              0.5 + kSampling)
+    double by_auto = LargestChange(with_all, automatic.RenderNoiseless(kRun), all, automatic);
+    if (by_auto > 0.5) by_auto = CarefulChange(options, some);
+    EXPECT_LE(by_auto, 0.5 + kSampling)
         << "left out: " << JoinedNames(PictureEffects().Without(automatic.effects().on));
 
     for (const EffectFinding& finding : all.effects().findings) {
@@ -138,7 +146,8 @@ void BoundsHold(unsigned first_seed, int scenes) {
       SceneSimulationOptions without = options;
       without.effects.without.Add(finding.effect);
       const SceneSimulator fewer(without, {});
-      const double actual = LargestChange(with_all, fewer.RenderNoiseless(kRun), all, fewer);
+      double actual = LargestChange(with_all, fewer.RenderNoiseless(kRun), all, fewer);
+      if (actual > finding.impact.grey_levels) actual = CarefulChange(options, without);
       EXPECT_LE(actual, finding.impact.grey_levels + kSampling) << facts.name;
       if (actual < kSampling) continue;
       looseness.push_back(finding.impact.grey_levels / actual);
