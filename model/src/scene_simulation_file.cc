@@ -187,8 +187,9 @@ void ReadEffects(const YamlNode& root, EffectChoice* choice) {
   const auto names = [](const YamlNode& node) {
     EffectSet effects;
     for (const YamlNode& name : node.Elements()) {
+      const std::string text = name.Text();
       try {
-        effects.Add(EffectFromName(name.Text()));
+        effects.Add(EffectFromName(text));
       } catch (const Error& error) {
         throw name.ErrorHere(error.what());
       }
@@ -205,8 +206,9 @@ void ReadEffects(const YamlNode& root, EffectChoice* choice) {
   }
   if (const auto without = root.Find("without")) choice->without = names(*without);
   if (const auto tolerance = root.Find("tolerance")) {
+    const std::string text = tolerance->Text();
     try {
-      choice->tolerance = EffectToleranceFromText(tolerance->Text());
+      choice->tolerance = EffectToleranceFromText(text);
     } catch (const Error& error) {
       throw tolerance->ErrorHere(error.what());
     }

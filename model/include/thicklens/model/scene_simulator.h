@@ -141,11 +141,11 @@ struct SceneRun {
 // the line that lands A c(z)/p to the left of the chief ray of what it meets there (derived here
 // from (16) with UV on the aperture). A layer is met in closed form.
 //
-// A pixel of the photograph is the mean over one set of rays for all pixels (Hammersley points)
-// that spreads over the aperture by the camera's PSF (Gaussian of standard deviation kappa r, or
-// disc of radius 2 kappa r; the set's second moment is exactly (kappa r)^2) and over the pixel box
-// widened by the lens floor; each effect that is off takes its part of the set with it. Pixels get
-// as many rays as their blur and their surroundings ask for (see sampling_plan.h). At 600 rays its
+// A pixel of the photograph is the mean over a set of rays (Hammersley points), as many as its blur
+// and its surroundings ask for (see sampling_plan.h); pixels with as many have the same set. It
+// spreads over the aperture by the camera's PSF (Gaussian of standard deviation kappa r, or disc of
+// radius 2 kappa r; the set's second moment is exactly (kappa r)^2) and over the pixel box widened
+// by the lens floor; each effect that is off takes its part of the set with it. With 600 rays the
 // transfer function is off by 0.01 at the highest frequencies and the share of a pixel that an edge
 // hides by 0.005, rms.
 //
