@@ -105,6 +105,13 @@ bool EffectConditions::IsValid(std::string* why) const {
   if (!(wavelength_mm > 0) || !std::isfinite(wavelength_mm)) {
     return fail(fmt::format("wavelength_mm is {}: it must be finite and > 0", wavelength_mm));
   }
+  if (planes && (!std::isfinite(planes->uv_depth_mm) || planes->plane_spacing_mm == 0 ||
+                 !std::isfinite(planes->plane_spacing_mm))) {
+    return fail(
+        fmt::format("planes: UV at {} mm, ST {} mm beyond it: both must be finite, and the "
+                    "planes not the same",
+                    planes->uv_depth_mm, planes->plane_spacing_mm));
+  }
   if (!(bits >= 1 && bits <= 32)) {
     return fail(fmt::format("bits is {}: it must be from 1 to 32", bits));
   }

@@ -413,6 +413,9 @@ TEST(EffectsTest, SaysWhatIsWrong) {
   wrong.bits = 0;
   EXPECT_THAT(message(wrong), HasSubstr("bits is 0: it must be from 1 to 32"));
   wrong = conditions;
+  wrong.planes = LightFieldPlanes{300, 0};
+  EXPECT_THAT(message(wrong), HasSubstr("planes: UV at 300 mm, ST 0 mm beyond it"));
+  wrong = conditions;
   wrong.bench = BenchConditions{true, -1, 0, 0, 0};
   EXPECT_THAT(message(wrong), HasSubstr("bench.flicker is -1"));
   wrong.bench = BenchConditions{true, 0, 0, 0, 90};
