@@ -109,23 +109,29 @@ DeviceArray::DeviceArray(OpenClQueue* queue, const std::string& what, void* data
 void DeviceArray::BringHome() { queue_->BringHome(what_, buffer_, data_, bytes_); }
 
 DeviceMemory::DeviceMemory(OpenClQueue* queue, const std::string& what, std::size_t bytes)
-    : queue_(queue), what_(what), bytes_(std::max(bytes, sizeof(double))) {
+    : queue_(queue), what_(what), bytes_(bytes) {
   queue_->CheckAllocation(what, bytes_);
-  Guarded(*queue_->device_, what_,
-          [&] { buffer_ = cl::Buffer(queue_->device_->context, CL_MEM_READ_WRITE, bytes_); });
+  Guarded(*queue_->device_, what_, [&] {
+    // OpenCL has no buffer of 0 bytes.
+    buffer_ =
+        cl::Buffer(queue_->device_->context, CL_MEM_READ_WRITE, std::max<std::size_t>(bytes_, 1));
+  });
 }
 
 void DeviceMemory::Clear() {
+  if (bytes_ == 0) return;
   Guarded(*queue_->device_, what_,
           [&] { queue_->queue_.enqueueFillBuffer(buffer_, cl_uchar{0}, 0, bytes_); });
 }
 
 void DeviceMemory::Write(const void* from) {
+  if (bytes_ == 0) return;
   Guarded(*queue_->device_, what_,
           [&] { queue_->queue_.enqueueWriteBuffer(buffer_, CL_TRUE, 0, bytes_, from); });
 }
 
 void DeviceMemory::Read(void* to) const {
+  if (bytes_ == 0) return;
   Guarded(*queue_->device_, what_,
           [&] { queue_->queue_.enqueueReadBuffer(buffer_, CL_TRUE, 0, bytes_, to); });
 }

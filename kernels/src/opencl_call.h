@@ -73,7 +73,7 @@ class DeviceArray {
 // Memory of the device alone.
 class DeviceMemory {
  public:
-  // Of 0 bytes it is some, which no one is to read.
+  // Of 0 bytes it is one a kernel can be given, and nothing is written or read.
   DeviceMemory(OpenClQueue* queue, const std::string& what, std::size_t bytes);
   void Clear();  // all bytes 0
   void Write(const void* from);
@@ -88,6 +88,13 @@ class DeviceMemory {
   std::size_t bytes_;
   cl::Buffer buffer_;
 };
+
+template <typename Plain>
+DeviceMemory Copied(OpenClQueue* queue, const std::string& what, const std::vector<Plain>& array) {
+  DeviceMemory memory(queue, what, array.size() * sizeof(Plain));
+  memory.Write(array.data());
+  return memory;
+}
 
 // One call of a kernel: arguments in the kernel's order, then Run. Arrays must not be empty.
 class OpenClCall {

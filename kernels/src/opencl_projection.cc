@@ -32,13 +32,6 @@ ReadPixels ReadPixelsOf(const PixelRows<Real>& rows, const PackedPlane& plane) {
   return read;
 }
 
-template <typename Plain>
-DeviceMemory Copied(OpenClQueue* queue, const std::string& what, const std::vector<Plain>& array) {
-  DeviceMemory memory(queue, what, array.size() * sizeof(Plain));
-  if (!array.empty()) memory.Write(array.data());
-  return memory;
-}
-
 }  // namespace
 
 template <typename Real>

@@ -55,12 +55,6 @@ std::vector<float> PairsOf(const TapRanges& ranges) {
   return pairs;
 }
 
-DeviceMemory Copied(OpenClQueue* queue, const char* what, const std::vector<float>& numbers) {
-  DeviceMemory memory(queue, what, numbers.size() * sizeof(float));
-  memory.Write(numbers.data());
-  return memory;
-}
-
 class OpenClWarp : public ViewWarp {
  public:
   OpenClWarp(std::unique_ptr<OpenClQueue> queue, const SurfacePicture& picture,
