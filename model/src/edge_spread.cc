@@ -41,8 +41,9 @@ double DiscSecondAntiderivative(double x, double radius) {
 
 }  // namespace
 
-EdgeSpread::EdgeSpread(double angle_rad, double gaussian_sigma_px, double disc_radius_px)
-    : sigma_px_(gaussian_sigma_px), radius_px_(disc_radius_px) {
+EdgeSpread::EdgeSpread(double angle_rad, double gaussian_sigma_px, double disc_radius_px,
+                       bool pixel_box)
+    : sigma_px_(gaussian_sigma_px), radius_px_(disc_radius_px), pixel_box_(pixel_box) {
   const double a = std::abs(std::cos(angle_rad));
   const double b = std::abs(std::sin(angle_rad));
   wide_box_px_ = std::max(a, b);
@@ -54,6 +55,15 @@ EdgeSpread::EdgeSpread(double angle_rad, double gaussian_sigma_px, double disc_r
 double EdgeSpread::SecondAntiderivative(double x) const {
   return radius_px_ > 0 ? DiscSecondAntiderivative(x, radius_px_)
                         : GaussianSecondAntiderivative(x, sigma_px_);
+}
+
+double EdgeSpread::BlurredStep(double x) const {
+  if (radius_px_ > 0) {
+    const double u = std::clamp(x / radius_px_, -1.0, 1.0);
+    return 0.5 + (u * std::sqrt(1 - u * u) + std::asin(u)) / kPi;
+  }
+  if (sigma_px_ > 0) return std::erfc(-x / (std::sqrt(2.0) * sigma_px_)) / 2;
+  return x == 0 ? 0.5 : x > 0 ? 1 : 0;
 }
 
 // An edge at 0, back at L/2, and so on with period L, behind a real transfer T:
@@ -77,8 +87,9 @@ void EdgeSpread::Tabulate(double angle_rad) {
     const double fy = k / period_px * std::sin(angle_rad);
     const double gaussian = GaussianTransfer(sigma_px_, fx, fy);
     if (gaussian < 1e-17) break;
-    coefficients[2 * static_cast<std::size_t>(k)] =
-        -gaussian * DiscTransfer(radius_px_, fx, fy) * PixelBoxTransfer(fx, fy) / (kPi * k);
+    coefficients[2 * static_cast<std::size_t>(k)] = -gaussian * DiscTransfer(radius_px_, fx, fy) *
+                                                    (pixel_box_ ? PixelBoxTransfer(fx, fy) : 1) /
+                                                    (kPi * k);
   }
   cv::Mat edge;
   cv::dft(packed, edge, cv::DFT_INVERSE | cv::DFT_REAL_OUTPUT);
@@ -100,6 +111,7 @@ double EdgeSpread::At(double distance_px) const {
     return -t * (t - 1) * (t - 2) / 6 * e[0] + (t + 1) * (t - 1) * (t - 2) / 2 * e[1] -
            (t + 1) * t * (t - 2) / 2 * e[2] + (t + 1) * t * (t - 1) / 6 * e[3];
   }
+  if (!pixel_box_) return BlurredStep(distance_px);
   // On the dark side F is small; the bright side follows from E(d) + E(-d) = 1.
   const double d = -std::abs(distance_px);
   const double sum = (wide_box_px_ + narrow_box_px_) / 2;

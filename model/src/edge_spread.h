@@ -18,8 +18,10 @@ namespace thicklens::model {
 // nothing but the pixel blurs. With a disc, a Gaussian below 0.004 px but not 0 costs up to 2e-5.
 class EdgeSpread {
  public:
-  // `angle_rad` is that of the normal from the pixel grid's x axis.
-  EdgeSpread(double angle_rad, double gaussian_sigma_px, double disc_radius_px);
+  // `angle_rad` is that of the normal from the pixel grid's x axis. Without the pixel box E is the
+  // blurred step itself; of no blur at all, 1/2 on the edge.
+  EdgeSpread(double angle_rad, double gaussian_sigma_px, double disc_radius_px,
+             bool pixel_box = true);
 
   double At(double distance_px) const;
   // Beyond this distance E is 0 or 1 to rounding.
@@ -27,10 +29,12 @@ class EdgeSpread {
 
  private:
   double SecondAntiderivative(double x) const;
+  double BlurredStep(double x) const;
   void Tabulate(double angle_rad);
 
   double sigma_px_;
   double radius_px_;
+  bool pixel_box_;
   double wide_box_px_;
   double narrow_box_px_;
   double reach_px_;

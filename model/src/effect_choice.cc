@@ -169,4 +169,17 @@ EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions&
   return decision;
 }
 
+EffectRecord RecordOf(const EffectDecision& decision) {
+  EffectRecord record;
+  for (const EffectFinding& finding : decision.findings) {
+    const std::string name = EffectName(finding.effect);
+    if (decision.on.Has(finding.effect)) {
+      record.on.push_back(name);
+    } else {
+      record.left_out_grey_levels.emplace_back(name, finding.impact.grey_levels);
+    }
+  }
+  return record;
+}
+
 }  // namespace thicklens::model

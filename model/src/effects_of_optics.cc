@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
+#include "aperture_irradiance.h"
 #include "effect_bounds.h"
-#include "ray_irradiance.h"
 
 namespace thicklens::model {
 namespace {
@@ -16,75 +16,6 @@ double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
                   std::abs(optics.DefocusPx(place.other_depth_mm.value_or(place.depth_mm))));
 }
 
-enum class Aperture { kPinhole, kGaussian, kDisc };
-
-Aperture ApertureOf(const EffectOptics& optics, const EffectSet& effects) {
-  if (!effects.Has(Effect::kDefocus)) return Aperture::kPinhole;
-  return optics.is_disc() && effects.Has(Effect::kApertureShape) ? Aperture::kDisc
-                                                                 : Aperture::kGaussian;
-}
-
-// Points of an aperture of standard deviation 1 whose mean is exact up to the fifth order.
-struct AperturePoint {
-  double x, y, weight;
-};
-const std::vector<AperturePoint>& PointsOf(Aperture aperture) {
-  static const std::vector<AperturePoint> pinhole = {{0, 0, 1}};
-  // Gauss and Hermite's three on each axis.
-  static const std::vector<AperturePoint> gaussian = [] {
-    std::vector<AperturePoint> points;
-    const double at[] = {-std::sqrt(3.0), 0, std::sqrt(3.0)},
-                 weight[] = {1.0 / 6, 2.0 / 3, 1.0 / 6};
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) points.push_back({at[i], at[j], weight[i] * weight[j]});
-    }
-    return points;
-  }();
-  // Abramowitz and Stegun 25.4.61, seven points of a disc of radius 2.
-  static const std::vector<AperturePoint> disc = [] {
-    std::vector<AperturePoint> points = {{0, 0, 0.25}};
-    const double radius = 2 * std::sqrt(2.0 / 3);
-    for (int i = 0; i < 6; ++i) {
-      points.push_back({radius * std::cos(kPi * i / 3), radius * std::sin(kPi * i / 3), 0.125});
-    }
-    return points;
-  }();
-  return aperture == Aperture::kPinhole ? pinhole : aperture == Aperture::kDisc ? disc : gaussian;
-}
-
-// What rays through the points of an aperture bring to a position of the picture of a uniform
-// radiance: their mean, 1 at the principal point by exposure, and each over that mean.
-struct Irradiance {
-  double mean = 0;
-  std::vector<double> over_mean;
-};
-Irradiance IrradianceAt(const EffectOptics& optics, const Eigen::Vector2d& position_px,
-                        double image_distance_mm, Aperture aperture) {
-  const Sensor& sensor = optics.camera().sensor;
-  const auto values_at = [&](const Eigen::Vector2d& from_axis_px) {
-    std::vector<double> values;
-    for (const AperturePoint& point : PointsOf(aperture)) {
-      const Eigen::Vector2d aperture_mm =
-          optics.aperture_sigma_mm() * Eigen::Vector2d(point.x, point.y);
-      values.push_back(
-          RayIrradiance(from_axis_px / optics.scale_px() - aperture_mm * optics.inverse_focus(),
-                        sensor.pixel_pitch_mm * from_axis_px, aperture_mm, image_distance_mm));
-    }
-    return values;
-  };
-  const auto mean_of = [&](const std::vector<double>& values) {
-    double sum = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) sum += PointsOf(aperture)[i].weight * values[i];
-    return sum;
-  };
-  Irradiance irradiance;
-  irradiance.over_mean = values_at(position_px - sensor.principal_point_px);
-  const double mean = mean_of(irradiance.over_mean);
-  for (double& value : irradiance.over_mean) value /= mean;
-  irradiance.mean = mean / mean_of(values_at({0, 0}));
-  return irradiance;
-}
-
 // What weights of the aperture's rays change of a picture, stored: `weights` over the points, less
 // 1, of standard deviation s. It is their covariance with what different rays see, whose own
 // standard deviation is at most sqrt((I - dark)(bright - I)) where they see I in the mean, and at
@@ -93,7 +24,7 @@ double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aper
                       const std::vector<double>& weights, const EffectSet& others) {
   double square = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
-    square += PointsOf(aperture)[i].weight * std::pow(weights[i] - 1, 2);
+    square += AperturePoints(aperture)[i].weight * std::pow(weights[i] - 1, 2);
   }
   const double sd = std::sqrt(square);
   if (!(sd > 0)) return 0;

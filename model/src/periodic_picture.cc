@@ -44,7 +44,8 @@ struct AxisPlan {
   std::vector<double> taps;     // kTaps a pixel
 };
 
-AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_sigma_px) {
+AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_sigma_px,
+                  bool pixel_box) {
   AxisPlan plan;
   while (plan.limit < max_frequency &&
          GaussianTransfer(gaussian_sigma_px, (plan.limit + 1) * axis.step, 0) >=
@@ -66,8 +67,8 @@ AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_s
     const double q = std::sqrt(beta * beta - std::pow(kPi * kTaps * xi, 2));
     const double window_transform = kTaps * std::sinh(q) / q;
     plan.factor[static_cast<std::size_t>(a)] =
-        GaussianTransfer(gaussian_sigma_px, a * axis.step, 0) * PixelBoxTransfer(a * axis.step, 0) /
-        window_transform;
+        GaussianTransfer(gaussian_sigma_px, a * axis.step, 0) *
+        (pixel_box ? PixelBoxTransfer(a * axis.step, 0) : 1) / window_transform;
   }
 
   plan.first_node.resize(static_cast<std::size_t>(axis.count));
@@ -141,8 +142,8 @@ cv::Mat PeriodicPicture::Evaluate(const AxisSampling& x, const AxisSampling& y,
   const bool disc = blur.psf == Psf::kDisc && blur.defocus_sigma_px > 0;
   const double gaussian_sigma_px =
       disc ? blur.floor_sigma_px : std::hypot(blur.floor_sigma_px, blur.defocus_sigma_px);
-  const AxisPlan x_plan = PlanAxis(x, max_x_, gaussian_sigma_px);
-  const AxisPlan y_plan = PlanAxis(y, max_y_, gaussian_sigma_px);
+  const AxisPlan x_plan = PlanAxis(x, max_x_, gaussian_sigma_px, blur.pixel_box);
+  const AxisPlan y_plan = PlanAxis(y, max_y_, gaussian_sigma_px, blur.pixel_box);
 
   // First axis: row b of the spectrum to the pixels' columns; kept transposed for the second.
   const int rows = y_plan.limit + 1;

@@ -22,6 +22,7 @@ struct FrameBlur {
   double floor_sigma_px = 0;
   Psf psf = Psf::kGaussian;
   double defocus_sigma_px = 0;
+  bool pixel_box = true;  // else a pixel is the light at its centre
 };
 
 // A picture that is a finite Fourier series: it repeats in both directions and is band-limited by

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "scene_geometry.h"
+#include "simulated_camera.h"
 #include "thicklens/error.h"
 #include "thicklens/model/scene_simulator.h"
 
@@ -92,24 +93,6 @@ std::string LayerComplaint(const SceneLayer& layer) {
   return outline.empty() ? TextureComplaint(layer.texture) : outline;
 }
 
-bool IsValidTruth(const Camera& camera, std::string* why) {
-  std::string inner;
-  if (!camera.IsValid(&inner)) return Fail(why, "camera: " + inner);
-  const auto missing = [&](const char* field) {
-    return Fail(why, fmt::format("camera '{}': {} is missing: a simulation needs it as the truth",
-                                 camera.name, field));
-  };
-  if (!camera.calibration || !camera.calibration->image_distance_mm)
-    return missing("image_distance_mm");
-  if (!camera.calibration->blur_ratio) return missing("blur_ratio");
-  if (!std::isfinite(camera.focus_depth_mm())) {
-    return Fail(why, fmt::format("camera '{}' is focused at infinity: a scene needs a finite plane "
-                                 "of focus, because the samples of its views lie there",
-                                 camera.name));
-  }
-  return true;
-}
-
 }  // namespace
 
 std::string TextureKindName(TextureKind kind) {
@@ -137,7 +120,7 @@ EffectSet PictureEffects() {
 }
 
 bool SceneSimulationOptions::IsValid(std::string* why) const {
-  if (!IsValidTruth(camera, why)) return false;
+  if (!IsSimulatable(camera, why)) return false;
   bool has_whole_layer = false;
   for (std::size_t i = 0; i < layers.size(); ++i) {
     const std::string complaint = LayerComplaint(layers[i]);

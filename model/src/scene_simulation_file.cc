@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "effect_yaml.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene_simulator.h"
@@ -182,39 +183,6 @@ SceneLayer ReadLayer(const YamlNode& node) {
   return layer;
 }
 
-// effects: auto, all, none or a list of names; without: a list of names.
-void ReadEffects(const YamlNode& root, EffectChoice* choice) {
-  const auto names = [](const YamlNode& node) {
-    EffectSet effects;
-    for (const YamlNode& name : node.Elements()) {
-      const std::string text = name.Text();
-      try {
-        effects.Add(EffectFromName(text));
-      } catch (const Error& error) {
-        throw name.ErrorHere(error.what());
-      }
-    }
-    return effects;
-  };
-  if (const auto effects = root.Find("effects")) {
-    if (effects->IsSequence()) {
-      choice->base = EffectChoice::Base::kGiven;
-      choice->given = names(*effects);
-    } else {
-      *choice = EffectChoiceFromText(effects->OneOf({"auto", "all", "none"}), "", "");
-    }
-  }
-  if (const auto without = root.Find("without")) choice->without = names(*without);
-  if (const auto tolerance = root.Find("tolerance")) {
-    const std::string text = tolerance->Text();
-    try {
-      choice->tolerance = EffectToleranceFromText(text);
-    } catch (const Error& error) {
-      throw tolerance->ErrorHere(error.what());
-    }
-  }
-}
-
 }  // namespace
 
 SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
@@ -232,7 +200,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   for (const YamlNode& layer : root.At("layers").Elements()) {
     options.layers.push_back(ReadLayer(layer));
   }
-  ReadEffects(root, &options.effects);
+  ReadEffectChoice(root, &options.effects);
   if (const auto rays = root.Find("rays_per_pixel"))
     options.rays_per_pixel = rays->Integer(1, kAny);
   if (const auto wavelength = root.Find("wavelength_nm")) {
@@ -269,10 +237,7 @@ std::string SceneTruthToYaml(const SceneTruth& truth) {
   number("nearest_depth_mm", truth.nearest_depth_mm);
   number("farthest_depth_mm", truth.farthest_depth_mm);
   number("largest_blur_sigma_px", truth.largest_blur_sigma_px);
-  out << YAML::Key << "effects" << YAML::Value << YAML::Flow << truth.effects;
-  out << YAML::Key << "left_out_grey_levels" << YAML::Value << YAML::Flow << YAML::BeginMap;
-  for (const auto& [name, grey_levels] : truth.left_out) number(name.c_str(), grey_levels);
-  out << YAML::EndMap;
+  EmitEffects(truth.effects, &out);
   number("sampling_error_grey_levels", truth.sampling_error_grey_levels);
   out << YAML::Key << "seed" << YAML::Value << truth.seed << YAML::EndMap;
   return std::string(out.c_str()) + "\n";

@@ -236,14 +236,7 @@ SceneTruth SceneSimulator::Truth(const RawDepthMap& depth) const {
   truth.focus_depth_mm = camera.focus_depth_mm();
   truth.blur_ratio = camera.blur_ratio();
   truth.blur_floor_px = impl_->geometry.floor_px();
-  for (const EffectFinding& finding : impl_->decision.findings) {
-    const std::string name = EffectName(finding.effect);
-    if (impl_->decision.on.Has(finding.effect)) {
-      truth.effects.push_back(name);
-    } else {
-      truth.left_out.emplace_back(name, finding.impact.grey_levels);
-    }
-  }
+  truth.effects = RecordOf(impl_->decision);
   truth.sampling_error_grey_levels = impl_->photograph->sampling_error_grey_levels();
   truth.seed = impl_->options.seed;
   const auto [nearest, farthest] = std::minmax_element(depth.values.begin(), depth.values.end());

@@ -1,6 +1,7 @@
 #include <Eigen/Core>
 #include <limits>
 
+#include "effect_yaml.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/sweep_simulator.h"
 #include "thicklens/model/yaml_reader.h"
@@ -127,7 +128,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
-                    "drift_sigma_px", "noise", "bits", "seed"});
+                    "drift_sigma_px", "noise", "bits", "effects", "without", "tolerance", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
@@ -138,6 +139,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   ReadNumber(root, "drift_sigma_px", &options.drift_sigma_px);
   if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
+  ReadEffectChoice(root, &options.effects);
   if (const auto seed = root.Find("seed")) {
     options.seed = static_cast<std::uint64_t>(seed->Integer(0, std::numeric_limits<int>::max()));
   }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "aperture_irradiance.h"
 #include "edge_spread.h"
 #include "periodic_picture.h"
 #include "random_draws.h"
@@ -18,53 +19,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-bool Fail(std::string* why, const std::string& message) {
-  if (why != nullptr) *why = message;
-  return false;
-}
-
 bool IsEdge(TargetKind kind) {
   return kind == TargetKind::kPrintedEdge || kind == TargetKind::kKnifeEdge;
-}
-
-bool IsValidTarget(const TargetOptions& target, std::string* why) {
-  if (!(target.contrast > 0 && target.contrast <= 1)) {
-    return Fail(why, fmt::format("target.contrast is {}: it must be above 0 and at most 1",
-                                 target.contrast));
-  }
-  if (!(target.feature_size_mm >= 0) || !std::isfinite(target.feature_size_mm)) {
-    return Fail(why, fmt::format("target.feature_size_mm is {}: it must be > 0, or 0 to have it "
-                                 "chosen",
-                                 target.feature_size_mm));
-  }
-  if (!(std::abs(target.edge_angle_deg) <= 90)) {
-    return Fail(why, fmt::format("target.edge_angle_deg is {}: it must be between -90 and 90",
-                                 target.edge_angle_deg));
-  }
-  if (!(target.ink_sigma_mm >= 0) || !std::isfinite(target.ink_sigma_mm)) {
-    return Fail(why,
-                fmt::format("target.ink_sigma_mm is {}: it must be >= 0", target.ink_sigma_mm));
-  }
-  return true;
-}
-
-bool IsValidTruth(const Camera& camera, std::string* why) {
-  std::string inner;
-  if (!camera.IsValid(&inner)) return Fail(why, "camera: " + inner);
-  const auto missing = [&](const char* field) {
-    return Fail(why, fmt::format("camera '{}': {} is missing: a simulation needs it as the truth",
-                                 camera.name, field));
-  };
-  if (!camera.calibration || !camera.calibration->image_distance_mm)
-    return missing("image_distance_mm");
-  if (!camera.calibration->blur_ratio) return missing("blur_ratio");
-  if (!camera.calibration->blur_floor_px) return missing("blur_floor_px");
-  if (!std::isfinite(camera.focus_depth_mm())) {
-    return Fail(why, fmt::format("camera '{}' is focused at infinity: a sweep needs a finite plane "
-                                 "of focus, because light and drift are stated there",
-                                 camera.name));
-  }
-  return true;
 }
 
 // What distinguishes one frame from another.
@@ -79,82 +35,47 @@ struct FrameState {
 
 }  // namespace
 
-std::string TargetKindName(TargetKind kind) {
-  switch (kind) {
-    case TargetKind::kDeadLeaves:
-      return "dead-leaves";
-    case TargetKind::kPinkNoise:
-      return "pink-noise";
-    case TargetKind::kWhiteNoise:
-      return "white-noise";
-    case TargetKind::kCheckerboard:
-      return "checkerboard";
-    case TargetKind::kSiemensStar:
-      return "siemens-star";
-    case TargetKind::kPicture:
-      return "picture";
-    case TargetKind::kPrintedEdge:
-      return "printed-edge";
-    case TargetKind::kKnifeEdge:
-      return "knife-edge";
-  }
-  throw Error("no such kind of target");
-}
-
-bool SweepSimulationOptions::IsValid(std::string* why) const {
-  if (!IsValidTruth(camera, why) || !IsValidTarget(target, why)) return false;
-  if (!(frame_count >= 1 && frame_count <= 100000)) {
-    return Fail(why, fmt::format("bench.frames is {}: it must be from 1 to 100000", frame_count));
-  }
-  const double last_depth_mm = first_depth_mm + (frame_count - 1) * step_mm;
-  const auto possible = [](double depth_mm) { return depth_mm > 0 && std::isfinite(depth_mm); };
-  if (!possible(first_depth_mm) || !possible(last_depth_mm)) {
-    return Fail(why, fmt::format("bench: the depths run from {} to {} mm: they must be finite and "
-                                 "> 0",
-                                 first_depth_mm, last_depth_mm));
-  }
-  if (!std::isfinite(bench_offset_mm)) {
-    return Fail(why, fmt::format("bench.offset_mm is {}: it must be finite", bench_offset_mm));
-  }
-  const std::pair<const char*, double> amounts[] = {
-      {"bench.reading_sigma_mm", reading_sigma_mm},
-      {"drift_sigma_px", drift_sigma_px},
-      {"noise.full_well_electrons", full_well_electrons},
-      {"noise.read_noise_electrons", read_noise_electrons}};
-  for (const auto& [field, value] : amounts) {
-    if (!(value >= 0) || !std::isfinite(value)) {
-      return Fail(why, fmt::format("{} is {}: it must be finite and >= 0", field, value));
-    }
-  }
-  if (read_noise_electrons > 0 && !(full_well_electrons > 0)) {
-    return Fail(why, fmt::format("noise.read_noise_electrons is {}: noise in electrons needs "
-                                 "noise.full_well_electrons > 0",
-                                 read_noise_electrons));
-  }
-  if (!(light_level > 0 && light_level <= 1)) {
-    return Fail(why,
-                fmt::format("light.level is {}: it must be above 0 and at most 1", light_level));
-  }
-  if (!(flicker >= 0 && flicker <= 0.5)) {
-    return Fail(why, fmt::format("light.flicker is {}: it must be from 0 to 0.5", flicker));
-  }
-  if (bits != 8 && bits != 16) {
-    return Fail(why, fmt::format("bits is {}: it must be 8 or 16", bits));
-  }
-  return true;
-}
-
 struct SweepSimulator::Impl {
   Impl(const SweepSimulationOptions& given, const LinearPicture& picture) : options(given) {
     std::string why;
     if (!options.IsValid(&why)) throw Error(why);
+    Decide();
     MakeFrames();
     MakeTruth();
+    MakeFalloff();
     if (!IsEdge(options.target.kind)) MakeTile(picture);
   }
 
+  EffectConditions Conditions() const {
+    EffectConditions conditions;
+    conditions.camera = options.camera;
+    conditions.bits = options.bits;
+    conditions.full_well_electrons = options.full_well_electrons;
+    conditions.read_noise_electrons = options.read_noise_electrons;
+    conditions.bench = BenchConditions{options.lamp_falloff, options.flicker,
+                                       options.drift_sigma_px, options.reading_sigma_mm, 0};
+    return conditions;
+  }
+
+  void Decide() {
+    EffectChoice choice = options.effects;
+    // All that costs nothing where frames are sums of waves.
+    choice.kept = choice.kept.With(SweepEffects().Without({Effect::kThickness, Effect::kFalloff}));
+    const double last_depth_mm =
+        options.first_depth_mm + (options.frame_count - 1) * options.step_mm;
+    const auto [near, far] = std::minmax(options.first_depth_mm, last_depth_mm);
+    decision = DecideEffects(choice, Conditions(), PlacesBetween(options.camera, near, far, false),
+                             SweepEffects());
+    stored_camera = options.camera;
+    if (!On(Effect::kTransferCurve)) stored_camera.sensor.transfer = TransferCurve::Linear();
+    psf = On(Effect::kApertureShape) ? options.camera.psf : Psf::kGaussian;
+  }
+
+  bool On(Effect effect) const { return decision.on.Has(effect); }
+
   // p/|m|, mm on the target, of one px at a depth.
   double PixelMm(double depth_mm) const {
+    if (!On(Effect::kMagnification)) depth_mm = options.camera.focus_depth_mm();
     return options.camera.sensor.pixel_pitch_mm /
            std::abs(ChiefRayMagnification(options.camera.lens, options.camera.image_distance_mm(),
                                           depth_mm));
@@ -181,37 +102,74 @@ struct SweepSimulator::Impl {
       frame.depth_mm = options.first_depth_mm + i * options.step_mm;
       frame.reading_mm =
           DirectionSign(options.direction) * (frame.depth_mm - options.bench_offset_mm) +
-          options.reading_sigma_mm * bench.Normal();
+          (On(Effect::kReadingError) ? options.reading_sigma_mm * bench.Normal() : 0);
       // The lamp stands at the camera: irradiance of the target (zf/z)^2, 1 in the plane of focus.
-      const double falloff =
-          options.lamp_falloff ? std::pow(focus_depth_mm / frame.depth_mm, 2) : 1.0;
-      frame.lamp =
-          options.light_level * falloff * std::max(0.0, 1 + options.flicker * lamp.Normal());
-      const double drift_sigma_mm = options.drift_sigma_px * focus_pixel_mm;
+      const double falloff = options.lamp_falloff && On(Effect::kLampFalloff)
+                                 ? std::pow(focus_depth_mm / frame.depth_mm, 2)
+                                 : 1.0;
+      const double flicker = On(Effect::kFlicker) ? options.flicker : 0;
+      frame.lamp = options.light_level * falloff * std::max(0.0, 1 + flicker * lamp.Normal());
+      const double drift_sigma_mm =
+          On(Effect::kDrift) ? options.drift_sigma_px * focus_pixel_mm : 0;
       frame.drift_mm.x() = drift_sigma_mm * drift.Normal();
       frame.drift_mm.y() = drift_sigma_mm * drift.Normal();
       frame.pixel_mm = PixelMm(frame.depth_mm);
       // sigma = kappa r_defocus, here in px.
-      frame.defocus_sigma_px =
-          camera.blur_ratio() *
-          BlurRadiusMm(camera.lens, camera.image_distance_mm(), frame.depth_mm) /
-          camera.sensor.pixel_pitch_mm;
+      if (On(Effect::kDefocus)) {
+        frame.defocus_sigma_px =
+            camera.blur_ratio() *
+            BlurRadiusMm(camera.lens, camera.image_distance_mm(), frame.depth_mm) /
+            camera.sensor.pixel_pitch_mm;
+      }
       frames.push_back(frame);
     }
   }
 
   void MakeTruth() {
     const Camera& camera = options.camera;
-    floor_px = camera.calibration->blur_floor_px->value;
+    if (On(Effect::kLensFloor)) floor_px = camera.calibration->blur_floor_px->value;
+    truth.effects = RecordOf(decision);
     truth.image_distance_mm = camera.image_distance_mm();
     truth.focus_depth_mm = camera.focus_depth_mm();
     truth.blur_ratio = camera.blur_ratio();
-    truth.blur_floor_px = floor_px;
+    truth.blur_floor_px = camera.calibration->blur_floor_px->value;
     truth.bench_offset_mm = options.bench_offset_mm;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
                               frames[i].reading_mm,
                               std::hypot(floor_px, frames[i].defocus_sigma_px)});
+    }
+  }
+
+  // What each pixel gets of a uniform target's light, 1 at the principal point: by symmetry a
+  // function of the distance from there, and of no depth, since (12) knows the ray alone.
+  void MakeFalloff() {
+    if (!On(Effect::kFalloff)) return;
+    const Sensor& sensor = options.camera.sensor;
+    const EffectConditions conditions = Conditions();
+    const EffectOptics optics(conditions, decision.on);
+    const Aperture aperture = ApertureOf(optics, decision.on);
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const Eigen::Vector2d far_px(std::max(axis_px.x(), sensor.width_px - 1 - axis_px.x()),
+                                 std::max(axis_px.y(), sensor.height_px - 1 - axis_px.y()));
+    constexpr int kSteps = 1024;
+    const double step_px = std::max(far_px.norm(), 1.0) / kSteps;
+    std::vector<double> at_step;
+    for (int i = 0; i <= kSteps + 1; ++i) {
+      at_step.push_back(IrradianceAt(optics, axis_px + Eigen::Vector2d(i * step_px, 0),
+                                     optics.image_distance_mm(), aperture)
+                            .mean);
+    }
+    light_of_pixel.reserve(static_cast<std::size_t>(sensor.width_px) *
+                           static_cast<std::size_t>(sensor.height_px));
+    for (int y = 0; y < sensor.height_px; ++y) {
+      for (int x = 0; x < sensor.width_px; ++x) {
+        const double place = (Eigen::Vector2d(x, y) - axis_px).norm() / step_px;
+        const auto below = std::min(static_cast<std::size_t>(place), std::size_t{kSteps});
+        const double rest = place - static_cast<double>(below);
+        light_of_pixel.push_back(
+            static_cast<float>(at_step[below] + rest * (at_step[below + 1] - at_step[below])));
+      }
     }
   }
 
@@ -264,7 +222,9 @@ struct SweepSimulator::Impl {
                               options.frame_count));
     }
     const FrameState& frame = frames[static_cast<std::size_t>(frame_index)];
-    return tile_texture ? RenderTile(frame) : RenderEdge(frame);
+    LinearPicture picture = tile_texture ? RenderTile(frame) : RenderEdge(frame);
+    for (std::size_t i = 0; i < light_of_pixel.size(); ++i) picture.values[i] *= light_of_pixel[i];
+    return picture;
   }
 
   LinearPicture RenderTile(const FrameState& frame) const {
@@ -276,8 +236,8 @@ struct SweepSimulator::Impl {
                          sensor.width_px};
     const AxisSampling y{first_mm.y() / tile_frame.height_mm, frame.pixel_mm / tile_frame.height_mm,
                          sensor.height_px};
-    const cv::Mat light =
-        tile_texture->Evaluate(x, y, {floor_px, options.camera.psf, frame.defocus_sigma_px});
+    const cv::Mat light = tile_texture->Evaluate(
+        x, y, {floor_px, psf, frame.defocus_sigma_px, On(Effect::kPixelBox)});
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
     picture.values.reserve(light.total());
     for (int i = 0; i < light.rows; ++i) {
@@ -296,11 +256,12 @@ struct SweepSimulator::Impl {
     const TargetOptions& target = options.target;
     const double ink_px =
         target.kind == TargetKind::kPrintedEdge ? target.ink_sigma_mm / frame.pixel_mm : 0;
-    const bool disc = options.camera.psf == Psf::kDisc;
+    const bool disc = psf == Psf::kDisc;
     const double gaussian_px =
         std::hypot(std::hypot(floor_px, ink_px), disc ? 0 : frame.defocus_sigma_px);
     const double angle_rad = target.edge_angle_deg * kPi / 180;
-    const EdgeSpread edge(angle_rad, gaussian_px, disc ? 2 * frame.defocus_sigma_px : 0);
+    const EdgeSpread edge(angle_rad, gaussian_px, disc ? 2 * frame.defocus_sigma_px : 0,
+                          On(Effect::kPixelBox));
 
     const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad));
     const Eigen::Vector2d on_edge_px =
@@ -321,20 +282,25 @@ struct SweepSimulator::Impl {
 
   // Electrons: Poisson with the mean light * full well, plus the reading's Gaussian.
   void AddNoise(int frame_index, LinearPicture* picture) const {
-    if (!(options.full_well_electrons > 0)) return;
+    const bool shot = On(Effect::kShotNoise);
+    const bool read = On(Effect::kReadNoise) && options.read_noise_electrons > 0;
+    if (!(options.full_well_electrons > 0) || !(shot || read)) return;
     RandomDraws draws(options.seed, RandomDraws::Purpose::kSensor,
                       static_cast<std::uint32_t>(frame_index));
     for (float& light : picture->values) {
-      double electrons = draws.Poisson(light * options.full_well_electrons);
-      if (options.read_noise_electrons > 0) {
-        electrons += options.read_noise_electrons * draws.Normal();
-      }
+      double electrons = light * options.full_well_electrons;
+      if (shot) electrons = draws.Poisson(electrons);
+      if (read) electrons += options.read_noise_electrons * draws.Normal();
       light = static_cast<float>(electrons / options.full_well_electrons);
     }
   }
 
   SweepSimulationOptions options;
+  EffectDecision decision;
+  Camera stored_camera;
+  Psf psf = Psf::kGaussian;
   double floor_px = 0;
+  std::vector<float> light_of_pixel;  // none without fall-off
   std::vector<FrameState> frames;
   SweepTruth truth;
   std::optional<PeriodicPicture> tile_texture;  // none for an edge
@@ -354,9 +320,14 @@ LinearPicture SweepSimulator::RenderNoiseless(int frame_index) const {
 StoredPicture SweepSimulator::RenderFrame(int frame_index) const {
   LinearPicture picture = impl_->Render(frame_index);
   impl_->AddNoise(frame_index, &picture);
-  return ToStored(picture, impl_->options.camera.sensor.transfer, impl_->options.bits);
+  return ToStored(picture, impl_->stored_camera.sensor.transfer,
+                  impl_->On(Effect::kQuantisation) ? impl_->options.bits : 16);
 }
 
 const SweepTruth& SweepSimulator::truth() const { return impl_->truth; }
+
+const EffectDecision& SweepSimulator::effects() const { return impl_->decision; }
+
+const Camera& SweepSimulator::camera() const { return impl_->stored_camera; }
 
 }  // namespace thicklens::model

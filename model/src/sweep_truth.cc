@@ -1,6 +1,7 @@
 // What a simulated sweep was made with: its file, read and written.
 #include <yaml-cpp/yaml.h>
 
+#include "effect_yaml.h"
 #include "thicklens/model/sweep_file.h"
 #include "thicklens/model/yaml_reader.h"
 
@@ -15,7 +16,7 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kTruthSchema);
   root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "frames"});
+                    "bench_offset_mm", "effects", "left_out_grey_levels", "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
   truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
@@ -42,6 +43,7 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   number("blur_ratio", truth.blur_ratio);
   number("blur_floor_px", truth.blur_floor_px);
   number("bench_offset_mm", truth.bench_offset_mm);
+  EmitEffects(truth.effects, &out);
   out << YAML::Key << "frames" << YAML::Value << YAML::BeginSeq;
   for (const SweepTruth::Frame& frame : truth.frames) {
     out << YAML::Flow << YAML::BeginMap << YAML::Key << "image" << YAML::Value << frame.image;

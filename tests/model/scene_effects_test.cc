@@ -286,8 +286,8 @@ TEST(SceneEffectsTest, EffectsCanBeLeftOutOneByOne) {
   for (std::size_t i = 0; i < picture.values.size(); ++i) {
     EXPECT_NEAR(stored.values[i], 65535 * std::min(picture.values[i], 1.0F), 0.51);
   }
-  EXPECT_EQ(bare.Truth(bare.RenderDepth()).effects.size(), 0U);
-  EXPECT_EQ(bare.Truth(bare.RenderDepth()).left_out.size(), 12U);
+  EXPECT_EQ(bare.Truth(bare.RenderDepth()).effects.on.size(), 0U);
+  EXPECT_EQ(bare.Truth(bare.RenderDepth()).effects.left_out_grey_levels.size(), 12U);
 
   options.effects.base = EffectChoice::Base::kAll;
   options.effects.without = {Effect::kReadNoise, Effect::kQuantisation, Effect::kTransferCurve};

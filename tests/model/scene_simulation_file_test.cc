@@ -284,8 +284,7 @@ TEST_F(SceneSimulationFileTest, TruthIsWrittenInFull) {
   truth.nearest_depth_mm = 290.5;
   truth.farthest_depth_mm = 310;
   truth.largest_blur_sigma_px = 1.0 / 3;
-  truth.effects = {"defocus", "pixel-box"};
-  truth.left_out = {{"falloff", 0.125}};
+  truth.effects = {{"defocus", "pixel-box"}, {{"falloff", 0.125}}};
   truth.seed = 18446744073709551615u;
   const YamlNode root = YamlNode::Parse(SceneTruthToYaml(truth), "truth.yaml");
   root.RequireSchema("thicklens/scene-truth/1");

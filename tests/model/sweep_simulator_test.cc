@@ -62,6 +62,7 @@ SweepSimulationOptions StillOptions(int width_px, int height_px, double depth_mm
   options.first_depth_mm = depth_mm;
   options.frame_count = 1;
   options.lamp_falloff = false;
+  options.effects.without = {Effect::kFalloff};
   return options;
 }
 

@@ -98,6 +98,10 @@ struct Camera {
 // Names of the fields marked `assumed`, for the notice printed once per run.
 std::vector<std::string> AssumedFields(const Camera& camera);
 
+// The same camera with the thin lens of focal length f1, focused on the same plane: its image
+// distance is f1 zf/(zf - f1), and rays land where they did. Needs an image distance.
+Camera ThinTwin(const Camera& camera);
+
 }  // namespace thicklens::model
 
 #endif  // THICKLENS_MODEL_CAMERA_H_

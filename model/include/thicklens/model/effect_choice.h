@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "thicklens/model/effect_impact.h"
@@ -57,6 +58,13 @@ struct EffectDecision {
 // not have, and as FindImpacts does.
 EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions& conditions,
                              const std::vector<EffectPlace>& places, const EffectSet& of_model);
+
+// What is written down of it.
+struct EffectRecord {
+  std::vector<std::string> on;
+  std::vector<std::pair<std::string, double>> left_out_grey_levels;  // the bounds
+};
+EffectRecord RecordOf(const EffectDecision& decision);
 
 }  // namespace thicklens::model
 

@@ -119,9 +119,7 @@ struct SceneTruth {
   double blur_floor_px = 0;
   double nearest_depth_mm = 0, farthest_depth_mm = 0;  // of the depth map
   double largest_blur_sigma_px = 0;                    // of defocus alone, over the depth map
-  std::vector<std::string> effects;                    // that were on, by name
-  // What was left out, by name, with the bound of its own impact in grey levels.
-  std::vector<std::pair<std::string, double>> left_out;
+  EffectRecord effects;
   double sampling_error_grey_levels = 0;  // rms, of the pixels where it is largest
   std::uint64_t seed = 0;
 };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "thicklens/model/camera.h"
+#include "thicklens/model/effect_choice.h"
 
 namespace thicklens::model {
 
@@ -96,6 +97,7 @@ struct SweepTruth {
     double blur_sigma_px = 0;  // sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel box
   };
   std::vector<Frame> frames;
+  EffectRecord effects;  // not read
 };
 SweepTruth ReadSweepTruth(const std::string& path);
 std::string SweepTruthToYaml(const SweepTruth& truth);

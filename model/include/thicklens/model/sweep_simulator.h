@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "thicklens/model/camera.h"
+#include "thicklens/model/effect_choice.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/sweep_file.h"
 
@@ -58,16 +59,23 @@ struct SweepSimulationOptions {
   double full_well_electrons = 0;  // shot noise: electrons at full scale; 0: no shot noise
   double read_noise_electrons = 0;
   int bits = 8;
+  // Of SweepEffects. kAuto keeps all but fall-off and thickness, which it decides about.
+  EffectChoice effects;
   std::uint64_t seed = 1;
 
   bool IsValid(std::string* why) const;
 };
 
+// What a simulated sweep can have. A tilted target and diffraction are not among them (a lens floor
+// holds the latter).
+EffectSet SweepEffects();
+
 // Reads schema thicklens/simulate-sweep/1 (docs/file-formats.md).
 SweepSimulationOptions ReadSweepSimulation(const std::string& path);
 
 // A bench sweep of a flat target, frame by frame, grey: at each depth the target through the exact
-// transfer functions of defocus, lens floor and pixel box, at the image scale of its chief rays.
+// transfer functions of defocus, lens floor and pixel box, at the image scale of its chief rays;
+// each of its effects can be left out.
 // Textures are periodic and band-limited by definition (what a frame sees beyond their tile is
 // their repetition); edges are in closed form. `target_picture` is linear light, for kPicture
 // alone.
@@ -86,6 +94,9 @@ class SweepSimulator {
   StoredPicture RenderFrame(int frame_index) const;
 
   const SweepTruth& truth() const;
+  const EffectDecision& effects() const;
+  // The options' camera as its stored values say it: without the transfer curve's effect linear.
+  const Camera& camera() const;
 
  private:
   struct Impl;
