@@ -74,8 +74,8 @@ RayField::RayField(const EstimateInput& input, bool falloff, int threads)
   if (!falloff || !input.camera) return;
   irradiance_.resize(disparity_.size());
   model::ParallelFor(u_count() * v_count(), threads, [&](int view) {
-    irradiance_[Index(view)] = RelativeFalloff(*input_.grid, *input_.camera, input_.weights,
-                                               view % u_count(), view / u_count());
+    irradiance_[Index(view)] = RelativeFalloff(*input_.grid, input_.camera_of_falloff(),
+                                               input_.weights, view % u_count(), view / u_count());
   });
 }
 

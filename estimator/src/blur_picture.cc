@@ -41,8 +41,8 @@ BlurPicture BlurPictureOf(const EstimateInput& input, bool falloff, int threads)
   if (input.grid) {
     of_pixels = PhotographDisparity(input.disparity, LandingStepPx(*input.camera, *input.grid));
     if (falloff) {
-      without_falloff =
-          WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, threads);
+      without_falloff = WithoutFalloff(input.picture, *input.grid, input.camera_of_falloff(),
+                                       input.weights, threads);
     }
   }
   const DisparityMap& disparity = of_pixels ? *of_pixels : input.disparity;

@@ -35,9 +35,9 @@ model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int t
                                  std::vector<std::vector<float>>* disparity) {
   model::LightField warped = FrameOf(input);
   const model::LinearPicture radiance =
-      falloff && input.camera
-          ? WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, threads)
-          : input.picture;
+      falloff && input.camera ? WithoutFalloff(input.picture, *input.grid,
+                                               input.camera_of_falloff(), input.weights, threads)
+                              : input.picture;
   const DisparityRenderer renderer(input.disparity);
   const PictureWarper warper(radiance, input.disparity);
   const int views = warped.u_count * warped.v_count;

@@ -160,7 +160,8 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
 
   const bool falloff = options.falloff && input.camera.has_value();
   const model::LinearPicture radiance =
-      falloff ? WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, threads)
+      falloff ? WithoutFalloff(input.picture, *input.grid, input.camera_of_falloff(), input.weights,
+                               threads)
               : input.picture;
   AperturePrior<Real> prior(static_cast<int>(input.weights.cols()),
                             static_cast<int>(input.weights.rows()), options.gamma, summary->ridge);

@@ -160,8 +160,8 @@ std::vector<std::vector<float>> IrradianceOfViews(const EstimateInput& input, in
   const auto u_count = static_cast<int>(input.weights.cols());
   std::vector<std::vector<float>> irradiance(static_cast<std::size_t>(input.weights.size()));
   model::ParallelFor(static_cast<int>(irradiance.size()), threads, [&](int view) {
-    irradiance[static_cast<std::size_t>(view)] =
-        RelativeFalloff(*input.grid, *input.camera, input.weights, view % u_count, view / u_count);
+    irradiance[static_cast<std::size_t>(view)] = RelativeFalloff(
+        *input.grid, input.camera_of_falloff(), input.weights, view % u_count, view / u_count);
   });
   return irradiance;
 }

@@ -82,11 +82,12 @@ void ForEachView(const model::LightField& light_field, int threads, const Work& 
 
 // Irradiance of every ray, by view; empty unless it counts.
 std::vector<std::vector<float>> FalloffOfViews(const model::LightField& light_field,
+                                               const model::Camera& camera,
                                                const Eigen::ArrayXXd& weights, int threads) {
   std::vector<std::vector<float>> falloff(Index(light_field.u_count * light_field.v_count));
   ForEachView(light_field, threads, [&](int view, int k, int l) {
     if (weights(l, k) == 0) return;
-    falloff[Index(view)] = RelativeFalloff(*light_field.grid, *light_field.camera, weights, k, l);
+    falloff[Index(view)] = RelativeFalloff(*light_field.grid, camera, weights, k, l);
   });
   return falloff;
 }
@@ -222,14 +223,16 @@ void CheckRepeat(int repeat_px) {
 }  // namespace
 
 model::LinearPicture Photograph(const model::LightField& light_field,
-                                const Eigen::ArrayXXd& weights, bool falloff,
+                                const Eigen::ArrayXXd& weights, const model::Camera* falloff,
                                 kernels::Kernels<float>* kernels, int threads) {
   CheckLightField(light_field);
   const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
   const kernels::BlockGeometry whole =
       BlockOf(light_field, {0, 0, light_field.s_count, light_field.t_count}, present);
   std::vector<std::vector<float>> irradiance;
-  if (falloff && light_field.camera) irradiance = FalloffOfViews(light_field, present, threads);
+  if (falloff != nullptr && light_field.grid) {
+    irradiance = FalloffOfViews(light_field, *falloff, present, threads);
+  }
 
   // As the rays were taken apart, so they are put together.
   const kernels::Splat splat =

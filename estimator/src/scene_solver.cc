@@ -81,8 +81,8 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   SceneBandRun<Real> run(input, options, backend, memory, reach_px, iterations, &progress, summary);
   std::optional<model::LinearPicture> without_falloff;
   if (falloff) {
-    without_falloff =
-        WithoutFalloff(input.picture, *input.grid, *input.camera, input.weights, summary->threads);
+    without_falloff = WithoutFalloff(input.picture, *input.grid, input.camera_of_falloff(),
+                                     input.weights, summary->threads);
   }
   summary->setup_seconds = SecondsSince(start);
   const bool wants_confidence = sink != nullptr ? sink->wants_confidence : maps != nullptr;

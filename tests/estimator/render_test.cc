@@ -98,7 +98,8 @@ double IrradianceAt(const model::LightField& field, const model::Ray& ray) {
 
 model::LinearPicture TakePhotograph(const model::LightField& field, const Eigen::ArrayXXd& weights,
                                     bool falloff, int threads = 1) {
-  return Photograph(field, weights, falloff, kernels::NewReference<float>().get(), threads);
+  return Photograph(field, weights, falloff && field.camera ? &*field.camera : nullptr,
+                    kernels::NewReference<float>().get(), threads);
 }
 
 // --- The photograph.

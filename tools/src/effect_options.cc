@@ -12,7 +12,7 @@ namespace {
 
 // Throws UsageError with the option's name for what the parser says is wrong.
 template <typename Parse>
-auto Parsed(const char* option, const Parse& parse) {
+auto Parsed(const std::string& option, const Parse& parse) {
   try {
     return parse();
   } catch (const Error& error) {
@@ -38,7 +38,7 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options) {
   command->add_option("--without", options->without, "Effects to leave out in any case")
       ->type_name("NAMES");
   command
-      ->add_option("--tolerance", options->tolerance,
+      ->add_option(options->tolerance_option, options->tolerance,
                    "What auto may leave out, all together: 0.5gl (grey levels of 255) or 0.1px")
       ->type_name("AMOUNT");
 }
@@ -58,8 +58,8 @@ void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choic
         Parsed("--without", [&] { return model::EffectSetFromNames(*options.without); });
   }
   if (options.tolerance) {
-    choice->tolerance =
-        Parsed("--tolerance", [&] { return model::EffectToleranceFromText(*options.tolerance); });
+    choice->tolerance = Parsed(options.tolerance_option,
+                               [&] { return model::EffectToleranceFromText(*options.tolerance); });
   }
 }
 

@@ -13,6 +13,7 @@ namespace thicklens::tools {
 // --effects, --without, --tolerance of commands with a forward model. What is absent was not given.
 struct EffectOptions {
   std::optional<std::string> effects, without, tolerance;
+  std::string tolerance_option = "--tolerance";  // where that is something else
 };
 void AddEffectOptions(CLI::App* command, EffectOptions* options);
 // Puts what was given in the place of what `choice` says. Throws UsageError.

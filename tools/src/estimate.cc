@@ -61,8 +61,8 @@ constexpr double kMostBandPixels = 3e6;
 
 estimator::SceneOptions SceneSettings(const EstimateOptions& options,
                                       const estimator::EstimateInput& input,
-                                      const Progress& progress) {
-  estimator::SceneOptions settings = SceneOptionsOf(options, progress);
+                                      const model::EffectSet& on, const Progress& progress) {
+  estimator::SceneOptions settings = SceneOptionsOf(options, on, progress);
   if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
   const auto pixels = static_cast<double>(input.disparity.disparity.size());
   settings.least_bands = std::max(1, static_cast<int>(std::ceil(pixels / kMostBandPixels)));
@@ -70,26 +70,28 @@ estimator::SceneOptions SceneSettings(const EstimateOptions& options,
 }
 
 void CheckBlur(const EstimateOptions& options, const estimator::EstimateInput& input,
-               EstimateOutcome* outcome) {
+               const model::EffectSet& on, EstimateOutcome* outcome) {
   ProgressLine line("checking the blur", options.common.quiet);
-  estimator::BlurCheckOptions settings = BlurCheckOptionsOf(options, [&line](int done, int total) {
-    ThrowIfInterrupted();
-    line.Show(done, total);
-  });
+  estimator::BlurCheckOptions settings =
+      BlurCheckOptionsOf(options, on, [&line](int done, int total) {
+        ThrowIfInterrupted();
+        line.Show(done, total);
+      });
   if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
   outcome->blur.emplace(estimator::CheckBlur(input, settings), input, options.depth);
 }
 
 // Views go to the writer as they are made, unless a page is to show them.
 void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& input,
-                const Progress& progress, LightFieldWriter* writer, EstimateOutcome* outcome) {
+                const model::EffectSet& on, const Progress& progress, LightFieldWriter* writer,
+                EstimateOutcome* outcome) {
   // A device is worth its start where it is asked for.
   const auto backend = kernels::OpenBackend(
       kernels::ParseDeviceRequest(options.device == "auto" ? "cpu" : options.device), nullptr,
       ThrowIfInterrupted);
   spdlog::debug("device: {}", backend->description());
-  const estimator::SceneOptions settings = SceneSettings(options, input, progress);
-  if (options.check_blur) CheckBlur(options, input, outcome);
+  const estimator::SceneOptions settings = SceneSettings(options, input, on, progress);
+  if (options.check_blur) CheckBlur(options, input, on, outcome);
   estimator::SceneSummary scene;
   if (!options.report_folder.empty()) {
     outcome->light_field =
@@ -115,27 +117,28 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
 }
 
 void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput& input,
-                 const Progress& progress, EstimateOutcome* outcome) {
+                 const model::EffectSet& on, const Progress& progress, EstimateOutcome* outcome) {
   std::string notice;
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
                                             ThrowIfInterrupted);
   if (!notice.empty()) spdlog::warn("{}", notice);
   spdlog::debug("device: {}", backend->description());
   estimator::EstimateSummary blocks;
-  outcome->light_field =
-      estimator::EstimateByBlocks(input, BlockOptionsOf(options, progress), backend.get(), &blocks);
+  outcome->light_field = estimator::EstimateByBlocks(input, BlockOptionsOf(options, on, progress),
+                                                     backend.get(), &blocks);
   outcome->seconds.setup += blocks.setup_seconds;
   outcome->seconds.solve = blocks.solve_seconds;
   outcome->blocks = std::move(blocks);
 }
 
 void SolveFunctional(const EstimateOptions& options, const estimator::EstimateInput& input,
-                     const Progress& progress, EstimateOutcome* outcome) {
+                     const model::EffectSet& on, const Progress& progress,
+                     EstimateOutcome* outcome) {
   spdlog::debug("device: cpu");
   const auto estimate =
       options.solver == "grid" ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
   estimator::FunctionalSummary functional;
-  outcome->light_field = estimate(input, FunctionalOptionsOf(options, progress), &functional);
+  outcome->light_field = estimate(input, FunctionalOptionsOf(options, on, progress), &functional);
   outcome->seconds.setup += functional.setup_seconds;
   outcome->seconds.solve = functional.solve_seconds;
   outcome->seconds.views = functional.views_seconds;
@@ -145,19 +148,21 @@ void SolveFunctional(const EstimateOptions& options, const estimator::EstimateIn
 // Throws Error for settings that are not valid.
 void CheckSettings(const EstimateOptions& options) {
   if (options.solver == "scene") {
-    SceneOptionsOf(options, {});
+    SceneOptionsOf(options, {}, {});
   } else if (options.by_blocks()) {
-    BlockOptionsOf(options, {});
+    BlockOptionsOf(options, {}, {});
   } else {
-    FunctionalOptionsOf(options, {});
+    FunctionalOptionsOf(options, {}, {});
   }
 }
 
-void Solve(const EstimateOptions& options, const estimator::EstimateInput& input,
+void Solve(const EstimateOptions& options, const PreparedEstimate& prepared,
            const Progress& progress, LightFieldWriter* writer, EstimateOutcome* outcome) {
-  if (options.solver == "scene") return SolveScene(options, input, progress, writer, outcome);
-  if (options.by_blocks()) return SolveBlocks(options, input, progress, outcome);
-  SolveFunctional(options, input, progress, outcome);
+  const estimator::EstimateInput& input = prepared.input;
+  const model::EffectSet& on = prepared.effects.on;
+  if (options.solver == "scene") return SolveScene(options, input, on, progress, writer, outcome);
+  if (options.by_blocks()) return SolveBlocks(options, input, on, progress, outcome);
+  SolveFunctional(options, input, on, progress, outcome);
 }
 
 // What was not written as it was made.
@@ -226,9 +231,10 @@ CommandResult Estimate(const EstimateOptions& options) {
   LightFieldWriter writer(prepared.input.transfer,
                           options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng,
                           &outputs.light_field);
-  Solve(options, prepared.input, progress, &writer, &outcome);
+  Solve(options, prepared, progress, &writer, &outcome);
   model::LightFieldOrigin& origin = outcome.light_field.origin;
   origin.seconds = outcome.seconds.setup + outcome.seconds.solve + outcome.seconds.views;
+  origin.effects = prepared.effects.on.Names();
   origin.version = Version();
   origin.date = NowIso8601();
   CheckOutcome(prepared, &outcome);

@@ -12,6 +12,7 @@
 #include "commands.h"
 #include "depth_io.h"
 #include "image_io.h"
+#include "light_field_effects.h"
 #include "light_field_io.h"
 #include "option_values.h"
 #include "thicklens/error.h"
@@ -50,8 +51,10 @@ Eigen::ArrayXXd ViewWeights(const EstimateOptions& options,
   }
   auto [u_count, v_count] = ViewCounts(options.views);
   if (u_count == 0) u_count = v_count = kDefaultViews;
-  const model::ApertureShape usual =
-      camera ? model::ApertureShapeOf(camera->psf) : model::ApertureShape::kUniform;
+  const model::ApertureShape usual = IsLeftOut(options.effects, model::Effect::kApertureShape)
+                                         ? model::ApertureShape::kGaussian
+                                     : camera ? model::ApertureShapeOf(camera->psf)
+                                              : model::ApertureShape::kUniform;
   return model::ApertureWeights(ApertureShapeOr(options.aperture_shape, usual), u_count, v_count);
 }
 
@@ -186,6 +189,10 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
     TellUnlikelyDepth(options, *input.camera, *prepared.depth.depth);
   }
   SmoothNoisyDepth(options, &prepared);
+  prepared.effects = DecideEstimateEffects(options, input.camera, prepared.depth.depth);
+  if (input.camera && !prepared.effects.on.Has(model::Effect::kThickness)) {
+    input.falloff_camera = model::ThinTwin(*input.camera);
+  }
   return prepared;
 }
 

@@ -11,6 +11,7 @@ namespace thicklens::tools {
 
 struct PreparedEstimate {
   estimator::EstimateInput input;
+  model::EffectDecision effects;
   PreparedDepth depth;  // without its disparity, which is the input's
   // Of the disparity, px per view step: as it was, and what is left of it where it was smoothed.
   std::optional<double> depth_noise_px, depth_noise_left_px;

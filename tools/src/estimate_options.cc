@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "light_field_effects.h"
 #include "option_values.h"
 #include "thicklens/error.h"
 
@@ -89,10 +90,7 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("MM");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Takes the depth as it is, however noisy: it is smoothed along surfaces else");
-  command->add_option("--without", options->without, "Effects to leave out: falloff")
-      ->check(CLI::IsMember({"falloff"}))
-      ->delimiter(',')
-      ->type_name("EFFECT");
+  AddEffectOptions(command, &options->effects);
   command
       ->add_option("--format", options->format,
                    "Of the views: png (16 bit, stored values) or tiff (float, linear light)")
@@ -273,10 +271,6 @@ void RequireReportBesideLightField(const EstimateOptions& options) {
 
 }  // namespace
 
-bool EstimateOptions::falloff() const {
-  return std::find(without.begin(), without.end(), "falloff") == without.end();
-}
-
 std::string EstimateOptions::report_path() const {
   return report_folder.empty() ? "" : (fs::path(report_folder) / kReportName).string();
 }
@@ -305,11 +299,16 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
   needs(!options.aperture_shape.empty(), !aperture_of,
         "--aperture-shape and --aperture-of exclude each other");
+  needs(IsLeftOut(options.effects, model::Effect::kApertureShape),
+        options.aperture_shape.empty() && !aperture_of,
+        "--aperture-shape and --aperture-of say which shape the aperture has; without the effect "
+        "aperture-shape it is Gaussian");
   CheckSolverUsage(options);
   RequireReportBesideLightField(options);
 }
 
-estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress progress) {
+estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress) {
   estimator::SceneOptions solver;
   if (options.prior) solver.prior = estimator::PriorFromName(*options.prior);
   const std::string strength = options.strength.value_or("auto");
@@ -322,7 +321,7 @@ estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress 
   if (options.tolerance) solver.tolerance = *options.tolerance;
   if (options.max_iterations) solver.max_iterations = *options.max_iterations;
   solver.double_precision = options.double_precision;
-  solver.falloff = options.falloff();
+  solver.falloff = on.Has(model::Effect::kFalloff);
   solver.threads = options.common.threads;
   solver.memory_limit_mib = options.memory_limit_mib;
   solver.progress = std::move(progress);
@@ -331,16 +330,18 @@ estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress 
   return solver;
 }
 
-estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options, Progress progress) {
+estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options,
+                                               const model::EffectSet& on, Progress progress) {
   estimator::BlurCheckOptions check;
-  check.falloff = options.falloff();
+  check.falloff = on.Has(model::Effect::kFalloff);
   check.threads = options.common.threads;
   check.memory_limit_mib = options.memory_limit_mib;
   check.progress = std::move(progress);
   return check;
 }
 
-estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress progress) {
+estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress) {
   estimator::BlockOptions solver;
   if (options.block_solver) solver.solver = estimator::BlockSolverFromName(*options.block_solver);
   if (options.stencil) solver.stencil = estimator::StencilFromName(*options.stencil);
@@ -349,7 +350,7 @@ estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress 
   solver.ridge = options.ridge;
   solver.block_px = options.block_px;
   solver.memory_limit_mib = options.memory_limit_mib;
-  solver.falloff = options.falloff();
+  solver.falloff = on.Has(model::Effect::kFalloff);
   solver.threads = options.common.threads;
   solver.progress = std::move(progress);
   std::string why;
@@ -358,14 +359,14 @@ estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress 
 }
 
 estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options,
-                                                 Progress progress) {
+                                                 const model::EffectSet& on, Progress progress) {
   estimator::FunctionalOptions solver;
   if (options.gamma) solver.gamma = *options.gamma;
   solver.ridge = options.ridge;
   if (options.tolerance) solver.tolerance = *options.tolerance;
   if (options.max_iterations) solver.max_iterations = *options.max_iterations;
   solver.double_precision = options.double_precision;
-  solver.falloff = options.falloff();
+  solver.falloff = on.Has(model::Effect::kFalloff);
   solver.threads = options.common.threads;
   solver.memory_limit_mib = options.memory_limit_mib;
   solver.progress = std::move(progress);

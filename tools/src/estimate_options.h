@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "effect_options.h"
 #include "light_field_options.h"
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/estimate.h"
@@ -33,7 +34,7 @@ struct EstimateOptions {
   std::string solver = "scene";
   std::optional<double> memory_limit_mib;
   bool keep_depth_noise = false;
-  std::vector<std::string> without;
+  EffectOptions effects{{}, {}, {}, "--effect-tolerance"};
   std::string device = "auto";
   std::string format = "png";
   // Of some solvers, as the help says.
@@ -47,7 +48,6 @@ struct EstimateOptions {
   std::optional<int> block_px;
 
   bool by_blocks() const { return solver == "blocks"; }
-  bool falloff() const;
   std::string report_path() const;  // of the page in its folder; empty: none
 };
 
@@ -56,12 +56,17 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options);
 // Throws UsageError for what cannot be meant: nothing that is given is left out without a word.
 void CheckEstimateUsage(const EstimateOptions& options);
 
-// What is given, and the solver's defaults else. Throws Error where that is not valid.
+// What is given, and the solver's defaults else; `on`: the effects of the photograph that the
+// solver is to take into account. Throws Error where that is not valid.
 using Progress = std::function<void(int done, int total)>;
-estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, Progress progress);
-estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options, Progress progress);
-estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, Progress progress);
-estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options, Progress progress);
+estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress);
+estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options,
+                                               const model::EffectSet& on, Progress progress);
+estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress);
+estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options,
+                                                 const model::EffectSet& on, Progress progress);
 
 }  // namespace thicklens::tools
 

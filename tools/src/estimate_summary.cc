@@ -62,7 +62,7 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
   out->update({{"block_solver", nullptr},
                {"prior", estimator::PriorName(scene.prior)},
                {"strength", scene.strength},
-               {"strength_rule", NameOf(SceneOptionsOf(options, {}).strength_rule)},
+               {"strength_rule", NameOf(SceneOptionsOf(options, {}, {}).strength_rule)},
                {"noise_sigma", scene.noise_sigma},
                {"device", scene.device},
                {"threads", scene.threads},
@@ -294,6 +294,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
                 {"total", seconds.total}}},
               {"peak_rss_mib", PeakResidentMib()},
               {"effects", light_field.origin.effects},
+              {"effect_impacts", EffectsJson(prepared.effects)},
               {"holes_filled", prepared.depth.holes},
               {"holes_share", HoleShare(prepared)},
               {"clipped_fraction", outcome.clipped_fraction},
@@ -336,6 +337,7 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
   text += SolverText(summary, outcome);
   text += fmt::format("device       {}, {} thread(s)\n", summary["device"].get<std::string>(),
                       summary["threads"].get<int>());
+  if (!prepared.effects.findings.empty()) text += EffectsText(prepared.effects);
   text += AccuracyText(outcome);
   if (outcome.blur) text += fmt::format("blur check   {}\n", outcome.blur->Summary());
   text += ConfidenceText(outcome.confidence);

@@ -18,6 +18,7 @@
 #include "commands.h"
 #include "image_io.h"
 #include "interrupt.h"
+#include "light_field_effects.h"
 #include "light_field_io.h"
 #include "light_field_options.h"
 #include "option_values.h"
@@ -28,6 +29,8 @@
 
 namespace thicklens::tools {
 namespace {
+
+using model::Effect;
 
 constexpr int kMosaicGapPx = 2;
 constexpr int kEpipolarRepeatPx = 8;  // one line a view would be too thin to look at
@@ -50,7 +53,7 @@ struct RenderOptions {
   // How.
   std::string aperture_shape;
   std::optional<double> aperture_radius;
-  std::vector<std::string> without;
+  EffectOptions effects;
   std::optional<double> noise_levels;
   std::optional<int> bits;
   std::optional<std::int64_t> seed;
@@ -99,7 +102,12 @@ void CheckUsage(RenderOptions* options) {
   RefuseUnless(averages, options->aperture_radius.has_value(), "--aperture", kAverages);
   if (!options->aperture_shape.empty() && options->aperture_radius)
     throw UsageError("--aperture and --aperture-shape: one of them, or none, is expected");
-  RefuseUnless(options->as_captured, !options->without.empty(), "--without", "--as-captured");
+  RefuseUnless(options->as_captured, options->effects.effects.has_value(), "--effects",
+               "--as-captured");
+  RefuseUnless(options->as_captured, options->effects.without.has_value(), "--without",
+               "--as-captured");
+  RefuseUnless(options->as_captured, options->effects.tolerance.has_value(), "--tolerance",
+               "--as-captured");
   const bool is_picture = options->convert.empty();
   const char* const kPictures = "pictures, not with --convert,";
   RefuseUnless(is_picture, options->noise_levels.has_value(), "--noise", kPictures);
@@ -152,6 +160,7 @@ struct Rendering {
   model::LinearPicture picture;
   std::string what;  // for people
   nlohmann::json details;
+  std::string effects;  // for people, a line of its own; empty: nothing to tell
 };
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
@@ -183,6 +192,29 @@ std::string ApertureText(const RenderOptions& options, const model::LightField& 
                                         : fmt::format("a {} aperture", options.aperture_shape);
 }
 
+// Those of the effects that are on.
+Eigen::ArrayXXd PhotographWeights(const RenderOptions& options,
+                                  const model::LightField& light_field, const model::EffectSet& on,
+                                  nlohmann::json* details) {
+  const bool is_said = options.aperture_radius || !options.aperture_shape.empty();
+  for (const Effect effect : {Effect::kDefocus, Effect::kApertureShape}) {
+    if (!is_said || on.Has(effect)) continue;
+    throw UsageError(
+        fmt::format("--aperture and --aperture-shape: they need the effect {}, which is left out",
+                    model::EffectName(effect)));
+  }
+  if (!on.Has(Effect::kDefocus)) {
+    (*details)["aperture_shape"] = "pinhole";
+    return estimator::WeightsForRadius(light_field, 0);
+  }
+  if (!on.Has(Effect::kApertureShape)) {
+    (*details)["aperture_shape"] = "gaussian";
+    return model::ApertureWeights(model::ApertureShape::kGaussian, light_field.u_count,
+                                  light_field.v_count);
+  }
+  return WeightsOf(options, light_field, details);
+}
+
 Rendering RenderPhotograph(const RenderOptions& options, const model::LightField& light_field) {
   std::string notice;
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
@@ -192,12 +224,21 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
   const auto kernels = backend->NewFloat();
   Rendering rendering;
   rendering.details = {{"rendered", "as-captured"}, {"device", backend->name()}};
-  const bool falloff = light_field.camera && options.without.empty();
-  rendering.details["falloff"] = falloff;
-  const Eigen::ArrayXXd weights = WeightsOf(options, light_field, &rendering.details);
-  rendering.picture =
-      estimator::Photograph(light_field, weights, falloff, kernels.get(), options.common.threads);
-  rendering.what = fmt::format("photograph through {}", ApertureText(options, light_field));
+  const model::EffectDecision effects = DecidePhotographEffects(options.effects, light_field);
+  rendering.details["effects"] = effects.on.Names();
+  rendering.details["effect_impacts"] = EffectsJson(effects);
+  std::optional<model::Camera> falloff;
+  if (effects.on.Has(Effect::kFalloff)) {
+    falloff = effects.on.Has(Effect::kThickness) ? *light_field.camera
+                                                 : model::ThinTwin(*light_field.camera);
+  }
+  rendering.picture = estimator::Photograph(
+      light_field, PhotographWeights(options, light_field, effects.on, &rendering.details),
+      falloff ? &*falloff : nullptr, kernels.get(), options.common.threads);
+  rendering.what = fmt::format("photograph through {}", effects.on.Has(Effect::kDefocus)
+                                                            ? ApertureText(options, light_field)
+                                                            : "a pinhole");
+  if (!effects.findings.empty()) rendering.effects = EffectsText(effects);
   return rendering;
 }
 
@@ -347,7 +388,8 @@ CommandResult RenderPicture(const RenderOptions& options) {
               fmt::format("{}\n{} x {} views -> {} x {} px, {} channel(s), {} bit{}: {}\n{}",
                           rendering.what, light_field.u_count, light_field.v_count,
                           picture.width_px, picture.height_px, picture.channels, bits, noise,
-                          options.output, ClippedText(fraction)));
+                          options.output, ClippedText(fraction)) +
+                  rendering.effects);
   return result;
 }
 
@@ -418,10 +460,7 @@ void AddHowToRender(CLI::App* command, RenderOptions* options) {
                    "--as-captured with it")
       ->check(NonNegative())
       ->type_name("R");
-  command->add_option("--without", options->without, "Effects to leave out: falloff")
-      ->check(CLI::IsMember({"falloff"}))
-      ->delimiter(',')
-      ->type_name("EFFECT");
+  AddEffectOptions(command, &options->effects);
   command
       ->add_option("--noise", options->noise_levels,
                    "Add normal noise of N/255 to the stored values")

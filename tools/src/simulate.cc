@@ -13,6 +13,7 @@
 #include <string>
 
 #include "commands.h"
+#include "effect_options.h"
 #include "image_io.h"
 #include "interrupt.h"
 #include "progress_line.h"
@@ -34,6 +35,7 @@ struct SimulateOptions {
   std::string output_folder;
   std::optional<std::int64_t> seed;
   bool unknown_offset = false;
+  EffectOptions effects;
 };
 
 // Picture files of unknown origin are taken as sRGB, as a screen would show them.
@@ -69,18 +71,21 @@ model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
   return sweep;
 }
 
-void RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
-                  model::OutputFolder* folder) {
+// Returns the bits of what is stored.
+int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
+                 model::OutputFolder* folder) {
   const auto& frames = simulator.truth().frames;
   const int count = static_cast<int>(frames.size());
   ProgressLine progress("rendering", common.quiet);
-  std::atomic<int> done{0};
+  std::atomic<int> done{0}, bits{0};
   model::ParallelFor(count, common.threads, [&](int i) {
     ThrowIfInterrupted();
-    const std::string png = EncodePng(simulator.RenderFrame(i));
-    folder->Write(frames[static_cast<std::size_t>(i)].image, png);
+    const model::StoredPicture stored = simulator.RenderFrame(i);
+    bits = stored.bits;
+    folder->Write(frames[static_cast<std::size_t>(i)].image, EncodePng(stored));
     progress.Show(++done, count);
   });
+  return bits;
 }
 
 nlohmann::json Summary(const SimulateOptions& options,
@@ -95,7 +100,6 @@ nlohmann::json Summary(const SimulateOptions& options,
           {"frames", truth.frames.size()},
           {"width_px", simulation.camera.sensor.width_px},
           {"height_px", simulation.camera.sensor.height_px},
-          {"bits", simulation.bits},
           {"target", model::TargetKindName(simulation.target.kind)},
           {"seed", simulation.seed},
           {"nearest_depth_mm", near->depth_mm},
@@ -113,12 +117,13 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
+  ApplyEffectOptions(options.effects, &simulation.effects);
   model::OutputFolder folder(options.output_folder, kMarkerFile,
                              {"frames", "sweep.yaml", "camera.yaml", kMarkerFile});
 
   const model::SweepSimulator simulator(simulation, ReadTargetPicture(simulation.target));
-  RenderFrames(simulator, options.common, &folder);
-  model::Camera camera = simulation.camera;
+  const int bits = RenderFrames(simulator, options.common, &folder);
+  model::Camera camera = simulator.camera();
   camera.calibration.reset();  // what a calibration of this sweep has to find
   folder.Write("camera.yaml", model::CameraToYaml(camera));
   folder.Write("sweep.yaml", model::SweepToYaml(DescribeSweep(simulation, simulator.truth(),
@@ -130,10 +135,13 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   CommandResult result;
   result.summary = Summary(options, simulation, simulator.truth(), seconds.count());
+  result.summary["bits"] = bits;
+  result.summary["effects"] = EffectsJson(simulator.effects());
   PrintResult(options.common,
               fmt::format("{} frames of {} x {} px in {:.1f} s: {}\n", simulation.frame_count,
                           camera.sensor.width_px, camera.sensor.height_px, seconds.count(),
-                          options.output_folder));
+                          options.output_folder) +
+                  EffectsText(simulator.effects()));
   return result;
 }
 
@@ -157,6 +165,7 @@ void AddSimulateCommand(CLI::App* program, CommandAction* action) {
       ->type_name("N");
   command->add_flag("--unknown-offset", options->unknown_offset,
                     "Leave the bench offset out of sweep.yaml, to be found by a calibration");
+  AddEffectOptions(command, &options->effects);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] { RunCommand(options->common, [&] { return SimulateSweep(*options); }); };

@@ -63,6 +63,12 @@ struct EstimateInput {
   // Both or none. S x T of the grid is the size of the picture.
   std::optional<model::LightFieldGrid> grid;
   std::optional<model::Camera> camera;
+  std::optional<model::Camera>
+      falloff_camera;  // of the fall-off, if it is another, for example thin
+
+  const model::Camera& camera_of_falloff() const {
+    return falloff_camera ? *falloff_camera : *camera;
+  }
 };
 
 struct BlockReport {

@@ -10,10 +10,10 @@ namespace thicklens::estimator {
 
 // The photograph that the whole aperture would take of the light field, in linear light: the mean
 // of the views with `weights` (V x U, >= 0; the sum need not be 1), each ray where it lands.
-// Views that are not present have no share. With a camera, rays carry the irradiance of (12),
-// relative to that of a uniform radiance at the principal point, if `falloff` is on.
+// Views that are not present have no share. Rays carry the irradiance of (12) in `falloff`,
+// relative to that of a uniform radiance at the principal point; null: none.
 model::LinearPicture Photograph(const model::LightField& light_field,
-                                const Eigen::ArrayXXd& weights, bool falloff,
+                                const Eigen::ArrayXXd& weights, const model::Camera* falloff,
                                 kernels::Kernels<float>* kernels, int threads);
 
 // The weights of a smaller aperture over the same views, V x U, sum 1: the light field's own ones,
