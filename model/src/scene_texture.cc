@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <complex>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "square_wave.h"
+#include "texture_canvas.h"
 #include "thicklens/error.h"
 
 namespace thicklens::model {
@@ -15,17 +16,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-constexpr int kSamplesPerPixel = 4;
-// A tile of 4096 x 4096 samples holds 256 MiB. What is larger is drawn coarser.
-constexpr int kMaxSamples = 4096;
-// No detail above it, in cycles per px: more would alias in the views.
-constexpr double kHighestFrequency = 0.5;
-// Detail fades towards that limit as behind a Gaussian of this width, so that edges do not ring.
-constexpr double kSoftnessPx = 0.5;
 // The largest leaf, as a part of the shorter side of what is seen.
 constexpr double kLargestLeaf = 1.0 / 6;
-
-using Channels = std::array<cv::Mat, 3>;  // CV_32F
 
 struct FeatureRange {
   double chosen_px, smallest_px, largest_px;
@@ -61,80 +53,6 @@ double FeaturePx(const TextureOptions& options) {
   return size_px;
 }
 
-// The frame of a drawing: a period of samples.
-struct Canvas {
-  int columns = 0, rows = 0;
-  Eigen::Vector2d spacing_mm{0, 0};
-  Eigen::Vector2d origin_mm{0, 0};
-  Channels light;
-
-  double width_mm() const { return columns * spacing_mm.x(); }
-  double height_mm() const { return rows * spacing_mm.y(); }
-  Eigen::Vector2d PositionMm(int row, int column) const {
-    return origin_mm + spacing_mm.cwiseProduct(Eigen::Vector2d(column, row));
-  }
-};
-
-int QuickCount(double samples) {
-  const int needed = static_cast<int>(std::ceil(samples * (1 - 1e-12)));
-  return std::min(cv::getOptimalDFTSize(std::max(needed, 4)), kMaxSamples);
-}
-
-// `unit_mm`: the sides are whole multiples of it; 0: any length.
-Canvas MakeCanvas(const TextureRequest& request, double unit_mm) {
-  Eigen::Vector2d size_mm = request.high_mm - request.low_mm;
-  if (unit_mm > 0) size_mm = unit_mm * (size_mm / unit_mm).array().ceil().max(1);
-  const double spacing_mm =
-      std::max(request.coarsest_pixel_mm / kSamplesPerPixel, size_mm.maxCoeff() / kMaxSamples);
-  Canvas canvas;
-  canvas.columns = QuickCount(size_mm.x() / spacing_mm);
-  canvas.rows = QuickCount(size_mm.y() / spacing_mm);
-  canvas.spacing_mm = {spacing_mm, spacing_mm};
-  if (unit_mm > 0) {
-    canvas.spacing_mm = {size_mm.x() / canvas.columns, size_mm.y() / canvas.rows};
-  }
-  canvas.origin_mm = request.low_mm;
-  for (cv::Mat& channel : canvas.light) {
-    channel = cv::Mat(canvas.rows, canvas.columns, CV_32F, cv::Scalar(0));
-  }
-  return canvas;
-}
-
-// Multiplies the spectrum by gain(fx, fy), cycles per mm.
-template <typename Gain>
-void Filter(const Canvas& canvas, const Gain& gain, cv::Mat* samples) {
-  cv::Mat spectrum;
-  cv::dft(*samples, spectrum, cv::DFT_COMPLEX_OUTPUT);
-  for (int i = 0; i < spectrum.rows; ++i) {
-    auto* row = spectrum.ptr<std::complex<float>>(i);
-    const double fy = std::min(i, spectrum.rows - i) / canvas.height_mm();
-    for (int j = 0; j < spectrum.cols; ++j) {
-      row[j] *= static_cast<float>(gain(std::min(j, spectrum.cols - j) / canvas.width_mm(), fy));
-    }
-  }
-  cv::dft(spectrum, *samples, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-}
-
-double SincSquared(double x) {
-  if (x == 0) return 1;
-  const double sinc = std::sin(kPi * x) / (kPi * x);
-  return sinc * sinc;
-}
-
-// Takes away what the pixels cannot show, and gives back what the lines between the samples, whose
-// transfer is sinc^2(spacing f) on each axis, will take.
-void LimitBand(double coarsest_pixel_mm, Canvas* canvas) {
-  const auto gain = [&](double fx_per_mm, double fy_per_mm) {
-    const double f2 =
-        (fx_per_mm * fx_per_mm + fy_per_mm * fy_per_mm) * coarsest_pixel_mm * coarsest_pixel_mm;
-    if (f2 >= kHighestFrequency * kHighestFrequency) return 0.0;
-    return std::exp(-2 * kPi * kPi * kSoftnessPx * kSoftnessPx * f2) /
-           (SincSquared(fx_per_mm * canvas->spacing_mm.x()) *
-            SincSquared(fy_per_mm * canvas->spacing_mm.y()));
-  };
-  for (cv::Mat& channel : canvas->light) Filter(*canvas, gain, &channel);
-}
-
 // What a leaf or a noise adds to each channel's mean, from -1 to 1: common and own parts.
 std::array<double, 3> DrawnColour(const TextureOptions& options, RandomDraws* draws) {
   const double common = 2 * draws->Uniform() - 1;
@@ -147,9 +65,10 @@ std::array<double, 3> DrawnColour(const TextureOptions& options, RandomDraws* dr
 
 // Discs that hide each other, radii distributed as r^-3 between the smallest and the largest: the
 // statistics of natural pictures. Drawn from the front backward until nothing shines through.
-Canvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest& request,
-                      RandomDraws* draws) {
-  Canvas canvas = MakeCanvas(request, 0);
+TextureCanvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest& request,
+                             RandomDraws* draws) {
+  TextureCanvas canvas =
+      MakeTextureCanvas(request.low_mm, request.high_mm, request.coarsest_pixel_mm, 0);
   const double spacing_mm = canvas.spacing_mm.x();
   const double smallest_mm = FeaturePx(options) * request.pixel_mm;
   const double largest_mm =
@@ -199,8 +118,10 @@ Canvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest& reque
 
 // Gaussian noise whose amplitude falls as 1/f, from one cycle per side of what is seen up to the
 // shortest period. A tanh keeps it between no light and twice the mean.
-Canvas DrawNoise(const TextureOptions& options, const TextureRequest& request, RandomDraws* draws) {
-  Canvas canvas = MakeCanvas(request, 0);
+TextureCanvas DrawNoise(const TextureOptions& options, const TextureRequest& request,
+                        RandomDraws* draws) {
+  TextureCanvas canvas =
+      MakeTextureCanvas(request.low_mm, request.high_mm, request.coarsest_pixel_mm, 0);
   const double period_mm = FeaturePx(options) * request.pixel_mm;
   const double lowest_per_mm = 1 / std::min(canvas.width_mm(), canvas.height_mm());
   const auto gain = [&](double fx, double fy) {
@@ -214,7 +135,7 @@ Canvas DrawNoise(const TextureOptions& options, const TextureRequest& request, R
         samples.at<float>(i, j) = static_cast<float>(draws->Normal());
       }
     }
-    Filter(canvas, gain, &samples);
+    FilterChannel(canvas, gain, &samples);
     const double rms = std::sqrt(samples.dot(samples) / static_cast<double>(samples.total()));
     if (rms > 0) samples /= rms;
     return samples;
@@ -234,24 +155,16 @@ Canvas DrawNoise(const TextureOptions& options, const TextureRequest& request, R
   return canvas;
 }
 
-// +1 on the first half of each period and -1 on the second; a sample in whose cell it changes gets
-// the mean over the cell.
-double SquareWave(double x, double period, double cell) {
-  const double phase = x - period * std::floor(x / period);
-  const double from_middle = std::abs(phase - period / 2);  // period/2 at the rise, 0 at the fall
-  const double from_change = std::min(from_middle, period / 2 - from_middle);
-  return std::copysign(std::min(from_change / (cell / 2), 1.0), period / 2 - phase);
-}
-
-Canvas DrawCheckerboard(const TextureOptions& options, const TextureRequest& request) {
+TextureCanvas DrawCheckerboard(const TextureOptions& options, const TextureRequest& request) {
   const double period_mm = 2 * FeaturePx(options) * request.pixel_mm;
-  Canvas canvas = MakeCanvas(request, period_mm);
+  TextureCanvas canvas =
+      MakeTextureCanvas(request.low_mm, request.high_mm, request.coarsest_pixel_mm, period_mm);
   for (int i = 0; i < canvas.rows; ++i) {
     for (int j = 0; j < canvas.columns; ++j) {
       const Eigen::Vector2d at_mm = canvas.PositionMm(i, j);
       const double light = 1 + options.contrast *
-                                   SquareWave(at_mm.x(), period_mm, canvas.spacing_mm.x()) *
-                                   SquareWave(at_mm.y(), period_mm, canvas.spacing_mm.y());
+                                   SquareWaveMean(at_mm.x(), period_mm, canvas.spacing_mm.x()) *
+                                   SquareWaveMean(at_mm.y(), period_mm, canvas.spacing_mm.y());
       for (cv::Mat& channel : canvas.light) channel.at<float>(i, j) = static_cast<float>(light);
     }
   }
@@ -271,8 +184,8 @@ cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
 
 // The user's picture, upright and around the centre; beyond its sides it is mirrored, so that its
 // tile is twice as large.
-Canvas DrawPicture(const TextureOptions& options, const TextureRequest& request,
-                   const LinearPicture& picture) {
+TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& request,
+                          const LinearPicture& picture) {
   if (picture.width_px < 1 || picture.height_px < 1) {
     throw Error(fmt::format("texture.picture '{}' is empty", options.picture_path));
   }
@@ -285,13 +198,14 @@ Canvas DrawPicture(const TextureOptions& options, const TextureRequest& request,
                                          : 2 * std::max(reach_mm.x(), reach_mm.y() / shape);
   const Eigen::Vector2d size_mm(width_mm, width_mm * shape);
 
-  const double spacing_mm =
-      std::max(request.coarsest_pixel_mm / kSamplesPerPixel, 2 * size_mm.maxCoeff() / kMaxSamples);
+  const double spacing_mm = std::max(request.coarsest_pixel_mm / kSamplesPerPixel,
+                                     2 * size_mm.maxCoeff() / kMaxTileSamples);
   const auto count = [&](double length_mm) {
-    return std::clamp(static_cast<int>(std::lround(length_mm / spacing_mm)), 2, kMaxSamples / 2);
+    return std::clamp(static_cast<int>(std::lround(length_mm / spacing_mm)), 2,
+                      kMaxTileSamples / 2);
   };
   const cv::Size size(count(size_mm.x()), count(size_mm.y()));
-  Canvas canvas;
+  TextureCanvas canvas;
   canvas.columns = 2 * size.width;
   canvas.rows = 2 * size.height;
   canvas.spacing_mm = {size_mm.x() / size.width, size_mm.y() / size.height};
@@ -307,8 +221,8 @@ Canvas DrawPicture(const TextureOptions& options, const TextureRequest& request,
   return canvas;
 }
 
-Canvas Draw(const TextureOptions& options, const TextureRequest& request,
-            const LinearPicture& picture, RandomDraws* draws) {
+TextureCanvas Draw(const TextureOptions& options, const TextureRequest& request,
+                   const LinearPicture& picture, RandomDraws* draws) {
   switch (options.kind) {
     case TextureKind::kCheckerboard:
       return DrawCheckerboard(options, request);
@@ -322,7 +236,7 @@ Canvas Draw(const TextureOptions& options, const TextureRequest& request,
 }
 
 // Every channel gets its colour for its mean.
-void Paint(const Eigen::Vector3d& colour, Canvas* canvas) {
+void Paint(const Eigen::Vector3d& colour, TextureCanvas* canvas) {
   for (std::size_t c = 0; c < 3; ++c) {
     cv::Mat& channel = canvas->light[c];
     channel *= colour(static_cast<int>(c)) / cv::mean(channel)[0];
@@ -350,7 +264,7 @@ SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& 
     wave_ = 2 * kPi / period_mm * Eigen::Vector2d(std::cos(angle_rad), std::sin(angle_rad));
     return;
   }
-  Canvas canvas = Draw(options, request, picture, draws);
+  TextureCanvas canvas = Draw(options, request, picture, draws);
   LimitBand(request.coarsest_pixel_mm, &canvas);
   if (options.kind != TextureKind::kPicture) Paint(options.colour, &canvas);
   columns_ = canvas.columns;

@@ -7,6 +7,7 @@
 #include <complex>
 #include <opencv2/imgproc.hpp>
 
+#include "square_wave.h"
 #include "thicklens/error.h"
 
 namespace thicklens::model {
@@ -26,16 +27,6 @@ constexpr double kLargestLeaf = 1.0 / 6;
 // 128 MiB). The samples of a sweep that asks for more, because its field is large or its nearest
 // and farthest depth differ much, lie further apart: the near frames then lack the finest detail.
 constexpr int kMaxSamples = 4096;
-
-// The mean over [x - width/2, x + width/2] of a wave that is +1 on the first half of each period
-// and -1 on the second: the difference of its antiderivative, a triangle wave.
-double SquareWaveMean(double x, double period, double width) {
-  const auto triangle = [period](double at) {
-    const double phase = at - period * std::floor(at / period);
-    return phase < period / 2 ? phase : period - phase;
-  };
-  return (triangle(x + width / 2) - triangle(x - width / 2)) / width;
-}
 
 double FeatureSizeMm(const TargetOptions& options, double chosen_mm, double smallest_mm,
                      double largest_mm) {
@@ -214,11 +205,7 @@ TargetTile DrawSiemensStar(const TargetOptions& options, const TileRequest& requ
   const double cycles = std::max(1.0, std::round(kPi * rim_mm / sector_mm));
   Canvas canvas(request, 0);
   canvas.Fill([&](double x, double y) {
-    const double radius_mm = std::hypot(x, y);
-    const double width_cycles =
-        cycles * canvas.spacing_x_mm() / (2 * kPi * std::max(radius_mm, canvas.spacing_x_mm() / 2));
-    return 1 + options.contrast *
-                   SquareWaveMean(cycles * std::atan2(y, x) / (2 * kPi), 1, width_cycles);
+    return 1 + options.contrast * StarMean(x, y, cycles, canvas.spacing_x_mm());
   });
   return canvas.Finish();
 }
