@@ -101,8 +101,12 @@ std::string TextureKindName(TextureKind kind) {
       return "uniform";
     case TextureKind::kSine:
       return "sine";
+    case TextureKind::kEdge:
+      return "edge";
     case TextureKind::kCheckerboard:
       return "checkerboard";
+    case TextureKind::kSiemensStar:
+      return "siemens-star";
     case TextureKind::kDeadLeaves:
       return "dead-leaves";
     case TextureKind::kNoise:

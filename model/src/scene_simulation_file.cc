@@ -115,9 +115,10 @@ OutlineOptions ReadOutline(const YamlNode& node) {
 }
 
 TextureKind ReadKind(const YamlNode& node) {
-  const TextureKind kinds[] = {TextureKind::kUniform,      TextureKind::kSine,
-                               TextureKind::kCheckerboard, TextureKind::kDeadLeaves,
-                               TextureKind::kNoise,        TextureKind::kPicture};
+  const TextureKind kinds[] = {TextureKind::kUniform,     TextureKind::kSine,
+                               TextureKind::kEdge,        TextureKind::kCheckerboard,
+                               TextureKind::kSiemensStar, TextureKind::kDeadLeaves,
+                               TextureKind::kNoise,       TextureKind::kPicture};
   std::vector<std::string> names;
   for (const TextureKind kind : kinds) names.push_back(TextureKindName(kind));
   const std::string name = node.OneOf(names);
@@ -132,8 +133,10 @@ std::vector<std::string> TextureKeys(TextureKind kind) {
     case TextureKind::kUniform:
       return {"kind", "colour"};
     case TextureKind::kSine:
+    case TextureKind::kEdge:
       return {"kind", "colour", "contrast", "feature_size_px", "angle_deg"};
     case TextureKind::kCheckerboard:
+    case TextureKind::kSiemensStar:
       return {"kind", "colour", "contrast", "feature_size_px"};
     case TextureKind::kDeadLeaves:
     case TextureKind::kNoise:

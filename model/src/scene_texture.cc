@@ -18,6 +18,9 @@ constexpr double kPi = 3.14159265358979323846;
 
 // The largest leaf, as a part of the shorter side of what is seen.
 constexpr double kLargestLeaf = 1.0 / 6;
+// Of a star whose sectors are not given.
+constexpr double kStarCycles = 36;
+constexpr double kStarMarginPx = 8;
 
 struct FeatureRange {
   double chosen_px, smallest_px, largest_px;
@@ -29,8 +32,12 @@ FeatureRange FeatureRangeOf(TextureKind kind) {
       return {1, 0, 1000};
     case TextureKind::kSine:
       return {8, 0, 1e6};  // the shortest period is the layer's, see CheckSine
+    case TextureKind::kEdge:
+      return {0, 0, 1e6};  // the least is the layer's
     case TextureKind::kCheckerboard:
       return {12, 1, 1000};
+    case TextureKind::kSiemensStar:
+      return {0, 1, 1000};
     case TextureKind::kDeadLeaves:
       return {2, 0.5, 1000};
     case TextureKind::kNoise:
@@ -171,6 +178,28 @@ TextureCanvas DrawCheckerboard(const TextureOptions& options, const TextureReque
   return canvas;
 }
 
+// Bright and dark sectors around the middle of what is seen.
+TextureCanvas DrawSiemensStar(const TextureOptions& options, const TextureRequest& request) {
+  // Where the tile begins anew the sectors do not fit: away from what is seen.
+  const Eigen::Vector2d margin_mm =
+      Eigen::Vector2d::Constant(kStarMarginPx * request.coarsest_pixel_mm);
+  TextureCanvas canvas = MakeTextureCanvas(request.low_mm - margin_mm, request.high_mm + margin_mm,
+                                           request.coarsest_pixel_mm, 0);
+  const double rim_mm = (request.high_mm - request.low_mm).minCoeff() / 2;
+  const double sector_mm = FeaturePx(options) * request.pixel_mm;
+  const double cycles =
+      sector_mm > 0 ? std::max(1.0, std::round(kPi * rim_mm / sector_mm)) : kStarCycles;
+  for (int i = 0; i < canvas.rows; ++i) {
+    for (int j = 0; j < canvas.columns; ++j) {
+      const Eigen::Vector2d at_mm = canvas.PositionMm(i, j) - request.centre_mm;
+      const double light =
+          1 + options.contrast * StarMean(at_mm.x(), at_mm.y(), cycles, canvas.spacing_mm.x());
+      for (cv::Mat& channel : canvas.light) channel.at<float>(i, j) = static_cast<float>(light);
+    }
+  }
+  return canvas;
+}
+
 // One channel of a picture of 1 (grey), 3 (RGB) or 4 (RGBA) channels.
 cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
   cv::Mat values(picture.height_px, picture.width_px, CV_32F);
@@ -226,6 +255,8 @@ TextureCanvas Draw(const TextureOptions& options, const TextureRequest& request,
   switch (options.kind) {
     case TextureKind::kCheckerboard:
       return DrawCheckerboard(options, request);
+    case TextureKind::kSiemensStar:
+      return DrawSiemensStar(options, request);
     case TextureKind::kDeadLeaves:
       return DrawDeadLeaves(options, request, draws);
     case TextureKind::kNoise:
@@ -247,21 +278,11 @@ void Paint(const Eigen::Vector3d& colour, TextureCanvas* canvas) {
 
 SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& request,
                            const LinearPicture& picture, RandomDraws* draws) {
-  const double feature_px = FeaturePx(options);
+  FeaturePx(options);  // throws
   colour_.head<3>() = options.colour.cast<float>().array();
   if (options.kind == TextureKind::kUniform) return;
-  if (options.kind == TextureKind::kSine) {
-    const double period_mm = feature_px * request.pixel_mm;
-    const double shortest_mm = request.coarsest_pixel_mm / kHighestFrequency;
-    if (!(period_mm >= shortest_mm)) {
-      throw Error(fmt::format(
-          "texture.feature_size_px is {}: the period of a sine must be at least {:.4g} here, two "
-          "of the layer's largest px",
-          feature_px, shortest_mm / request.pixel_mm));
-    }
-    const double angle_rad = options.angle_deg * kPi / 180;
-    amplitude_ = options.contrast;
-    wave_ = 2 * kPi / period_mm * Eigen::Vector2d(std::cos(angle_rad), std::sin(angle_rad));
+  if (options.kind == TextureKind::kSine || options.kind == TextureKind::kEdge) {
+    SetWave(options, request);
     return;
   }
   TextureCanvas canvas = Draw(options, request, picture, draws);
@@ -285,6 +306,27 @@ SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& 
     darkest_ = darkest_.min(sample);
     brightest_ = brightest_.max(sample);
   }
+}
+
+void SceneTexture::SetWave(const TextureOptions& options, const TextureRequest& request) {
+  const double angle_rad = options.angle_deg * kPi / 180;
+  const Eigen::Vector2d direction(std::cos(angle_rad), std::sin(angle_rad));
+  is_edge_ = options.kind == TextureKind::kEdge;
+  amplitude_ = options.contrast;
+  // A sine's period, an edge's sigma. The latter has exp(-2 pi^2/4) at half a cycle per px.
+  const double least_mm = request.coarsest_pixel_mm * (is_edge_ ? 1 : 1 / kHighestFrequency);
+  double size_mm = FeaturePx(options) * request.pixel_mm;
+  if (is_edge_ && size_mm == 0) size_mm = least_mm;
+  // What is chosen, or stated to the last digit, is not refused for rounding.
+  if (!(size_mm >= least_mm * (1 - 1e-12))) {
+    throw Error(fmt::format(
+        "texture.feature_size_px is {}: the {} must be at least {:.4g} here, {} of the layer's "
+        "largest px",
+        options.feature_size_px, is_edge_ ? "sigma of an edge" : "period of a sine",
+        least_mm / request.pixel_mm, is_edge_ ? "one" : "two"));
+  }
+  wave_ = (is_edge_ ? 1 / (std::sqrt(2.0) * size_mm) : 2 * kPi / size_mm) * direction;
+  edge_at_ = wave_.dot(request.centre_mm);
 }
 
 }  // namespace thicklens::model

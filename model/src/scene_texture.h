@@ -16,12 +16,13 @@ namespace thicklens::model {
 // What a layer's texture must do. Positions are (X, Y), mm from the optical axis.
 struct TextureRequest {
   Eigen::Vector2d low_mm{0, 0}, high_mm{0, 0};  // what can be seen of the layer
-  Eigen::Vector2d centre_mm{0, 0};              // of a picture
+  Eigen::Vector2d centre_mm{0, 0};              // of an edge, a star or a picture
   double pixel_mm = 0;                          // one px at the layer's depth on the axis
   double coarsest_pixel_mm = 0;                 // the largest px on the layer
 };
 
-// The painted plane: RGB radiance at every position. A tile repeats itself, a picture mirrored;
+// The painted plane: RGB radiance at every position. Uniform, sine and edge are in closed form; the
+// others are tiles. A tile repeats itself, a picture mirrored;
 // between its samples, four to the coarsest px, it is linear, and the samples are such that what
 // is below half a cycle per px comes out at its full amplitude.
 class SceneTexture {
@@ -42,11 +43,15 @@ class SceneTexture {
   Eigen::Array4f At(double x_mm, double y_mm) const {
     if (!tile_.empty()) return TileAt(x_mm, y_mm);
     if (amplitude_ == 0) return colour_;
-    return colour_ *
-           static_cast<float>(1 + amplitude_ * std::cos(wave_.x() * x_mm + wave_.y() * y_mm));
+    const double phase = wave_.x() * x_mm + wave_.y() * y_mm;
+    return colour_ * static_cast<float>(1 + amplitude_ * (is_edge_ ? std::erf(phase - edge_at_)
+                                                                   : std::cos(phase)));
   }
 
  private:
+  // Of a sine or an edge.
+  void SetWave(const TextureOptions& options, const TextureRequest& request);
+
   Eigen::Array4f TileAt(double x_mm, double y_mm) const {
     const double x = (x_mm - origin_mm_.x()) * per_mm_.x();
     const double y = (y_mm - origin_mm_.y()) * per_mm_.y();
@@ -81,8 +86,10 @@ class SceneTexture {
   }
 
   Eigen::Array4f colour_{0, 0, 0, 0};
-  double amplitude_ = 0;              // of a sine
-  Eigen::Vector2d wave_{0, 0};        // radians per mm
+  double amplitude_ = 0;  // of a sine or an edge
+  bool is_edge_ = false;
+  Eigen::Vector2d wave_{0, 0};        // radians per mm; of an edge: direction/(sqrt(2) sigma)
+  double edge_at_ = 0;                // wave_ . middle
   std::vector<Eigen::Array4f> tile_;  // empty: closed form
   Eigen::Array4f darkest_{0, 0, 0, 0}, brightest_{0, 0, 0, 0};
   int columns_ = 0, rows_ = 0;

@@ -55,9 +55,11 @@ SceneSimulationOptions RandomScene(unsigned seed) {
     const double inverse = 1 / focus_mm + sigma_px / shift_px;
     layer.plane.depth_mm =
         inverse > 0.1 / focus_mm ? std::max(1 / inverse, 1.2 * focal_mm) : focus_mm * uniform(1, 5);
-    const TextureKind kinds[] = {TextureKind::kUniform, TextureKind::kSine, TextureKind::kNoise,
-                                 TextureKind::kDeadLeaves, TextureKind::kCheckerboard};
-    layer.texture.kind = kinds[pick(5)];
+    const TextureKind kinds[] = {TextureKind::kUniform,      TextureKind::kSine,
+                                 TextureKind::kNoise,        TextureKind::kDeadLeaves,
+                                 TextureKind::kCheckerboard, TextureKind::kEdge,
+                                 TextureKind::kSiemensStar};
+    layer.texture.kind = kinds[pick(7)];
     // Where a slant is stretched toward its horizon, a sine may have no period to show; every ray
     // must meet the plane.
     if (pick(3) == 0 && layer.texture.kind != TextureKind::kSine) {

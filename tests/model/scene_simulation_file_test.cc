@@ -201,6 +201,8 @@ TEST_F(SceneSimulationFileTest, TruthReplacesWhatItNamesInTheCalibration) {
 TEST_F(SceneSimulationFileTest, EveryKindOfTextureHasItsName) {
   const std::pair<const char*, TextureKind> kinds[] = {{"uniform", TextureKind::kUniform},
                                                        {"sine", TextureKind::kSine},
+                                                       {"edge", TextureKind::kEdge},
+                                                       {"siemens-star", TextureKind::kSiemensStar},
                                                        {"checkerboard", TextureKind::kCheckerboard},
                                                        {"dead-leaves", TextureKind::kDeadLeaves},
                                                        {"noise", TextureKind::kNoise}};

@@ -225,8 +225,8 @@ SceneTexture DrawTexture(const TextureOptions& options, const TextureRequest& re
 }
 
 TEST(SceneTextureTest, HoldsNothingThatThePixelsCannotShow) {
-  for (const TextureKind kind :
-       {TextureKind::kCheckerboard, TextureKind::kDeadLeaves, TextureKind::kNoise}) {
+  for (const TextureKind kind : {TextureKind::kCheckerboard, TextureKind::kSiemensStar,
+                                 TextureKind::kDeadLeaves, TextureKind::kNoise}) {
     TextureOptions options;
     options.kind = kind;
     const SceneTexture texture = DrawTexture(options, SquareRequest(160));
@@ -257,8 +257,8 @@ TEST(SceneTextureTest, HoldsNothingThatThePixelsCannotShow) {
 }
 
 TEST(SceneTextureTest, HasItsColourForItsMeanAndRepeats) {
-  for (const TextureKind kind :
-       {TextureKind::kCheckerboard, TextureKind::kDeadLeaves, TextureKind::kNoise}) {
+  for (const TextureKind kind : {TextureKind::kCheckerboard, TextureKind::kSiemensStar,
+                                 TextureKind::kDeadLeaves, TextureKind::kNoise}) {
     TextureOptions options;
     options.kind = kind;
     options.colour = {0.6, 0.3, 0.1};

@@ -16,13 +16,19 @@
 
 namespace thicklens::model {
 
-// What is painted on a layer. Every kind but kUniform and kSine is a periodic tile that holds
-// nothing above half a cycle per px of the picture, measured where the layer's pixels are largest:
-// what every view can show without aliasing. A sine finer than that is refused.
+// What is painted on a layer. Every kind but kUniform, kSine and kEdge is a periodic tile that
+// holds nothing above half a cycle per px of the picture, measured where the layer's pixels are
+// largest: what every view can show without aliasing. A sine finer than that is refused; an edge,
+// at its sharpest, has 0.7 % there of the amplitude of one that is infinitely sharp, and less
+// beyond.
 enum class TextureKind {
   kUniform,
   kSine,  // colour (1 + contrast cos(2 pi (X cos(angle) + Y sin(angle))/period)), (X, Y) as below
+  // colour (1 + contrast erf(d/(sqrt(2) sigma))), d the distance behind a straight line through
+  // the middle (TextureOptions)
+  kEdge,
   kCheckerboard,  // a corner of four squares at X = Y = 0, lower right and upper left bright
+  kSiemensStar,   // bright and dark sectors around the middle, the first below the right is bright
   kDeadLeaves,    // discs of many sizes that hide each other, each of a colour of its own
   kNoise,         // amplitude falls as 1/frequency
   kPicture,       // the user's own
@@ -38,11 +44,15 @@ struct TextureOptions {
   double contrast = 0.6;
   // Of leaves and noise: 0 all channels alike, 1 each on its own.
   double saturation = 0.5;
-  // Radius of the smallest leaf, shortest period of noise, period of a sine, side of a square,
-  // width of the whole picture; px of the simulated picture at the layer's depth on the axis. 0:
-  // chosen (2, 4, 8, 12 px, as wide as can be seen).
+  // Radius of the smallest leaf, shortest period of noise, period of a sine, sigma of an edge, side
+  // of a square, width of a star's sector half the shorter side of what is seen away from its
+  // middle, width of the whole picture; px of the simulated picture at the layer's depth on the
+  // axis. 0: chosen (2, 4, 8 px, as sharp as may be, 12 px, 36 bright sectors, as wide as can be
+  // seen).
   double feature_size_px = 0;
-  double angle_deg = 0;      // of a sine: its direction, from the right, positive downward
+  // Of a sine: its direction; of an edge: toward its bright side. From the right, positive
+  // downward. Edge, star and picture have their middle in that of the outline, or of what is seen.
+  double angle_deg = 0;
   std::string picture_path;  // kPicture, for messages
 };
 
