@@ -153,7 +153,7 @@ struct SceneSimulator::Impl {
                         static_cast<std::uint32_t>(i));
       try {
         drawn[i].emplace(layer.texture, geometry.RequestFor(layer),
-                         i < pictures.size() ? pictures[i] : none, &draws);
+                         i < pictures.size() ? pictures[i] : none, &draws, threads);
       } catch (const Error& error) {
         throw Error(place + ": " + error.what());
       }

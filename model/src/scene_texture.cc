@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -70,6 +71,53 @@ std::array<double, 3> DrawnColour(const TextureOptions& options, RandomDraws* dr
   return colour;
 }
 
+// In samples of a canvas.
+struct Leaf {
+  double x = 0, y = 0, radius = 0;
+  std::array<float, 3> light{};
+};
+
+// A leaf behind those that are there; `through` is what still shines through them, of each sample.
+// Returns how much of that the leaf hides.
+double PaintBehind(const Leaf& leaf, cv::Mat* through, std::array<cv::Mat, 3>* light) {
+  const int columns = through->cols, rows = through->rows;
+  const double outer_square = (leaf.radius + 0.5) * (leaf.radius + 0.5);
+  const double inner = std::max(leaf.radius - 0.5, 0.0);
+  double hidden_all = 0;
+  // A leaf wider than the tile would lie on itself.
+  const int reach = std::min(static_cast<int>(std::ceil(leaf.radius + 1)), (rows - 1) / 2);
+  const int centre_y = static_cast<int>(leaf.y);
+  for (int i = centre_y - reach; i <= centre_y + reach; ++i) {
+    const double dy = i - leaf.y;
+    if (!(dy * dy < outer_square)) continue;
+    const int row = (i % rows + rows) % rows;
+    float* open = through->ptr<float>(row);
+    const std::array<float*, 3> to = {
+        {(*light)[0].ptr<float>(row), (*light)[1].ptr<float>(row), (*light)[2].ptr<float>(row)}};
+    const double half_chord = std::min(std::sqrt(outer_square - dy * dy), (columns - 1) / 2.0);
+    const int first = static_cast<int>(std::ceil(leaf.x - half_chord));
+    const int last = static_cast<int>(std::floor(leaf.x + half_chord));
+    // What reaches over a side comes in at the other.
+    for (const int shift : {-columns, 0, columns}) {
+      for (int j = std::max(first, shift); j <= std::min(last, shift + columns - 1); ++j) {
+        const int column = j - shift;
+        if (open[column] == 0) continue;
+        // The part of the sample's cell that the leaf covers, its border taken as straight.
+        const double distance_square = (j - leaf.x) * (j - leaf.x) + dy * dy;
+        float hidden = open[column];
+        if (distance_square > inner * inner) {
+          const double inside = leaf.radius + 0.5 - std::sqrt(distance_square);
+          hidden = static_cast<float>(hidden * std::clamp(inside, 0.0, 1.0));
+        }
+        for (std::size_t c = 0; c < 3; ++c) to[c][column] += hidden * leaf.light[c];
+        open[column] -= hidden;
+        hidden_all += hidden;
+      }
+    }
+  }
+  return hidden_all;
+}
+
 // Discs that hide each other, radii distributed as r^-3 between the smallest and the largest: the
 // statistics of natural pictures. Drawn from the front backward until nothing shines through.
 TextureCanvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest& request,
@@ -82,42 +130,20 @@ TextureCanvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest
       std::max(kLargestLeaf * std::min(canvas.width_mm(), canvas.height_mm()), 2 * smallest_mm);
   const double small_term = 1 / (smallest_mm * smallest_mm);
   const double large_term = 1 / (largest_mm * largest_mm);
-  const int columns = canvas.columns;
-  const int rows = canvas.rows;
-  cv::Mat open(rows, columns, CV_32F, cv::Scalar(1));  // what still shines through
-  const double total = static_cast<double>(columns) * rows;
+  cv::Mat open(canvas.rows, canvas.columns, CV_32F, cv::Scalar(1));  // what still shines through
+  const double total = static_cast<double>(open.total());
   double remaining = total;
   while (remaining > 1e-4 * total) {
-    const double radius =
+    Leaf leaf;
+    leaf.radius =
         1 / std::sqrt(small_term - draws->Uniform() * (small_term - large_term)) / spacing_mm;
-    const double x = draws->Uniform() * columns;
-    const double y = draws->Uniform() * rows;
+    leaf.x = draws->Uniform() * canvas.columns;
+    leaf.y = draws->Uniform() * canvas.rows;
     const std::array<double, 3> colour = DrawnColour(options, draws);
-    // A leaf wider than the tile would lie on itself.
-    const int reach = std::min(static_cast<int>(std::ceil(radius + 1)), (rows - 1) / 2);
-    const int centre_y = static_cast<int>(y);
-    for (int i = centre_y - reach; i <= centre_y + reach; ++i) {
-      const int row = (i % rows + rows) % rows;
-      float* through = open.ptr<float>(row);
-      const double dy = i - y;
-      const double half_chord_square = (radius + 0.5) * (radius + 0.5) - dy * dy;
-      if (!(half_chord_square > 0)) continue;
-      const double half_chord = std::min(std::sqrt(half_chord_square), (columns - 1) / 2.0);
-      const int last = static_cast<int>(std::floor(x + half_chord));
-      for (int j = static_cast<int>(std::ceil(x - half_chord)); j <= last; ++j) {
-        const int column = (j % columns + columns) % columns;
-        if (through[column] == 0) continue;
-        // The part of the sample's cell that the leaf covers, its border taken as straight.
-        const double inside = std::clamp(radius + 0.5 - std::hypot(j - x, dy), 0.0, 1.0);
-        const auto hidden = static_cast<float>(through[column] * inside);
-        for (std::size_t c = 0; c < 3; ++c) {
-          canvas.light[c].ptr<float>(row)[column] +=
-              hidden * static_cast<float>(1 + options.contrast * colour[c]);
-        }
-        through[column] -= hidden;
-        remaining -= hidden;
-      }
+    for (std::size_t c = 0; c < 3; ++c) {
+      leaf.light[c] = static_cast<float>(1 + options.contrast * colour[c]);
     }
+    remaining -= PaintBehind(leaf, &open, &canvas.light);
   }
   for (cv::Mat& channel : canvas.light) channel += open;
   return canvas;
@@ -126,7 +152,7 @@ TextureCanvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest
 // Gaussian noise whose amplitude falls as 1/f, from one cycle per side of what is seen up to the
 // shortest period. A tanh keeps it between no light and twice the mean.
 TextureCanvas DrawNoise(const TextureOptions& options, const TextureRequest& request,
-                        RandomDraws* draws) {
+                        RandomDraws* draws, int threads) {
   TextureCanvas canvas =
       MakeTextureCanvas(request.low_mm, request.high_mm, request.coarsest_pixel_mm, 0);
   const double period_mm = FeaturePx(options) * request.pixel_mm;
@@ -142,7 +168,7 @@ TextureCanvas DrawNoise(const TextureOptions& options, const TextureRequest& req
         samples.at<float>(i, j) = static_cast<float>(draws->Normal());
       }
     }
-    FilterChannel(canvas, gain, &samples);
+    FilterSamples(canvas, 1 / period_mm, gain, threads, &samples);
     const double rms = std::sqrt(samples.dot(samples) / static_cast<double>(samples.total()));
     if (rms > 0) samples /= rms;
     return samples;
@@ -251,7 +277,7 @@ TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& r
 }
 
 TextureCanvas Draw(const TextureOptions& options, const TextureRequest& request,
-                   const LinearPicture& picture, RandomDraws* draws) {
+                   const LinearPicture& picture, RandomDraws* draws, int threads) {
   switch (options.kind) {
     case TextureKind::kCheckerboard:
       return DrawCheckerboard(options, request);
@@ -260,7 +286,7 @@ TextureCanvas Draw(const TextureOptions& options, const TextureRequest& request,
     case TextureKind::kDeadLeaves:
       return DrawDeadLeaves(options, request, draws);
     case TextureKind::kNoise:
-      return DrawNoise(options, request, draws);
+      return DrawNoise(options, request, draws, threads);
     default:
       return DrawPicture(options, request, picture);
   }
@@ -277,7 +303,7 @@ void Paint(const Eigen::Vector3d& colour, TextureCanvas* canvas) {
 }  // namespace
 
 SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& request,
-                           const LinearPicture& picture, RandomDraws* draws) {
+                           const LinearPicture& picture, RandomDraws* draws, int threads) {
   FeaturePx(options);  // throws
   colour_.head<3>() = options.colour.cast<float>().array();
   if (options.kind == TextureKind::kUniform) return;
@@ -285,8 +311,8 @@ SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& 
     SetWave(options, request);
     return;
   }
-  TextureCanvas canvas = Draw(options, request, picture, draws);
-  LimitBand(request.coarsest_pixel_mm, &canvas);
+  TextureCanvas canvas = Draw(options, request, picture, draws, threads);
+  LimitBand(request.coarsest_pixel_mm, threads, &canvas);
   if (options.kind != TextureKind::kPicture) Paint(options.colour, &canvas);
   columns_ = canvas.columns;
   rows_ = canvas.rows;

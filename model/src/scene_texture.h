@@ -27,9 +27,10 @@ struct TextureRequest {
 // is below half a cycle per px comes out at its full amplitude.
 class SceneTexture {
  public:
-  // Throws Error for a feature size that the layer cannot show, or an empty picture.
+  // Throws Error for a feature size that the layer cannot show, or an empty picture. `threads` (0:
+  // one per core) do not change it.
   SceneTexture(const TextureOptions& options, const TextureRequest& request,
-               const LinearPicture& picture, RandomDraws* draws);
+               const LinearPicture& picture, RandomDraws* draws, int threads = 1);
 
   // Bounds of R, G and B.
   Eigen::Array4f Darkest() const {

@@ -2,9 +2,8 @@
 #define THICKLENS_MODEL_SRC_TEXTURE_CANVAS_H_
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
-#include <complex>
+#include <functional>
 #include <opencv2/core.hpp>
 
 namespace thicklens::model {
@@ -35,24 +34,16 @@ struct TextureCanvas {
 TextureCanvas MakeTextureCanvas(const Eigen::Vector2d& low_mm, const Eigen::Vector2d& high_mm,
                                 double coarsest_pixel_mm, double unit_mm);
 
-// Multiplies the spectrum of one of its channels by gain(fx, fy), cycles per mm, both >= 0.
-template <typename Gain>
-void FilterChannel(const TextureCanvas& canvas, const Gain& gain, cv::Mat* samples) {
-  cv::Mat spectrum;
-  cv::dft(*samples, spectrum, cv::DFT_COMPLEX_OUTPUT);
-  for (int i = 0; i < spectrum.rows; ++i) {
-    auto* row = spectrum.ptr<std::complex<float>>(i);
-    const double fy = std::min(i, spectrum.rows - i) / canvas.height_mm();
-    for (int j = 0; j < spectrum.cols; ++j) {
-      row[j] *= static_cast<float>(gain(std::min(j, spectrum.cols - j) / canvas.width_mm(), fy));
-    }
-  }
-  cv::dft(spectrum, *samples, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-}
+// Multiplies the spectrum of samples of the canvas, CV_32F, by gain(fx, fy), cycles per mm, both
+// >= 0, which is 0 beyond `highest_per_mm`: only the frequencies up to it are worked out, and of
+// these the half whose conjugates the others are. `gain` is called from any thread.
+void FilterSamples(const TextureCanvas& canvas, double highest_per_mm,
+                   const std::function<double(double fx, double fy)>& gain, int threads,
+                   cv::Mat* samples);
 
 // Takes away what the pixels cannot show, and gives back what the lines between the samples will
 // take.
-void LimitBand(double coarsest_pixel_mm, TextureCanvas* canvas);
+void LimitBand(double coarsest_pixel_mm, int threads, TextureCanvas* canvas);
 
 }  // namespace thicklens::model
 
