@@ -59,6 +59,7 @@ class SceneGeometry {
   const std::vector<SceneLayer>& layers() const { return layers_; }
   double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
   double floor_px() const { return floor_px_; }
+  double scale_px() const { return scale_px_; }  // K/p
 
   // x of a picture position, px; A on the aperture, mm. The slope (x - cx) p/K of the chief ray
   // less A/zf: all rays of a position meet in the plane of focus.
@@ -102,7 +103,7 @@ class SceneGeometry {
   std::vector<SceneLayer> layers_;
   Sensor sensor_;
   double focal_mm_ = 0;
-  double scale_px_ = 0;  // K/p
+  double scale_px_ = 0;
   double focus_depth_mm_ = 0;
   double aperture_sigma_mm_ = 0;
   double floor_px_ = 0;

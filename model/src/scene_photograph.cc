@@ -1,8 +1,10 @@
 #include "scene_photograph.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "airy.h"
 #include "ray_irradiance.h"
@@ -87,28 +89,21 @@ ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& r
   const Sensor& sensor = geometry_.sensor();
   const Eigen::Vector2d& axis_px = sensor.principal_point_px;
   const auto count = static_cast<Eigen::Index>(rays.size());
-  RaySet set;
-  set.slope_x.resize(count);
-  set.slope_y.resize(count);
-  set.behind_x.resize(count);
-  set.behind_y.resize(count);
+  std::vector<SceneRay> bundle;
+  Eigen::ArrayXf behind_x(count), behind_y(count);
   double sum = 0;
   for (const PixelRay& ray : rays) {
-    const auto i = static_cast<Eigen::Index>(set.rays.size());
-    PreparedRay prepared;
-    prepared.aperture_mm = geometry_.aperture_sigma_mm() * ray.aperture;
-    prepared.slope = geometry_.RayAt(axis_px + ray.offset_px, prepared.aperture_mm).slope;
-    const Eigen::Vector2d behind_mm = sensor.pixel_pitch_mm * ray.offset_px + prepared.aperture_mm;
-    set.slope_x(i) = static_cast<float>(prepared.slope.x());
-    set.slope_y(i) = static_cast<float>(prepared.slope.y());
-    set.behind_x(i) = static_cast<float>(behind_mm.x());
-    set.behind_y(i) = static_cast<float>(behind_mm.y());
-    set.rays.push_back(prepared);
+    const auto i = static_cast<Eigen::Index>(bundle.size());
+    const Eigen::Vector2d aperture_mm = geometry_.aperture_sigma_mm() * ray.aperture;
+    bundle.push_back(geometry_.RayAt(axis_px + ray.offset_px, aperture_mm));
+    const Eigen::Vector2d behind_mm = sensor.pixel_pitch_mm * ray.offset_px + aperture_mm;
+    behind_x(i) = static_cast<float>(behind_mm.x());
+    behind_y(i) = static_cast<float>(behind_mm.y());
     // (12) fixes its constant k by exposure: uniform radiance 1 gives 1 at the principal point.
-    sum += Irradiance(axis_px, geometry_.RayAt(axis_px, prepared.aperture_mm));
+    sum += Irradiance(axis_px, geometry_.RayAt(axis_px, aperture_mm));
   }
-  set.exposure = static_cast<double>(rays.size()) / sum;
-  return set;
+  return {RayBundle(geometry_, bundle), static_cast<double>(rays.size()) / sum, std::move(behind_x),
+          std::move(behind_y)};
 }
 
 double ScenePhotograph::Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const {
@@ -118,85 +113,96 @@ double ScenePhotograph::Irradiance(const Eigen::Vector2d& position_px, const Sce
 }
 
 // RayIrradiance of all of them at once.
-Eigen::ArrayXf ScenePhotograph::Weights(const RaySet& set, const Eigen::Vector2d& centre_px) const {
+RayNumbers ScenePhotograph::Weights(const RaySet& set, const Eigen::Vector2d& centre_px,
+                                    const RayPart& part) const {
+  if (!on_.Has(Effect::kFalloff)) return RayNumbers::Ones(part.count);
   const Sensor& sensor = geometry_.sensor();
   const Eigen::Vector2f slope = geometry_.RayAt(centre_px, {0, 0}).slope.cast<float>();
   const Eigen::Vector2f landing_mm =
       (sensor.pixel_pitch_mm * (centre_px - sensor.principal_point_px)).cast<float>();
   const auto per_distance2 =
       static_cast<float>(1 / (irradiance_distance_mm_ * irradiance_distance_mm_));
-  const auto alpha = 1 + (set.slope_x + slope.x()).square() + (set.slope_y + slope.y()).square();
-  const Eigen::ArrayXf beta = 1 + per_distance2 * ((set.behind_x + landing_mm.x()).square() +
-                                                   (set.behind_y + landing_mm.y()).square());
+  const auto of = [&part](const Eigen::ArrayXf& numbers) {
+    return numbers.segment(part.first, part.count);
+  };
+  const RayNumbers alpha = 1 + (of(set.rays.slope_x()) + slope.x()).square() +
+                           (of(set.rays.slope_y()) + slope.y()).square();
+  const RayNumbers beta = 1 + per_distance2 * ((of(set.behind_x) + landing_mm.x()).square() +
+                                               (of(set.behind_y) + landing_mm.y()).square());
   return static_cast<float>(set.exposure) / ((alpha * beta).sqrt() * beta);
 }
 
-Eigen::Array4f ScenePhotograph::LightAlong(const SceneBlock& block, const SceneRay& ray) const {
-  const SceneHit hit = geometry_.Trace(ray, block.layers);
-  return LayerLight(geometry_, textures_[hit.layer], hit.layer, ray, hit.position_mm);
-}
-
-Eigen::Array4f ScenePhotograph::LightOf(std::size_t layer, const SceneRay& ray) const {
-  const double depth_mm = HitDepthMm(geometry_.layers()[layer].plane, ray);
-  return LayerLight(geometry_, textures_[layer], layer, ray, ray.PositionMm(depth_mm));
-}
-
-// Of the surface that the pixel shows, the ray passes a point; what the middle of the aperture sees
-// there is what the ray sees.
-Eigen::Array4f ScenePhotograph::LightWithoutOcclusion(const SceneBlock& block,
-                                                      const PlaneOptions& surface,
-                                                      const SceneRay& ray) const {
-  const double depth_mm = HitDepthMm(surface, ray);
-  const Eigen::Vector2d point_px = geometry_.ChiefPositionPx(ray.PositionMm(depth_mm), depth_mm);
-  return LightOf(geometry_.Trace(geometry_.RayAt(point_px, {0, 0}), block.layers).layer, ray);
-}
-
-template <typename Light>
-Eigen::Array3d ScenePhotograph::MeanOf(const RaySet& set, const Eigen::Vector2d& centre_px,
-                                       const Light& light) const {
-  const Eigen::Vector2d slope = geometry_.RayAt(centre_px, {0, 0}).slope;
-  const bool falloff = on_.Has(Effect::kFalloff);
-  Eigen::ArrayXf weights;
-  if (falloff) weights = Weights(set, centre_px);
-  // In parts: many numbers are not added up in float.
-  constexpr std::size_t kPart = 32;
-  Eigen::Array4d sum(0, 0, 0, 0);
-  for (std::size_t first = 0; first < set.rays.size(); first += kPart) {
-    Eigen::Array4f part(0, 0, 0, 0);
-    for (std::size_t i = first; i < std::min(first + kPart, set.rays.size()); ++i) {
-      const PreparedRay& prepared = set.rays[i];
-      const float weight = falloff ? weights(static_cast<Eigen::Index>(i)) : 1;
-      part += weight * light(SceneRay{prepared.aperture_mm, slope + prepared.slope});
-    }
-    sum += part.cast<double>();
+RayBundle::Shown ScenePhotograph::ShownBy(const Pixel& pixel, const RayPart& part) const {
+  const std::vector<std::size_t>& layers = pixel.block.layers;
+  if (layers.size() == 1) return {};
+  if (on_.Has(Effect::kOcclusion)) {
+    return pixel.set.rays.NearestAlong(pixel.centre_px, layers, pixel.chiefs, part);
   }
-  return sum.head<3>() / static_cast<double>(set.rays.size());
+  const SceneHit hit = geometry_.Trace(geometry_.RayAt(pixel.centre_px, {0, 0}), layers);
+  const auto surface = std::find(layers.begin(), layers.end(), hit.layer) - layers.begin();
+  return pixel.set.rays.NearestFromMiddle(pixel.centre_px, layers, pixel.chiefs,
+                                          static_cast<std::size_t>(surface), part);
+}
+
+Eigen::Array4f ScenePhotograph::LayerSum(const Pixel& pixel, std::size_t which,
+                                         const RayBundle::Shown& shown, const RayPart& part,
+                                         const RayNumbers& weights) const {
+  const std::size_t layer = pixel.block.layers[which];
+  const ChiefHit& chief = pixel.chiefs[which];
+  std::array<Eigen::Index, kRaysAtOnce> showing;
+  Eigen::Index count = 0;
+  for (Eigen::Index i = 0; i < part.count; ++i) {
+    if (shown[static_cast<std::size_t>(i)] == which) {
+      showing[static_cast<std::size_t>(count++)] = i;
+    }
+  }
+  if (count == 0) return Eigen::Array4f::Zero();
+  RayBundle::Meeting meeting = pixel.set.rays.Meet(layer, chief, part);
+  RayNumbers of_these = weights;
+  if (count < part.count) {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Eigen::Index ray = showing[static_cast<std::size_t>(i)];
+      meeting.x_mm(i) = meeting.x_mm(ray);
+      meeting.y_mm(i) = meeting.y_mm(ray);
+      of_these(i) = weights(ray);
+    }
+  }
+  if (geometry_.layers()[layer].gloss.empty()) {
+    return textures_[layer].SumAround(chief.position_mm, meeting.x_mm.data(), meeting.y_mm.data(),
+                                      of_these.data(), static_cast<int>(count));
+  }
+  Eigen::Array4f sum(0, 0, 0, 0);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index ray = part.first + showing[static_cast<std::size_t>(i)];
+    SceneRay along = pixel.set.rays.rays()[static_cast<std::size_t>(ray)];
+    along.slope += chief.slope;
+    sum += of_these(i) *
+           LayerLight(geometry_, textures_[layer], layer, along,
+                      along.PositionMm(HitDepthMm(geometry_.layers()[layer].plane, along)));
+  }
+  return sum;
 }
 
 Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
   const std::size_t index = survey_.IndexAt(x, y);
   const SceneBlock& block = survey_.blocks()[index];
-  const RaySet& set = sets_[set_of_block_[index]];
-  const Eigen::Vector2d centre_px(x, y);
-  if (block.layers.size() == 1) {
-    const std::size_t only = block.layers.front();
-    const SceneLayer& layer = geometry_.layers()[only];
-    if (!layer.gloss.empty()) {
-      return MeanOf(set, centre_px, [&](const SceneRay& ray) { return LightOf(only, ray); });
+  Pixel pixel{block, sets_[set_of_block_[index]], {x, y}, {}};
+  pixel.chiefs.reserve(block.layers.size());
+  for (const std::size_t layer : block.layers) {
+    pixel.chiefs.push_back(pixel.set.rays.ChiefAt(pixel.centre_px, layer));
+  }
+  const Eigen::Index rays = pixel.set.rays.size();
+  // In parts: many numbers are not added up in float.
+  Eigen::Array4d sum(0, 0, 0, 0);
+  for (Eigen::Index first = 0; first < rays; first += kRaysAtOnce) {
+    const RayPart part{first, std::min<Eigen::Index>(kRaysAtOnce, rays - first)};
+    const RayNumbers weights = Weights(pixel.set, pixel.centre_px, part);
+    const RayBundle::Shown shown = ShownBy(pixel, part);
+    for (std::size_t which = 0; which < block.layers.size(); ++which) {
+      sum += LayerSum(pixel, which, shown, part, weights).cast<double>();
     }
-    const SceneTexture& texture = textures_[only];
-    return MeanOf(set, centre_px, [&](const SceneRay& ray) {
-      const Eigen::Vector2d at_mm = ray.PositionMm(HitDepthMm(layer.plane, ray));
-      return texture.At(at_mm.x(), at_mm.y());
-    });
   }
-  if (on_.Has(Effect::kOcclusion)) {
-    return MeanOf(set, centre_px, [&](const SceneRay& ray) { return LightAlong(block, ray); });
-  }
-  const SceneHit shown = geometry_.Trace(geometry_.RayAt(centre_px, {0, 0}), block.layers);
-  const PlaneOptions& surface = geometry_.layers()[shown.layer].plane;
-  return MeanOf(set, centre_px,
-                [&](const SceneRay& ray) { return LightWithoutOcclusion(block, surface, ray); });
+  return sum.head<3>() / static_cast<double>(rays);
 }
 
 }  // namespace thicklens::model

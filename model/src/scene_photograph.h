@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "ray_bundle.h"
 #include "ray_set.h"
 #include "scene_geometry.h"
 #include "scene_survey.h"
@@ -29,31 +30,30 @@ class ScenePhotograph {
   double sampling_error_grey_levels() const { return sampling_error_; }
 
  private:
-  // Less what the pixel's centre's chief ray has.
-  struct PreparedRay {
-    Eigen::Vector2d aperture_mm, slope;
-  };
   struct RaySet {
-    std::vector<PreparedRay> rays;
+    RayBundle rays;
     double exposure = 1;
-    // Of each ray, for its irradiance: slope in front of the lens, and behind it, times d1.
-    Eigen::ArrayXf slope_x, slope_y, behind_x, behind_y;
+    Eigen::ArrayXf behind_x, behind_y;  // of each ray, its slope behind the lens times d1
   };
 
   void MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored);
   RaySet Prepared(const std::vector<PixelRay>& rays) const;
   double IrradianceSd(const SceneBlock& block) const;
   double Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const;
-  // Of all rays of a pixel, 1 in the mean at the principal point.
-  Eigen::ArrayXf Weights(const RaySet& set, const Eigen::Vector2d& centre_px) const;
-  // Of light(ray), weighed.
-  template <typename Light>
-  Eigen::Array3d MeanOf(const RaySet& set, const Eigen::Vector2d& centre_px,
-                        const Light& light) const;
-  Eigen::Array4f LightAlong(const SceneBlock& block, const SceneRay& ray) const;
-  Eigen::Array4f LightOf(std::size_t layer, const SceneRay& ray) const;
-  Eigen::Array4f LightWithoutOcclusion(const SceneBlock& block, const PlaneOptions& surface,
-                                       const SceneRay& ray) const;
+  // 1 in the mean at the principal point.
+  RayNumbers Weights(const RaySet& set, const Eigen::Vector2d& centre_px,
+                     const RayPart& part) const;
+  struct Pixel {
+    const SceneBlock& block;
+    const RaySet& set;
+    Eigen::Vector2d centre_px;
+    std::vector<ChiefHit> chiefs;  // of the block's layers
+  };
+  // Which of the block's layers each ray shows.
+  RayBundle::Shown ShownBy(const Pixel& pixel, const RayPart& part) const;
+  // The weighed sum of the light of the rays that show one of them, block.layers[which].
+  Eigen::Array4f LayerSum(const Pixel& pixel, std::size_t which, const RayBundle::Shown& shown,
+                          const RayPart& part, const RayNumbers& weights) const;
 
   const SceneGeometry& geometry_;
   const std::vector<SceneTexture>& textures_;

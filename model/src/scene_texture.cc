@@ -355,4 +355,54 @@ void SceneTexture::SetWave(const TextureOptions& options, const TextureRequest& 
   edge_at_ = wave_.dot(request.centre_mm);
 }
 
+Eigen::Array4f SceneTexture::SumAround(const Eigen::Vector2d& centre_mm, const float* x_mm,
+                                       const float* y_mm, const float* weight, int count) const {
+  using Numbers = Eigen::Array<float, Eigen::Dynamic, 1, Eigen::ColMajor, kMostAtOnce, 1>;
+  using Integers = Eigen::Array<int, Eigen::Dynamic, 1, Eigen::ColMajor, kMostAtOnce, 1>;
+  const Eigen::Map<const Eigen::ArrayXf> dx_mm(x_mm, count), dy_mm(y_mm, count);
+  if (count < 1) return Eigen::Array4f::Zero();
+  if (tile_.empty() && amplitude_ == 0) {
+    return colour_ * Eigen::Map<const Eigen::ArrayXf>(weight, count).sum();
+  }
+  Eigen::Array4f sum = Eigen::Array4f::Zero();
+  if (!tile_.empty()) {
+    // In samples, from the one that is the first of all four sides' whole numbers on.
+    const Eigen::Vector2d centre = (centre_mm - origin_mm_).cwiseProduct(per_mm_);
+    const Eigen::Vector2d whole = centre.array().floor();
+    const Eigen::Vector2f part = (centre - whole).cast<float>(), per_mm = per_mm_.cast<float>();
+    Numbers x = part.x() + per_mm.x() * dx_mm, y = part.y() + per_mm.y() * dy_mm;
+    const float left = std::floor(x.minCoeff()), above = std::floor(y.minCoeff());
+    const double first_column = whole.x() + static_cast<double>(left);
+    const double first_row = whole.y() + static_cast<double>(above);
+    x -= left;
+    y -= above;
+    if (first_column >= 0 && first_row >= 0 &&
+        first_column + static_cast<double>(x.maxCoeff()) + 2 < columns_ &&
+        first_row + static_cast<double>(y.maxCoeff()) + 2 < rows_) {
+      const Eigen::Array4f* corner =
+          &Sample(static_cast<int>(first_row), static_cast<int>(first_column));
+      const Integers column = x.cast<int>(), row = y.cast<int>();
+      const Integers offset = row * columns_ + column;
+      const Eigen::Map<const Eigen::ArrayXf> all(weight, count);
+      const Numbers fx = x - column.cast<float>(), fy = y - row.cast<float>();
+      const Numbers right = all * fx, lower_right = right * fy;
+      const Numbers upper_right = right - lower_right, lower_left = all * fy - lower_right;
+      const Numbers upper_left = all - right - lower_left;
+      Eigen::Array4f upper_sum = sum, lower_sum = sum;
+      for (int i = 0; i < count; ++i) {
+        const Eigen::Array4f* upper = corner + offset(i);
+        const Eigen::Array4f* lower = upper + columns_;
+        upper_sum += upper_left(i) * upper[0] + upper_right(i) * upper[1];
+        lower_sum += lower_left(i) * lower[0] + lower_right(i) * lower[1];
+      }
+      return upper_sum + lower_sum;
+    }
+  }
+  for (int i = 0; i < count; ++i) {
+    sum += weight[i] * At(centre_mm.x() + static_cast<double>(x_mm[i]),
+                          centre_mm.y() + static_cast<double>(y_mm[i]));
+  }
+  return sum;
+}
+
 }  // namespace thicklens::model

@@ -49,6 +49,11 @@ class SceneTexture {
                                                                    : std::cos(phase)));
   }
 
+  // The sum of weight_i At(centre + (x_i, y_i)), i < count <= kMostAtOnce.
+  static constexpr int kMostAtOnce = 64;
+  Eigen::Array4f SumAround(const Eigen::Vector2d& centre_mm, const float* x_mm, const float* y_mm,
+                           const float* weight, int count) const;
+
  private:
   // Of a sine or an edge.
   void SetWave(const TextureOptions& options, const TextureRequest& request);
