@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <mutex>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "square_wave.h"
 #include "texture_canvas.h"
 #include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
 
 namespace thicklens::model {
 namespace {
@@ -22,6 +25,8 @@ constexpr double kLargestLeaf = 1.0 / 6;
 // Of a star whose sectors are not given.
 constexpr double kStarCycles = 36;
 constexpr double kStarMarginPx = 8;
+
+constexpr int kRowsOfBand = 64;  // that a thread works on
 
 struct FeatureRange {
   double chosen_px, smallest_px, largest_px;
@@ -318,20 +323,31 @@ SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& 
   rows_ = canvas.rows;
   origin_mm_ = canvas.origin_mm;
   per_mm_ = canvas.spacing_mm.cwiseInverse();
-  tile_.reserve(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
-  for (int i = 0; i < rows_; ++i) {
-    for (int j = 0; j < columns_; ++j) {
-      // The limited band may overshoot beside a dark edge: there is no negative light.
-      tile_.emplace_back(std::max(canvas.light[0].at<float>(i, j), 0.0F),
-                         std::max(canvas.light[1].at<float>(i, j), 0.0F),
-                         std::max(canvas.light[2].at<float>(i, j), 0.0F), 0.0F);
+  tile_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+  darkest_.setConstant(std::numeric_limits<float>::infinity());
+  brightest_ = -darkest_;
+  std::mutex mutex;
+  const int bands = (rows_ + kRowsOfBand - 1) / kRowsOfBand;
+  ParallelFor(bands, threads, [&](int band) {
+    Eigen::Array4f darkest = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
+    Eigen::Array4f brightest = -darkest;
+    for (int i = band * kRowsOfBand; i < std::min((band + 1) * kRowsOfBand, rows_); ++i) {
+      Eigen::Array4f* sample =
+          &tile_[static_cast<std::size_t>(i) * static_cast<std::size_t>(columns_)];
+      const float* red = canvas.light[0].ptr<float>(i);
+      const float* green = canvas.light[1].ptr<float>(i);
+      const float* blue = canvas.light[2].ptr<float>(i);
+      for (int j = 0; j < columns_; ++j, ++sample) {
+        // The limited band may overshoot beside a dark edge: there is no negative light.
+        *sample = Eigen::Array4f(red[j], green[j], blue[j], 0).max(0);
+        darkest = darkest.min(*sample);
+        brightest = brightest.max(*sample);
+      }
     }
-  }
-  darkest_ = brightest_ = tile_.front();
-  for (const Eigen::Array4f& sample : tile_) {
-    darkest_ = darkest_.min(sample);
-    brightest_ = brightest_.max(sample);
-  }
+    const std::lock_guard<std::mutex> lock(mutex);
+    darkest_ = darkest_.min(darkest);
+    brightest_ = brightest_.max(brightest);
+  });
 }
 
 void SceneTexture::SetWave(const TextureOptions& options, const TextureRequest& request) {
