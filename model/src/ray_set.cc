@@ -12,6 +12,10 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
+// How far rays spread over the Gaussian by which they miss a pixel, and over the Airy pattern.
+constexpr double kFloorDeviations = 5;
+constexpr double kAiryRadii = 50;
+
 // Share of a standard normal distribution below x.
 double NormalBelow(double x) { return std::erfc(-x / std::sqrt(2.0)) / 2; }
 
@@ -90,6 +94,16 @@ void StandardiseAperture(std::vector<PixelRay>* rays) {
 }
 
 }  // namespace
+
+double FarthestDeviations(const RaySpread& spread) {
+  if (!spread.aperture) return 0;
+  return spread.aperture == Psf::kDisc ? kDiscDeviations : kGaussianDeviations;
+}
+
+double FarthestLandingPx(const RaySpread& spread) {
+  return (spread.box ? 0.5 : 0) + kFloorDeviations * spread.gaussian_px +
+         kAiryRadii * spread.airy_px;
+}
 
 std::vector<PixelRay> PhotographRays(const RaySpread& spread, int count) {
   const std::vector<double> v = EvenShares(2, count);

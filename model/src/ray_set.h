@@ -23,6 +23,14 @@ struct RaySpread {
   double airy_px = 0;           // radius of an Airy pattern by which they miss it, too
 };
 
+// No ray goes farther than this from the middle of the aperture, in standard deviations. A disc's
+// radius is two of them, a little more where the second moment of few rays is made 1.
+constexpr double kGaussianDeviations = 5;
+constexpr double kDiscDeviations = 2.2;
+double FarthestDeviations(const RaySpread& spread);  // 0 without aperture
+// Nor than this from where it would land, px.
+double FarthestLandingPx(const RaySpread& spread);
+
 // `count` rays of equal weight: over the aperture by the PSF's shape, with mean 0 and second moment
 // 1 per axis, and over the box convolved with the Gaussian and the pattern. Hammersley points in
 // as many dimensions as it takes, mapped by the inverse distribution functions.

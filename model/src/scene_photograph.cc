@@ -39,7 +39,7 @@ ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
                                  const std::vector<SceneTexture>& textures,
                                  const SceneSurvey& survey, const EffectSet& on,
                                  const TransferCurve& stored)
-    : geometry_(geometry), textures_(textures), survey_(survey), on_(on) {
+    : geometry_(geometry), textures_(textures), survey_(survey), blocks_(survey.blocks()), on_(on) {
   // The thin lens of the same focus has K for its image distance.
   irradiance_distance_mm_ = on.Has(Effect::kThickness) ? options.camera.image_distance_mm()
                                                        : options.camera.focal_scale_px() *
@@ -47,18 +47,33 @@ ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
   MakeSets(options, stored);
 }
 
+// The survey knows no effects. Without occlusion a surface may be looked up as far away as the most
+// blurred one's rays go: there its layers are the ones.
+void ScenePhotograph::LookCloser(const RaySpread& spread) {
+  if (spread.aperture && !on_.Has(Effect::kOcclusion)) return;
+  for (SceneBlock& block : blocks_) {
+    if (block.layers.size() == 1) continue;
+    const PictureRegion region{{block.x0 - 0.5, block.y0 - 0.5}, {block.x1 - 0.5, block.y1 - 0.5}};
+    block.layers =
+        MetLayers(geometry_, region, FarthestLandingPx(spread), FarthestDeviations(spread));
+    if (block.layers.size() > 1) continue;
+    for (EffectPlace& place : block.places) place.jump = 0;
+  }
+}
+
 void ScenePhotograph::MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored) {
   const RaySpread spread = SpreadOf(options, on_);
+  LookCloser(spread);
   SamplingSpread sampling;
   sampling.landing_px = std::sqrt((spread.box ? 1.0 / 12 : 0) + std::pow(spread.gaussian_px, 2));
   sampling.airy_px = spread.airy_px;
   if (!spread.aperture && sampling.landing_px == 0 && spread.airy_px == 0) {
     sets_.push_back(Prepared({PixelRay()}));
-    set_of_block_.assign(survey_.blocks().size(), 0);
+    set_of_block_.assign(blocks_.size(), 0);
     return;
   }
   std::map<int, std::size_t> set_of_count;
-  for (const SceneBlock& block : survey_.blocks()) {
+  for (const SceneBlock& block : blocks_) {
     sampling.defocus_px = spread.aperture ? block.sigma_px : 0;
     if (spread.aperture && on_.Has(Effect::kFalloff)) sampling.irradiance = IrradianceSd(block);
     const int rays = RaysWithin(block, sampling, stored, options.sampling_error_grey_levels,
@@ -185,7 +200,7 @@ Eigen::Array4f ScenePhotograph::LayerSum(const Pixel& pixel, std::size_t which,
 
 Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
   const std::size_t index = survey_.IndexAt(x, y);
-  const SceneBlock& block = survey_.blocks()[index];
+  const SceneBlock& block = blocks_[index];
   Pixel pixel{block, sets_[set_of_block_[index]], {x, y}, {}};
   pixel.chiefs.reserve(block.layers.size());
   for (const std::size_t layer : block.layers) {

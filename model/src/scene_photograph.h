@@ -36,6 +36,8 @@ class ScenePhotograph {
     Eigen::ArrayXf behind_x, behind_y;  // of each ray, its slope behind the lens times d1
   };
 
+  // Takes from the blocks the layers that no ray of these effects meets.
+  void LookCloser(const RaySpread& spread);
   void MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored);
   RaySet Prepared(const std::vector<PixelRay>& rays) const;
   double IrradianceSd(const SceneBlock& block) const;
@@ -58,6 +60,7 @@ class ScenePhotograph {
   const SceneGeometry& geometry_;
   const std::vector<SceneTexture>& textures_;
   const SceneSurvey& survey_;
+  std::vector<SceneBlock> blocks_;
   const EffectSet on_;
   double irradiance_distance_mm_ = 0;
   std::vector<RaySet> sets_;

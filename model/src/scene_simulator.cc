@@ -26,10 +26,6 @@ namespace {
 // No view is taken farther from the middle of the aperture, in its standard deviations: what the
 // planes must stand.
 constexpr double kFarthestDeviations = 6;
-// How far the rays of a pixel spread over the Gaussian by which they miss it, and over the Airy
-// pattern.
-constexpr double kFloorDeviations = 5;
-constexpr double kAiryRadii = 50;
 constexpr int kAiryViewRays = 256;
 
 const EffectSet kOfViews = {Effect::kPixelBox, Effect::kLensFloor, Effect::kDiffraction};
@@ -63,20 +59,26 @@ struct SceneSimulator::Impl {
   }
 
   // Whatever of box, floor and diffraction will be on.
-  double FarthestLandingPx() const {
+  double LandingPx() const {
     const double floor_px = geometry.floor_px();
     const EffectChoice& choice = options.effects;
     const bool without_floor =
         choice.without.Has(Effect::kLensFloor) ||
         (choice.base == EffectChoice::Base::kGiven && !choice.given.Has(Effect::kLensFloor));
     const double airy_px = AiryRadiusPx(options.camera, options.wavelength_mm);
-    if (floor_px > 0 && !without_floor) return 0.5 + kFloorDeviations * floor_px;
-    if (options.camera.psf == Psf::kDisc) return 0.5 + kAiryRadii * airy_px;
-    return 0.5 + kFloorDeviations * airy_px / kGaussianAiryRadius;
+    RaySpread spread;
+    if (floor_px > 0 && !without_floor) {
+      spread.gaussian_px = floor_px;
+    } else if (options.camera.psf == Psf::kDisc) {
+      spread.airy_px = airy_px;
+    } else {
+      spread.gaussian_px = airy_px / kGaussianAiryRadius;
+    }
+    return FarthestLandingPx(spread);
   }
 
   void Decide(int threads) {
-    const double landing_px = FarthestLandingPx();
+    const double landing_px = LandingPx();
     survey.emplace(options.camera, geometry, textures, landing_px, threads);
     EffectChoice choice = options.effects;
     // They cost nothing, and make the file that is asked for.

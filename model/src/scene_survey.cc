@@ -5,14 +5,15 @@
 #include <limits>
 
 #include "ray_irradiance.h"
+#include "ray_set.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::model {
 namespace {
 
-// Of the aperture: no ray of a photograph goes farther from its middle, in standard deviations; and
-// what that is widened by for depths that change along the way.
-constexpr double kReachDeviations = 5;
+// Of the aperture: no ray of a photograph goes farther from its middle, in standard deviations.
+constexpr double kReachDeviations = kGaussianDeviations;
+// What a reach is widened by for depths that change along the way.
 constexpr double kReachMargin = 1.1;
 // Blocks around the picture that are looked at, too: blur brings in what lies beside it.
 constexpr int kMostMargin = 16;
@@ -143,7 +144,7 @@ class LayerDetail {
 // How far from a region the chief positions of what its rays meet on a layer, or in its gloss, may
 // lie, px.
 double ReachPx(const SceneGeometry& geometry, const SceneLayer& layer, const PictureRegion& region,
-               double landing_px) {
+               double landing_px, double deviations) {
   const PlaneOptions& plane = layer.plane;
   double sigma_px = 0;
   for (const GlossOptions& gloss : layer.gloss) {
@@ -155,7 +156,7 @@ double ReachPx(const SceneGeometry& geometry, const SceneLayer& layer, const Pic
       sigma_px = std::max(sigma_px, geometry.DefocusPx(HitDepthMm(plane, ray)));
     }
   }
-  return landing_px + kReachMargin * kReachDeviations * sigma_px;
+  return landing_px + kReachMargin * deviations * sigma_px;
 }
 
 // The most and the least 1/z of the plane over the region; linear there.
@@ -169,33 +170,6 @@ std::pair<double, double> InverseDepths(const SceneGeometry& geometry, const Pla
     most = std::max(most, inverse);
   }
   return {least, most};
-}
-
-// The layers that rays through the region can meet: not those that lie behind one that fills it.
-std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
-                                   double landing_px) {
-  struct Candidate {
-    std::size_t layer;
-    double least, most;  // 1/z
-    bool covers;
-  };
-  std::vector<Candidate> candidates;
-  for (std::size_t i = 0; i < geometry.layers().size(); ++i) {
-    const SceneLayer& layer = geometry.layers()[i];
-    const PictureRegion reached = region.Widened(ReachPx(geometry, layer, region, landing_px));
-    if (!geometry.MayTouch(layer, reached)) continue;
-    const auto [least, most] = InverseDepths(geometry, layer.plane, reached);
-    candidates.push_back({i, least, most, geometry.Covers(layer, reached)});
-  }
-  double nearest_cover = -std::numeric_limits<double>::infinity();
-  for (const Candidate& candidate : candidates) {
-    if (candidate.covers) nearest_cover = std::max(nearest_cover, candidate.least);
-  }
-  std::vector<std::size_t> met;
-  for (const Candidate& candidate : candidates) {
-    if (candidate.most >= nearest_cover) met.push_back(candidate.layer);
-  }
-  return met;
 }
 
 // The block's pixel that is farthest from the axis.
@@ -291,6 +265,33 @@ Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& tex
   return light;
 }
 
+std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
+                                   double landing_px, double deviations) {
+  struct Candidate {
+    std::size_t layer;
+    double least, most;  // 1/z
+    bool covers;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < geometry.layers().size(); ++i) {
+    const SceneLayer& layer = geometry.layers()[i];
+    const PictureRegion reached =
+        region.Widened(ReachPx(geometry, layer, region, landing_px, deviations));
+    if (!geometry.MayTouch(layer, reached)) continue;
+    const auto [least, most] = InverseDepths(geometry, layer.plane, reached);
+    candidates.push_back({i, least, most, geometry.Covers(layer, reached)});
+  }
+  double nearest_cover = -std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : candidates) {
+    if (candidate.covers) nearest_cover = std::max(nearest_cover, candidate.least);
+  }
+  std::vector<std::size_t> met;
+  for (const Candidate& candidate : candidates) {
+    if (candidate.most >= nearest_cover) met.push_back(candidate.layer);
+  }
+  return met;
+}
+
 SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
                          const std::vector<SceneTexture>& textures, double landing_px,
                          int threads) {
@@ -307,9 +308,10 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
       block.x1 = std::min(block.x0 + kBlockPx, sensor.width_px);
       block.y1 = std::min(block.y0 + kBlockPx, sensor.height_px);
       const PictureRegion region = grid.RegionOf(column, row);
-      block.layers = MetLayers(geometry, region, landing_px);
+      block.layers = MetLayers(geometry, region, landing_px, kReachDeviations);
       for (const std::size_t layer : block.layers) {
-        reaches.push_back(ReachPx(geometry, geometry.layers()[layer], region, landing_px));
+        reaches.push_back(
+            ReachPx(geometry, geometry.layers()[layer], region, landing_px, kReachDeviations));
       }
       blocks_.push_back(std::move(block));
     }

@@ -27,6 +27,12 @@ struct SceneBlock {
   std::array<EffectPlace, 3> places;
 };
 
+// The layers that rays through a region of the picture can meet, if they land up to `landing_px`
+// from where they would and go through the aperture up to so many of its standard deviations from
+// its middle: not those that lie behind one that fills what they reach.
+std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
+                                   double landing_px, double deviations);
+
 // What a scene holds where, found before any picture is taken: by one ray for each quarter of a
 // pixel, through the middle of the aperture.
 class SceneSurvey {
