@@ -11,6 +11,7 @@
 
 #include "effect_bounds.h"
 #include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
 
 namespace thicklens::model {
 namespace {
@@ -97,13 +98,13 @@ EffectTolerance EffectToleranceFromText(const std::string& text) {
 }
 
 EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
-                        const EffectSet& effects, const EffectTolerance& tolerance) {
+                        const EffectSet& effects, const EffectTolerance& tolerance, int threads) {
   std::string why;
   if (!tolerance.IsValid(&why)) throw Error("effects: " + why);
   CheckEffects(conditions, places);
   Spent spent(tolerance);
   EffectSet chosen = effects;
-  std::vector<EffectFinding> findings = FindImpacts(conditions, places, chosen);
+  std::vector<EffectFinding> findings = FindImpacts(conditions, places, chosen, threads);
   while (!findings.empty()) {
     auto least = findings.end();
     for (auto finding = findings.begin(); finding != findings.end(); ++finding) {
@@ -116,9 +117,10 @@ EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<Ef
     chosen.Remove(left_out);
     findings.erase(least);
     if (!HidesOthers(left_out)) continue;
-    for (EffectFinding& finding : findings) {
+    ParallelFor(static_cast<int>(findings.size()), threads, [&](int i) {
+      EffectFinding& finding = findings[static_cast<std::size_t>(i)];
       finding = FindImpact(finding.effect, conditions, places, chosen.Without({finding.effect}));
-    }
+    });
   }
   return chosen;
 }
@@ -138,7 +140,8 @@ EffectChoice EffectChoiceFromText(const std::string& effects, const std::string&
 }
 
 EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions& conditions,
-                             const std::vector<EffectPlace>& places, const EffectSet& of_model) {
+                             const std::vector<EffectPlace>& places, const EffectSet& of_model,
+                             int threads) {
   CheckEffects(conditions, places);
   const EffectSet foreign = choice.given.With(choice.without).Without(of_model);
   if (!foreign.empty()) {
@@ -149,9 +152,13 @@ EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions&
   // What the user takes out is not among the others of the rest.
   EffectSet base = of_model.Without(choice.without);
   if (choice.base == EffectChoice::Base::kGiven) base = base.Both(choice.given);
-  for (const Effect effect : of_model.Effects()) {
-    decision.findings.push_back(FindImpact(effect, conditions, places, base.Without({effect})));
-  }
+  const std::vector<Effect> each = of_model.Effects();
+  decision.findings.resize(each.size());
+  ParallelFor(static_cast<int>(each.size()), threads, [&](int i) {
+    const Effect effect = each[static_cast<std::size_t>(i)];
+    decision.findings[static_cast<std::size_t>(i)] =
+        FindImpact(effect, conditions, places, base.Without({effect}));
+  });
   switch (choice.base) {
     case EffectChoice::Base::kAll:
       decision.on = of_model.Without(choice.without);
@@ -162,7 +169,7 @@ EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions&
     case EffectChoice::Base::kAuto:
       decision.on =
           ChooseEffects(conditions, places, of_model.Without(choice.without).Without(choice.kept),
-                        choice.tolerance)
+                        choice.tolerance, threads)
               .With(choice.kept.Without(choice.without));
       break;
   }

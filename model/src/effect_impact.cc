@@ -10,6 +10,7 @@
 
 #include "effect_bounds.h"
 #include "thicklens/error.h"
+#include "thicklens/model/parallel.h"
 
 namespace thicklens::model {
 namespace {
@@ -145,12 +146,15 @@ EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const E
 
 std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
                                        const std::vector<EffectPlace>& places,
-                                       const EffectSet& effects) {
+                                       const EffectSet& effects, int threads) {
   CheckEffects(conditions, places);
-  std::vector<EffectFinding> findings;
-  for (const Effect effect : effects.Effects()) {
-    findings.push_back(FindImpact(effect, conditions, places, effects.Without({effect})));
-  }
+  const std::vector<Effect> each = effects.Effects();
+  std::vector<EffectFinding> findings(each.size());
+  ParallelFor(static_cast<int>(each.size()), threads, [&](int i) {
+    const Effect effect = each[static_cast<std::size_t>(i)];
+    findings[static_cast<std::size_t>(i)] =
+        FindImpact(effect, conditions, places, effects.Without({effect}));
+  });
   return findings;
 }
 

@@ -83,7 +83,8 @@ struct SceneSimulator::Impl {
     EffectChoice choice = options.effects;
     // They cost nothing, and make the file that is asked for.
     choice.kept = choice.kept.With({Effect::kQuantisation, Effect::kTransferCurve});
-    decision = DecideEffects(choice, ConditionsOf(options), survey->Places(), PictureEffects());
+    decision =
+        DecideEffects(choice, ConditionsOf(options), survey->Places(), PictureEffects(), threads);
     camera = options.camera;
     if (!On(Effect::kTransferCurve)) camera.sensor.transfer = TransferCurve::Linear();
   }

@@ -27,7 +27,8 @@ EffectTolerance EffectToleranceFromText(const std::string& text);
 // tolerance allows it. Bounds add up along the way: each is that of taking the effect from a
 // picture that lacks those before it.
 EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
-                        const EffectSet& effects, const EffectTolerance& tolerance);
+                        const EffectSet& effects, const EffectTolerance& tolerance,
+                        int threads = 1);
 
 // What the user wants of a forward model.
 struct EffectChoice {
@@ -57,7 +58,8 @@ struct EffectDecision {
 // `of_model`: what the forward model has. Throws Error for effects that are named and that it does
 // not have, and as FindImpacts does.
 EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions& conditions,
-                             const std::vector<EffectPlace>& places, const EffectSet& of_model);
+                             const std::vector<EffectPlace>& places, const EffectSet& of_model,
+                             int threads = 1);
 
 // What is written down of it.
 struct EffectRecord {

@@ -76,10 +76,10 @@ struct EffectFinding {
   EffectPlace place;
 };
 // Of each of `effects`, in their order, among all of them. Throws Error if the conditions are not
-// valid or there is no place.
+// valid or there is no place. `threads`: 0: one per core.
 std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
                                        const std::vector<EffectPlace>& places,
-                                       const EffectSet& effects);
+                                       const EffectSet& effects, int threads = 1);
 
 // Black and white edges in the middle and in the farthest corner of the picture at depths equally
 // spaced in 1/z; with `occlusion` those of the one end before the other. Throws Error unless
