@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -47,15 +48,28 @@ ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
   MakeSets(options, stored);
 }
 
-// The survey knows no effects. Without occlusion a surface may be looked up as far away as the most
-// blurred one's rays go: there its layers are the ones.
+// The survey knows no effects. Without occlusion the middle of the aperture says what is seen where
+// rays meet the surface that a pixel shows, whatever else there is: as far away as those go.
+std::vector<std::size_t> ScenePhotograph::LayersFor(const PictureRegion& region,
+                                                    const RaySpread& spread) const {
+  const double landing_px = FarthestLandingPx(spread), deviations = FarthestDeviations(spread);
+  if (on_.Has(Effect::kOcclusion)) return MetLayers(geometry_, region, landing_px, deviations);
+  double farthest_px = landing_px;
+  for (const std::size_t surface : MetLayers(geometry_, region, 0, 0)) {
+    farthest_px = std::max(farthest_px, ReachPx(geometry_, geometry_.layers()[surface], region,
+                                                landing_px, deviations));
+  }
+  return MetLayers(geometry_, region, farthest_px, 0);
+}
+
 void ScenePhotograph::LookCloser(const RaySpread& spread) {
-  if (spread.aperture && !on_.Has(Effect::kOcclusion)) return;
   for (SceneBlock& block : blocks_) {
     if (block.layers.size() == 1) continue;
     const PictureRegion region{{block.x0 - 0.5, block.y0 - 0.5}, {block.x1 - 0.5, block.y1 - 0.5}};
-    block.layers =
-        MetLayers(geometry_, region, FarthestLandingPx(spread), FarthestDeviations(spread));
+    const std::vector<std::size_t> met = LayersFor(region, spread), surveyed = block.layers;
+    block.layers.clear();
+    std::set_intersection(surveyed.begin(), surveyed.end(), met.begin(), met.end(),
+                          std::back_inserter(block.layers));
     if (block.layers.size() > 1) continue;
     for (EffectPlace& place : block.places) place.jump = 0;
   }

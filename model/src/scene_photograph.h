@@ -36,6 +36,8 @@ class ScenePhotograph {
     Eigen::ArrayXf behind_x, behind_y;  // of each ray, its slope behind the lens times d1
   };
 
+  // What rays of a region's pixels can show; in ascending order.
+  std::vector<std::size_t> LayersFor(const PictureRegion& region, const RaySpread& spread) const;
   // Takes from the blocks the layers that no ray of these effects meets.
   void LookCloser(const RaySpread& spread);
   void MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored);

@@ -141,24 +141,6 @@ class LayerDetail {
   Detail anything_;
 };
 
-// How far from a region the chief positions of what its rays meet on a layer, or in its gloss, may
-// lie, px.
-double ReachPx(const SceneGeometry& geometry, const SceneLayer& layer, const PictureRegion& region,
-               double landing_px, double deviations) {
-  const PlaneOptions& plane = layer.plane;
-  double sigma_px = 0;
-  for (const GlossOptions& gloss : layer.gloss) {
-    sigma_px = std::max(sigma_px, geometry.DefocusPx(gloss.depth_mm));
-  }
-  for (const Eigen::Vector2d& corner_px : region.Corners()) {
-    const SceneRay ray = geometry.RayAt(corner_px, {0, 0});
-    if (plane.slope.dot(ray.slope) < 1) {
-      sigma_px = std::max(sigma_px, geometry.DefocusPx(HitDepthMm(plane, ray)));
-    }
-  }
-  return landing_px + kReachMargin * deviations * sigma_px;
-}
-
 // The most and the least 1/z of the plane over the region; linear there.
 std::pair<double, double> InverseDepths(const SceneGeometry& geometry, const PlaneOptions& plane,
                                         const PictureRegion& region) {
@@ -263,6 +245,22 @@ Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& tex
                                                           (2 * gloss.sigma_px * gloss.sigma_px)));
   }
   return light;
+}
+
+double ReachPx(const SceneGeometry& geometry, const SceneLayer& layer, const PictureRegion& region,
+               double landing_px, double deviations) {
+  const PlaneOptions& plane = layer.plane;
+  double sigma_px = 0;
+  for (const GlossOptions& gloss : layer.gloss) {
+    sigma_px = std::max(sigma_px, geometry.DefocusPx(gloss.depth_mm));
+  }
+  for (const Eigen::Vector2d& corner_px : region.Corners()) {
+    const SceneRay ray = geometry.RayAt(corner_px, {0, 0});
+    if (plane.slope.dot(ray.slope) < 1) {
+      sigma_px = std::max(sigma_px, geometry.DefocusPx(HitDepthMm(plane, ray)));
+    }
+  }
+  return landing_px + kReachMargin * deviations * sigma_px;
 }
 
 std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
