@@ -99,6 +99,16 @@ void ScenePhotograph::MakeSets(const SceneSimulationOptions& options, const Tran
   }
 }
 
+double ScenePhotograph::mean_rays_per_pixel() const {
+  double rays = 0;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const SceneBlock& block = blocks_[i];
+    rays += static_cast<double>((block.x1 - block.x0) * (block.y1 - block.y0)) *
+            static_cast<double>(sets_[set_of_block_[i]].rays.size());
+  }
+  return rays / (static_cast<double>(geometry_.sensor().width_px) * geometry_.sensor().height_px);
+}
+
 // Relative, over the aperture: of points at +-1 standard deviation on both axes.
 double ScenePhotograph::IrradianceSd(const SceneBlock& block) const {
   const Eigen::Vector2d& position_px = block.places.front().position_px;

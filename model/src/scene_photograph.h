@@ -28,6 +28,7 @@ class ScenePhotograph {
   Eigen::Array3d PixelAt(int x, int y) const;
   // The largest of all blocks, rms, of stored values; 255 at full scale.
   double sampling_error_grey_levels() const { return sampling_error_; }
+  double mean_rays_per_pixel() const;
 
  private:
   struct RaySet {

@@ -202,6 +202,10 @@ double SceneSimulator::sampling_error_grey_levels() const {
   return impl_->photograph->sampling_error_grey_levels();
 }
 
+double SceneSimulator::mean_rays_per_pixel() const {
+  return impl_->photograph->mean_rays_per_pixel();
+}
+
 const Camera& SceneSimulator::camera() const { return impl_->camera; }
 
 LinearPicture SceneSimulator::RenderNoiseless(const SceneRun& run) const {

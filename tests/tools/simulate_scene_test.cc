@@ -105,6 +105,8 @@ TEST_F(SimulateSceneTest, PictureFolderHoldsWhatTheSimulatorMakes) {
   EXPECT_EQ(json["bits"], 8);
   EXPECT_EQ(json["layers"], 2);
   EXPECT_EQ(json["rays_per_pixel"], 600);
+  EXPECT_GE(json["mean_rays_per_pixel"], 16);
+  EXPECT_LE(json["mean_rays_per_pixel"], 600);
   EXPECT_EQ(json["nearest_depth_mm"], 297);
   EXPECT_NEAR(json["truth"]["focus_depth_mm"], 300, 1e-9);
   EXPECT_EQ(json["truth"]["blur_ratio"], 0.45);

@@ -137,6 +137,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   result.summary["effects"] = EffectsJson(simulator.effects());
   result.summary["sampling_error_grey_levels"] = simulator.sampling_error_grey_levels();
   result.summary["rays_per_pixel"] = scene.rays_per_pixel;
+  result.summary["mean_rays_per_pixel"] = simulator.mean_rays_per_pixel();
   PrintResult(
       options.common,
       fmt::format("a picture of {} x {} px, depths from {:.6g} to {:.6g} mm, blur sigma up "

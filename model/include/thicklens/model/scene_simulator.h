@@ -174,6 +174,8 @@ class SceneSimulator {
   const EffectSet& effects_of_views() const;  // pixel box, lens floor, diffraction, as chosen
   // Rms of the photograph's pixels where it is largest, of stored values, in 1/255.
   double sampling_error_grey_levels() const;
+  // Of the photograph: what it costs.
+  double mean_rays_per_pixel() const;
   // As what Store writes is to be understood: linear if its transfer curve was left out.
   const Camera& camera() const;
 
