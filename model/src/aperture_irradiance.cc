@@ -57,7 +57,8 @@ Irradiance IrradianceAt(const EffectOptics& optics, const Eigen::Vector2d& posit
   };
   const auto mean_of = [&](const std::vector<double>& values) {
     double sum = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) sum += AperturePoints(aperture)[i].weight * values[i];
+    for (std::size_t i = 0; i < values.size(); ++i)
+      sum += AperturePoints(aperture)[i].weight * values[i];
     return sum;
   };
   Irradiance irradiance;

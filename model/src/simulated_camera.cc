@@ -22,10 +22,11 @@ bool IsSimulatable(const Camera& camera, std::string* why) {
   }
   if (!camera.calibration->blur_ratio) return missing("blur_ratio");
   if (!std::isfinite(camera.focus_depth_mm())) {
-    return fail(fmt::format("camera '{}' is focused at infinity: a simulation needs a finite plane "
-                            "of focus, where views have their samples, and a bench its scale and "
-                            "light",
-                            camera.name));
+    return fail(
+        fmt::format("camera '{}' is focused at infinity: a simulation needs a finite plane "
+                    "of focus, where views have their samples, and a bench its scale and "
+                    "light",
+                    camera.name));
   }
   return true;
 }

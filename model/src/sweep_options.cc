@@ -63,11 +63,11 @@ std::string TargetKindName(TargetKind kind) {
 }
 
 EffectSet SweepEffects() {
-  return {Effect::kThickness,     Effect::kDefocus,      Effect::kApertureShape,
-          Effect::kFalloff,       Effect::kPixelBox,     Effect::kLensFloor,
-          Effect::kShotNoise,     Effect::kReadNoise,    Effect::kQuantisation,
-          Effect::kTransferCurve, Effect::kLampFalloff,  Effect::kFlicker,
-          Effect::kMagnification, Effect::kDrift,        Effect::kReadingError};
+  return {Effect::kThickness,     Effect::kDefocus,     Effect::kApertureShape,
+          Effect::kFalloff,       Effect::kPixelBox,    Effect::kLensFloor,
+          Effect::kShotNoise,     Effect::kReadNoise,   Effect::kQuantisation,
+          Effect::kTransferCurve, Effect::kLampFalloff, Effect::kFlicker,
+          Effect::kMagnification, Effect::kDrift,       Effect::kReadingError};
 }
 
 bool SweepSimulationOptions::IsValid(std::string* why) const {

@@ -59,8 +59,12 @@ struct SweepSimulator::Impl {
 
   void Decide() {
     EffectChoice choice = options.effects;
-    // All that costs nothing where frames are sums of waves.
-    choice.kept = choice.kept.With(SweepEffects().Without({Effect::kThickness, Effect::kFalloff}));
+    // All but fall-off costs nothing where frames are sums of waves; and that, with the thickness
+    // it depends on, is for those who ask: what it does to a calibration is not known.
+    if (choice.base == EffectChoice::Base::kAuto) {
+      choice.without = choice.without.With({Effect::kThickness, Effect::kFalloff});
+    }
+    choice.kept = choice.kept.With(SweepEffects());
     const double last_depth_mm =
         options.first_depth_mm + (options.frame_count - 1) * options.step_mm;
     const auto [near, far] = std::minmax(options.first_depth_mm, last_depth_mm);
