@@ -97,14 +97,22 @@ EffectTolerance EffectToleranceFromText(const std::string& text) {
   return tolerance;
 }
 
-EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
-                        const EffectSet& effects, const EffectTolerance& tolerance, int threads) {
+namespace {
+
+// Of `effects` in a picture that has `kept`, too, and keeps them.
+EffectSet ChooseBeside(const EffectSet& kept, const EffectConditions& conditions,
+                       const std::vector<EffectPlace>& places, const EffectSet& effects,
+                       const EffectTolerance& tolerance, int threads) {
   std::string why;
   if (!tolerance.IsValid(&why)) throw Error("effects: " + why);
   CheckEffects(conditions, places);
   Spent spent(tolerance);
-  EffectSet chosen = effects;
+  EffectSet chosen = effects.With(kept);
   std::vector<EffectFinding> findings = FindImpacts(conditions, places, chosen, threads);
+  findings.erase(
+      std::remove_if(findings.begin(), findings.end(),
+                     [&](const EffectFinding& finding) { return kept.Has(finding.effect); }),
+      findings.end());
   while (!findings.empty()) {
     auto least = findings.end();
     for (auto finding = findings.begin(); finding != findings.end(); ++finding) {
@@ -123,6 +131,13 @@ EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<Ef
     });
   }
   return chosen;
+}
+
+}  // namespace
+
+EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
+                        const EffectSet& effects, const EffectTolerance& tolerance, int threads) {
+  return ChooseBeside({}, conditions, places, effects, tolerance, threads);
 }
 
 EffectChoice EffectChoiceFromText(const std::string& effects, const std::string& without,
@@ -167,10 +182,9 @@ EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions&
       decision.on = choice.given.Without(choice.without);
       break;
     case EffectChoice::Base::kAuto:
-      decision.on =
-          ChooseEffects(conditions, places, of_model.Without(choice.without).Without(choice.kept),
-                        choice.tolerance, threads)
-              .With(choice.kept.Without(choice.without));
+      decision.on = ChooseBeside(choice.kept.Both(of_model).Without(choice.without), conditions,
+                                 places, of_model.Without(choice.without).Without(choice.kept),
+                                 choice.tolerance, threads);
       break;
   }
   return decision;

@@ -8,13 +8,24 @@ namespace {
 
 using Flags = Eigen::Array<bool, Eigen::Dynamic, 1, Eigen::ColMajor, kRaysAtOnce, 1>;
 
-// Of positions from the outline's centre, in its unit.
-Flags Inside(const OutlineOptions& outline, const RayNumbers& x, const RayNumbers& y) {
+// Of positions (x, y) from a point that lies at `from_centre` from the outline's centre, in its
+// unit. However large the outline is, its border is compared near the point, in double: float has
+// not the digits. Of a disc, |c + d|^2 <= R^2 is |d|^2 + 2 c.d <= (R - |c|)(R + |c|).
+Flags Inside(const OutlineOptions& outline, const Eigen::Vector2d& from_centre, const RayNumbers& x,
+             const RayNumbers& y) {
   if (outline.shape == OutlineOptions::Shape::kDisc) {
-    return x.square() + y.square() <= static_cast<float>(outline.radius * outline.radius);
+    const double c = from_centre.norm();
+    // By 2R, so that nothing overflows where R is large.
+    const double scale = 1 / (2 * outline.radius);
+    const Eigen::Vector2f direction = (2 * scale * from_centre).cast<float>();
+    return static_cast<float>(scale) * (x.square() + y.square()) + direction.x() * x +
+               direction.y() * y <=
+           static_cast<float>(scale * (outline.radius - c) * (outline.radius + c));
   }
-  const Eigen::Vector2f half = (outline.size / 2).cast<float>();
-  return x.abs() <= half.x() && y.abs() <= half.y();
+  const Eigen::Array2d half = outline.size.array() / 2;
+  const Eigen::Array2f low = (-half - from_centre.array()).cast<float>();
+  const Eigen::Array2f high = (half - from_centre.array()).cast<float>();
+  return x >= low.x() && x <= high.x() && y >= low.y() && y <= high.y();
 }
 
 // Keeps, for each ray, the nearest of what is offered.
@@ -143,12 +154,10 @@ RayBundle::Shown RayBundle::NearestAlong(const Eigen::Vector2d& centre_px,
     }
     Flags inside;
     if (outline.unit == OutlineOptions::Unit::kPx) {
-      const Eigen::Vector2f from_centre = (centre_px - outline.centre).cast<float>();
       const auto [x_px, y_px] = ChiefOffsetsPx(chiefs[k], meeting);
-      inside = Inside(outline, x_px + from_centre.x(), y_px + from_centre.y());
+      inside = Inside(outline, centre_px - outline.centre, x_px, y_px);
     } else {
-      const Eigen::Vector2f from_centre = (chiefs[k].position_mm - outline.centre).cast<float>();
-      inside = Inside(outline, meeting.x_mm + from_centre.x(), meeting.y_mm + from_centre.y());
+      inside = Inside(outline, chiefs[k].position_mm - outline.centre, meeting.x_mm, meeting.y_mm);
     }
     nearest.Offer(k, depth_mm, &inside);
   }
@@ -177,13 +186,13 @@ RayBundle::Shown RayBundle::NearestFromMiddle(const Eigen::Vector2d& centre_px,
     Flags inside;
     const Eigen::Vector2d& centre = layer.outline.centre;
     if (layer.outline.unit == OutlineOptions::Unit::kPx) {
-      const Eigen::Vector2f from_centre = (centre_px - centre).cast<float>();
-      inside = Inside(layer.outline, x_px + from_centre.x(), y_px + from_centre.y());
+      inside = Inside(layer.outline, centre_px - centre, x_px, y_px);
     } else {
+      const Eigen::Vector2d& middle_mm = chiefs[k].position_mm;
       inside = Inside(
-          layer.outline,
-          (depth_mm * (slope.x() + x_px.cast<double>() / scale_px) - centre.x()).cast<float>(),
-          (depth_mm * (slope.y() + y_px.cast<double>() / scale_px) - centre.y()).cast<float>());
+          layer.outline, middle_mm - centre,
+          (depth_mm * (slope.x() + x_px.cast<double>() / scale_px) - middle_mm.x()).cast<float>(),
+          (depth_mm * (slope.y() + y_px.cast<double>() / scale_px) - middle_mm.y()).cast<float>());
     }
     nearest.Offer(k, depth_mm, &inside);
   }

@@ -13,6 +13,8 @@
 
 namespace thicklens::model {
 
+static_assert(kRaysAtOnce <= SceneTexture::kMostAtOnce);
+
 RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on) {
   const Camera& camera = options.camera;
   RaySpread spread;

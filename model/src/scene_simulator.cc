@@ -147,6 +147,8 @@ struct SceneSimulator::Impl {
   void MakeTextures(const std::vector<LinearPicture>& pictures, int threads) {
     const LinearPicture none;
     std::vector<std::optional<SceneTexture>> drawn(options.layers.size());
+    const int in_texture =
+        std::max(1, ResolveThreads(threads) / static_cast<int>(options.layers.size()));
     ParallelFor(static_cast<int>(drawn.size()), threads, [&](int index) {
       const auto i = static_cast<std::size_t>(index);
       const SceneLayer& layer = options.layers[i];
@@ -156,7 +158,7 @@ struct SceneSimulator::Impl {
                         static_cast<std::uint32_t>(i));
       try {
         drawn[i].emplace(layer.texture, geometry.RequestFor(layer),
-                         i < pictures.size() ? pictures[i] : none, &draws, threads);
+                         i < pictures.size() ? pictures[i] : none, &draws, in_texture);
       } catch (const Error& error) {
         throw Error(place + ": " + error.what());
       }

@@ -37,7 +37,7 @@ FeatureRange FeatureRangeOf(TextureKind kind) {
     case TextureKind::kUniform:
       return {1, 0, 1000};
     case TextureKind::kSine:
-      return {8, 0, 1e6};  // the shortest period is the layer's, see CheckSine
+      return {8, 0, 1e6};  // the shortest period is the layer's, see SetWave
     case TextureKind::kEdge:
       return {0, 0, 1e6};  // the least is the layer's
     case TextureKind::kCheckerboard:
@@ -364,7 +364,7 @@ void SceneTexture::SetWave(const TextureOptions& options, const TextureRequest& 
     throw Error(fmt::format(
         "texture.feature_size_px is {}: the {} must be at least {:.4g} here, {} of the layer's "
         "largest px",
-        options.feature_size_px, is_edge_ ? "sigma of an edge" : "period of a sine",
+        size_mm / request.pixel_mm, is_edge_ ? "sigma of an edge" : "period of a sine",
         least_mm / request.pixel_mm, is_edge_ ? "one" : "two"));
   }
   wave_ = (is_edge_ ? 1 / (std::sqrt(2.0) * size_mm) : 2 * kPi / size_mm) * direction;

@@ -128,7 +128,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
-                    "drift_sigma_px", "noise", "bits", "effects", "without", "tolerance", "seed"});
+                    "drift_sigma_px", "noise", "bits", "effects", "without", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);

@@ -72,7 +72,7 @@ struct SweepSimulator::Impl {
                              SweepEffects());
     stored_camera = options.camera;
     if (!On(Effect::kTransferCurve)) stored_camera.sensor.transfer = TransferCurve::Linear();
-    psf = On(Effect::kApertureShape) ? options.camera.psf : Psf::kGaussian;
+    if (!On(Effect::kApertureShape)) stored_camera.psf = Psf::kGaussian;
   }
 
   bool On(Effect effect) const { return decision.on.Has(effect); }
@@ -136,7 +136,7 @@ struct SweepSimulator::Impl {
     truth.image_distance_mm = camera.image_distance_mm();
     truth.focus_depth_mm = camera.focus_depth_mm();
     truth.blur_ratio = camera.blur_ratio();
-    truth.blur_floor_px = camera.calibration->blur_floor_px->value;
+    truth.blur_floor_px = floor_px;
     truth.bench_offset_mm = options.bench_offset_mm;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
@@ -241,7 +241,7 @@ struct SweepSimulator::Impl {
     const AxisSampling y{first_mm.y() / tile_frame.height_mm, frame.pixel_mm / tile_frame.height_mm,
                          sensor.height_px};
     const cv::Mat light = tile_texture->Evaluate(
-        x, y, {floor_px, psf, frame.defocus_sigma_px, On(Effect::kPixelBox)});
+        x, y, {floor_px, stored_camera.psf, frame.defocus_sigma_px, On(Effect::kPixelBox)});
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
     picture.values.reserve(light.total());
     for (int i = 0; i < light.rows; ++i) {
@@ -260,7 +260,7 @@ struct SweepSimulator::Impl {
     const TargetOptions& target = options.target;
     const double ink_px =
         target.kind == TargetKind::kPrintedEdge ? target.ink_sigma_mm / frame.pixel_mm : 0;
-    const bool disc = psf == Psf::kDisc;
+    const bool disc = stored_camera.psf == Psf::kDisc;
     const double gaussian_px =
         std::hypot(std::hypot(floor_px, ink_px), disc ? 0 : frame.defocus_sigma_px);
     const double angle_rad = target.edge_angle_deg * kPi / 180;
@@ -302,7 +302,6 @@ struct SweepSimulator::Impl {
   SweepSimulationOptions options;
   EffectDecision decision;
   Camera stored_camera;
-  Psf psf = Psf::kGaussian;
   double floor_px = 0;
   std::vector<float> light_of_pixel;  // none without fall-off
   std::vector<FrameState> frames;

@@ -209,6 +209,8 @@ TEST(SceneEffectsTest, SamplingErrorIsWithinWhatIsStated) {
 // Out of focus the photograph could do without pixel box and floor; its views cannot.
 TEST(SceneEffectsTest, ViewsKeepWhatOnlyThePhotographDoesNotNeed) {
   SceneSimulationOptions options = RandomScene(1);
+  // A curve that is steep near black would ask for the pixel box even so.
+  options.camera.sensor.transfer = TransferCurve::Linear();
   options.camera.psf = Psf::kGaussian;
   options.layers.resize(1);
   SceneLayer& layer = options.layers.front();

@@ -22,11 +22,12 @@ using model::EffectSet;
 using ::testing::HasSubstr;
 
 constexpr int kWidth = 60, kHeight = 40;
+const EstimateOptions kUsual;
 
 // Thick, with a wide field where the pixels are large.
-model::Camera ThickCamera(double pixel_pitch_mm) {
+model::Camera ThickCamera(double pixel_pitch_mm, double aperture_radius_mm = 4) {
   model::Camera camera;
-  camera.lens = {12.5, 14, 6, 4};
+  camera.lens = {12.5, 14, 6, aperture_radius_mm};
   camera.sensor = {kWidth, kHeight, pixel_pitch_mm, {29.5, 19.5}, model::TransferCurve::Srgb()};
   camera.calibration = model::CameraCalibration{};
   camera.calibration->image_distance_mm =
@@ -54,33 +55,57 @@ std::string ErrorOf(const std::function<void()>& work) {
 
 TEST(LightFieldEffectsTest, AnEstimateTakesWhatMatters) {
   const EffectSet kept = {Effect::kDefocus, Effect::kOcclusion};
-  EXPECT_EQ(Decided({}, ThickCamera(0.2)), kept.With({Effect::kFalloff, Effect::kThickness}));
-  EXPECT_EQ(Decided({}, ThickCamera(0.001)), kept);
+  EXPECT_EQ(Decided(kUsual, ThickCamera(0.2)), kept.With({Effect::kFalloff, Effect::kThickness}));
+  EXPECT_EQ(Decided(kUsual, ThickCamera(0.001, 0.05)), kept);
+  // A small field, but rays that come from all over a wide aperture.
+  EXPECT_TRUE(Decided(kUsual, ThickCamera(0.001)).Has(Effect::kFalloff));
   EXPECT_EQ(Decided(Without("thickness"), ThickCamera(0.2)), kept.With({Effect::kFalloff}));
   EstimateOptions options;
   options.effects.effects = "all";
-  EXPECT_EQ(Decided(options, ThickCamera(0.001)),
+  EXPECT_EQ(Decided(options, ThickCamera(0.001, 0.05)),
             kept.With({Effect::kFalloff, Effect::kThickness, Effect::kApertureShape}));
   options.effects.effects = "defocus,occlusion";
   EXPECT_EQ(Decided(options, ThickCamera(0.2)), kept);
-  options = {};
+  options = kUsual;
   options.effects.tolerance = "30gl";
-  EXPECT_EQ(Decided(options, ThickCamera(0.05)), kept);
-  model::Camera disc = ThickCamera(0.001);
+  EXPECT_EQ(Decided(options, ThickCamera(0.05, 1)), kept);
+  model::Camera disc = ThickCamera(0.001, 0.05);
   disc.psf = model::Psf::kDisc;
-  EXPECT_EQ(Decided({}, disc), kept.With({Effect::kApertureShape}));
+  EXPECT_EQ(Decided(kUsual, disc), kept.With({Effect::kApertureShape}));
 }
 
 TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
-  EXPECT_EQ(Decided({}, std::nullopt),
+  EXPECT_EQ(Decided(kUsual, std::nullopt),
             (EffectSet{Effect::kDefocus, Effect::kApertureShape, Effect::kOcclusion}));
-  EXPECT_TRUE(DecideEstimateEffects({}, std::nullopt, std::nullopt).findings.empty());
+  EXPECT_TRUE(DecideEstimateEffects(kUsual, std::nullopt, std::nullopt).findings.empty());
   EstimateOptions functional;
   functional.solver = "functional";
   EXPECT_EQ(Decided(functional, std::nullopt),
             (EffectSet{Effect::kDefocus, Effect::kApertureShape}));
+  EstimateOptions tolerance;
+  tolerance.effects.tolerance = "1gl";
+  EXPECT_THAT(ErrorOf([&] { Decided(tolerance, std::nullopt); }), HasSubstr("--effect-tolerance"));
   EXPECT_THAT(ErrorOf([] { Decided(Without("falloff"), std::nullopt); }),
-              HasSubstr("effect falloff is not one of a light field without a camera"));
+              HasSubstr("--without: effect falloff is not one of those there are here"));
+}
+
+// What auto leaves out is within the tolerance as it is told, too: there each is alone without,
+// while they are left out one after the other, which changes bounds by a little.
+TEST(LightFieldEffectsTest, WhatIsLeftOutIsWithinTheToleranceThatIsTold) {
+  int left_out = 0;
+  for (const double pitch_mm : {0.001, 0.003, 0.01, 0.03, 0.1}) {
+    for (const double radius_mm : {0.02, 0.2, 1.0, 4.0}) {
+      const model::EffectDecision decision = DecideEstimateEffects(
+          kUsual, ThickCamera(pitch_mm, radius_mm), model::DepthStatistics{9, 0, 500, 800, 2000});
+      for (const model::EffectFinding& finding : decision.findings) {
+        if (decision.on.Has(finding.effect)) continue;
+        EXPECT_LE(finding.impact.grey_levels, 0.6)
+            << model::EffectName(finding.effect) << " " << pitch_mm << " " << radius_mm;
+        if (finding.effect == Effect::kFalloff) ++left_out;
+      }
+    }
+  }
+  EXPECT_GT(left_out, 0);
 }
 
 TEST(LightFieldEffectsTest, AnEstimateRefusesToLeaveOutWhatItIsAbout) {
@@ -89,7 +114,7 @@ TEST(LightFieldEffectsTest, AnEstimateRefusesToLeaveOutWhatItIsAbout) {
   EXPECT_THAT(ErrorOf([] { Decided(Without("occlusion"), std::nullopt); }),
               HasSubstr("occlusion cannot be left out"));
   EXPECT_THAT(ErrorOf([] { Decided(Without("shot-noise"), ThickCamera(0.2)); }),
-              HasSubstr("effect shot-noise is not one of"));
+              HasSubstr("--without: effect shot-noise is not one of"));
   EXPECT_THAT(ErrorOf([] { Decided(Without("bokeh"), ThickCamera(0.2)); }), HasSubstr("\"bokeh\""));
   EstimateOptions options;
   options.effects.effects = "falloff";
@@ -141,12 +166,12 @@ TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
 TEST(LightFieldEffectsTest, APhotographTakesWhatMatters) {
   model::LightField field = model::MakeLightField(kWidth, kHeight, 3, 3, 1);
   const EffectSet kept = {Effect::kDefocus, Effect::kApertureShape};
-  EXPECT_EQ(DecidePhotographEffects({}, field).on, kept);
+  EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on, kept);
   field.camera = ThickCamera(0.2);
-  EXPECT_EQ(DecidePhotographEffects({}, field).on,
+  EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on,
             kept.With({Effect::kThickness, Effect::kFalloff}));
-  field.camera = ThickCamera(0.001);
-  EXPECT_EQ(DecidePhotographEffects({}, field).on, kept);
+  field.camera = ThickCamera(0.001, 0.05);
+  EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on, kept);
   EffectOptions none;
   none.effects = "none";
   EXPECT_TRUE(DecidePhotographEffects(none, field).on.empty());

@@ -136,8 +136,9 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndTold) {
   EXPECT_EQ(truth.At("effects").Elements()[0].Text(), "falloff");
   EXPECT_EQ(model::ReadCamera(folder_ / "given" + "/camera.yaml").sensor.transfer.Name(), "linear");
 
-  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "c", "--effects", "tilt"}),
-              HasSubstr("effect tilt is not one of this picture's"));
+  const ProgramResult foreign = Run({"picture", config, "-o", folder_ / "c", "--effects", "tilt"});
+  EXPECT_EQ(foreign.exit_code, 2);
+  EXPECT_THAT(foreign.err, HasSubstr("--effects: effect tilt is not one of those there are here"));
   EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--without", "bokeh"}).exit_code, 2);
   EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--tolerance", "1"}).exit_code, 2);
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "option_values.h"
 #include "thicklens/error.h"
@@ -37,10 +38,23 @@ void AddEffectOptions(CLI::App* command, EffectOptions* options) {
       ->type_name("NAMES");
   command->add_option("--without", options->without, "Effects to leave out in any case")
       ->type_name("NAMES");
+  if (options->tolerance_option.empty()) return;
   command
       ->add_option(options->tolerance_option, options->tolerance,
                    "What auto may leave out, all together: 0.5gl (grey levels of 255) or 0.1px")
       ->type_name("AMOUNT");
+}
+
+void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model) {
+  model::EffectChoice named;
+  ApplyEffectOptions(options, &named);
+  for (const auto& [option, effects] :
+       {std::pair("--effects", named.given), std::pair("--without", named.without)}) {
+    const model::EffectSet foreign = effects.Without(of_model);
+    if (foreign.empty()) continue;
+    throw UsageError(fmt::format("{}: effect {} is not one of those there are here: {}", option,
+                                 model::JoinedNames(foreign), model::JoinedNames(of_model)));
+  }
 }
 
 void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice) {

@@ -13,9 +13,11 @@ namespace thicklens::tools {
 // --effects, --without, --tolerance of commands with a forward model. What is absent was not given.
 struct EffectOptions {
   std::optional<std::string> effects, without, tolerance;
-  std::string tolerance_option = "--tolerance";  // where that is something else
+  std::string tolerance_option = "--tolerance";  // where it has another name; empty: there is none
 };
 void AddEffectOptions(CLI::App* command, EffectOptions* options);
+// Throws UsageError for effects that are named and that the forward model does not have.
+void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model);
 // Puts what was given in the place of what `choice` says. Throws UsageError.
 void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice);
 

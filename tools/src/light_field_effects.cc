@@ -1,9 +1,10 @@
 #include "light_field_effects.h"
 
+#include <algorithm>
+#include <limits>
 #include <string>
 
 #include "option_values.h"
-#include "thicklens/error.h"
 #include "thicklens/model/effect_impact.h"
 
 namespace thicklens::tools {
@@ -24,28 +25,15 @@ model::EffectChoice ChoiceOf(const EffectOptions& options) {
   return choice;
 }
 
-model::EffectDecision DecisionWithoutCamera(const model::EffectChoice& choice,
+model::EffectDecision DecisionWithoutCamera(const EffectOptions& options,
                                             const EffectSet& of_model) {
-  const EffectSet foreign = choice.given.With(choice.without).Without(of_model);
-  if (!foreign.empty()) {
-    throw UsageError("--effects, --without: effect " + model::JoinedNames(foreign) +
-                     " is not one of a light field without a camera: it has " +
-                     model::JoinedNames(of_model));
+  if (options.tolerance) {
+    throw UsageError(options.tolerance_option +
+                     ": without a camera nothing is known of what effects matter");
   }
+  const model::EffectChoice choice = ChoiceOf(options);
   const EffectSet base = choice.base == model::EffectChoice::Base::kGiven ? choice.given : of_model;
   return {base.Without(choice.without), {}};
-}
-
-model::EffectDecision DecisionWith(const model::EffectChoice& choice, const EffectSet& of_model,
-                                   const model::Camera& camera, double near_mm, double far_mm) {
-  model::EffectConditions conditions;
-  conditions.camera = camera;
-  try {
-    return model::DecideEffects(choice, conditions,
-                                model::PlacesBetween(camera, near_mm, far_mm, true), of_model);
-  } catch (const Error& error) {
-    throw UsageError(std::string("--effects, --without: ") + error.what());
-  }
 }
 
 }  // namespace
@@ -59,8 +47,9 @@ bool IsLeftOut(const EffectOptions& options, Effect effect) {
 model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
                                             const std::optional<model::Camera>& camera,
                                             const std::optional<model::DepthStatistics>& depth) {
-  model::EffectChoice choice = ChoiceOf(options.effects);
   const EffectSet of_model = EffectsOf(options.solver, camera.has_value());
+  CheckEffectNames(options.effects, of_model);
+  model::EffectChoice choice = ChoiceOf(options.effects);
   // The solution's own, which cost what they bring.
   choice.kept = EffectsOf(options.solver, false);
   const bool is_gaussian = options.aperture_shape.empty() && options.aperture_of.empty() &&
@@ -76,21 +65,42 @@ model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
         "--effects, --without: occlusion cannot be left out of an estimate, whose views show the "
         "depth map as each of them sees it; where nothing is hidden it costs nothing");
   }
-  if (!camera) return DecisionWithoutCamera(choice, of_model);
+  if (!camera) return DecisionWithoutCamera(options.effects, of_model);
+  model::EffectConditions conditions;
+  conditions.camera = *camera;
   const double focus_depth_mm = camera->focus_depth_mm();
-  return DecisionWith(choice, of_model, *camera, depth ? depth->min_mm : focus_depth_mm,
-                      depth ? depth->max_mm : focus_depth_mm);
+  return model::DecideEffects(choice, conditions,
+                              model::PlacesBetween(*camera, depth ? depth->min_mm : focus_depth_mm,
+                                                   depth ? depth->max_mm : focus_depth_mm, true),
+                              of_model);
 }
 
 model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
                                               const model::LightField& light_field) {
+  const EffectSet of_views = {Effect::kDefocus, Effect::kApertureShape};
+  const EffectSet of_model =
+      light_field.camera ? of_views.With({Effect::kThickness, Effect::kFalloff}) : of_views;
+  CheckEffectNames(options, of_model);
+  if (!light_field.camera) return DecisionWithoutCamera(options, of_model);
   model::EffectChoice choice = ChoiceOf(options);
-  choice.kept = {Effect::kDefocus, Effect::kApertureShape};
-  if (!light_field.camera) return DecisionWithoutCamera(choice, choice.kept);
-  // The fall-off of a ray knows no depth.
-  const double focus_depth_mm = light_field.camera->focus_depth_mm();
-  return DecisionWith(choice, choice.kept.With({Effect::kThickness, Effect::kFalloff}),
-                      *light_field.camera, focus_depth_mm, focus_depth_mm);
+  choice.kept = of_views;
+  model::EffectConditions conditions;
+  conditions.camera = *light_field.camera;
+  // Views do not tell their depths: any, from half of that of the plane of focus on. What defocus
+  // and aperture shape do there is therefore not told.
+  constexpr double kFarMm = 1e6;
+  const double near_mm = std::min(light_field.camera->focus_depth_mm(), kFarMm) / 2;
+  model::EffectDecision decision =
+      model::DecideEffects(choice, conditions,
+                           model::PlacesBetween(*light_field.camera, near_mm,
+                                                std::numeric_limits<double>::infinity(), false),
+                           of_model);
+  decision.findings.erase(std::remove_if(decision.findings.begin(), decision.findings.end(),
+                                         [&](const model::EffectFinding& finding) {
+                                           return of_views.Has(finding.effect);
+                                         }),
+                          decision.findings.end());
+  return decision;
 }
 
 }  // namespace thicklens::tools

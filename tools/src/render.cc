@@ -160,7 +160,7 @@ struct Rendering {
   model::LinearPicture picture;
   std::string what;  // for people
   nlohmann::json details;
-  std::string effects;  // for people, a line of its own; empty: nothing to tell
+  std::string effects{};  // for people, a line of its own; empty: nothing to tell
 };
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
@@ -235,9 +235,12 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
   rendering.picture = estimator::Photograph(
       light_field, PhotographWeights(options, light_field, effects.on, &rendering.details),
       falloff ? &*falloff : nullptr, kernels.get(), options.common.threads);
-  rendering.what = fmt::format("photograph through {}", effects.on.Has(Effect::kDefocus)
-                                                            ? ApertureText(options, light_field)
-                                                            : "a pinhole");
+  const bool is_pinhole = !effects.on.Has(Effect::kDefocus);
+  const bool is_gaussian = !effects.on.Has(Effect::kApertureShape);
+  rendering.what =
+      fmt::format("photograph through {}", is_pinhole    ? "a pinhole"
+                                           : is_gaussian ? "a gaussian aperture"
+                                                         : ApertureText(options, light_field));
   if (!effects.findings.empty()) rendering.effects = EffectsText(effects);
   return rendering;
 }

@@ -35,7 +35,7 @@ struct SimulateOptions {
   std::string output_folder;
   std::optional<std::int64_t> seed;
   bool unknown_offset = false;
-  EffectOptions effects;
+  EffectOptions effects{{}, {}, {}, ""};  // auto has no choice
 };
 
 // Picture files of unknown origin are taken as sRGB, as a screen would show them.
@@ -58,10 +58,13 @@ model::SweepTarget SweepTargetOf(model::TargetKind kind) {
 
 // The sweep as the person at the bench would describe it; paths as seen from its own folder.
 model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
-                               const model::SweepTruth& truth, bool unknown_offset) {
+                               const model::SweepSimulator& simulator, bool unknown_offset) {
+  const model::SweepTruth& truth = simulator.truth();
   model::SweepFile sweep;
   sweep.camera_path = "camera.yaml";
-  sweep.reading_sigma_mm = simulation.reading_sigma_mm;
+  if (simulator.effects().on.Has(model::Effect::kReadingError)) {
+    sweep.reading_sigma_mm = simulation.reading_sigma_mm;
+  }
   sweep.reading_sigma_stated = true;
   if (!unknown_offset) sweep.offset_mm = model::Estimate{simulation.bench_offset_mm, 0};
   sweep.direction = simulation.direction;
@@ -117,6 +120,7 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
+  CheckEffectNames(options.effects, model::SweepEffects());
   ApplyEffectOptions(options.effects, &simulation.effects);
   model::OutputFolder folder(options.output_folder, kMarkerFile,
                              {"frames", "sweep.yaml", "camera.yaml", kMarkerFile});
@@ -126,8 +130,8 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   model::Camera camera = simulator.camera();
   camera.calibration.reset();  // what a calibration of this sweep has to find
   folder.Write("camera.yaml", model::CameraToYaml(camera));
-  folder.Write("sweep.yaml", model::SweepToYaml(DescribeSweep(simulation, simulator.truth(),
-                                                              options.unknown_offset)));
+  folder.Write("sweep.yaml",
+               model::SweepToYaml(DescribeSweep(simulation, simulator, options.unknown_offset)));
   folder.Write(kMarkerFile, model::SweepTruthToYaml(simulator.truth()));
   ThrowIfInterrupted();
   folder.Commit();

@@ -46,6 +46,7 @@ struct SceneOptions {
 model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   model::SceneSimulationOptions scene = model::ReadSceneSimulation(options.config_path);
   if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
+  CheckEffectNames(options.effects, model::PictureEffects());
   ApplyEffectOptions(options.effects, &scene.effects);
   const auto [u_count, v_count] = ViewCounts(options.views);
   if (u_count > 0) {
