@@ -190,7 +190,7 @@ TEST_F(EstimateSceneTest, IsTheDefaultAndSaysWhatItDid) {
   EXPECT_EQ(summary["size"], json({kW, kH}));
   EXPECT_EQ(summary["channels"], 3);
   EXPECT_EQ(summary["transfer"], "srgb");
-  EXPECT_EQ(summary["effects"], json({"defocus"}));
+  EXPECT_EQ(summary["effects"], json({"defocus", "aperture-shape", "occlusion"}));
   EXPECT_EQ(summary["holes_filled"], 0);
   EXPECT_EQ(summary["converged"], true);
   EXPECT_GT(summary["strength"].get<double>(), 0);
