@@ -18,7 +18,8 @@ class RandomDraws {
     kLamp = 3,
     kDrift = 4,
     kSensor = 5,
-    kStoredNoise = 6
+    kStoredNoise = 6,
+    kReadout = 7
   };
 
   // `item` is the frame's index, so that a frame does not depend on which were drawn before.

@@ -16,6 +16,7 @@
 #include "scene_photograph.h"
 #include "scene_survey.h"
 #include "scene_texture.h"
+#include "sensor_noise.h"
 #include "thicklens/error.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/parallel.h"
@@ -166,19 +167,6 @@ struct SceneSimulator::Impl {
     for (std::optional<SceneTexture>& texture : drawn) textures.push_back(std::move(*texture));
   }
 
-  // Electrons: Poisson of the mean light times full well, plus the reading's Gaussian.
-  void AddElectrons(LinearPicture* picture) const {
-    const double full_well = options.full_well_electrons;
-    if (!(full_well > 0) || !(On(Effect::kShotNoise) || On(Effect::kReadNoise))) return;
-    RandomDraws draws(options.seed, RandomDraws::Purpose::kSensor, 0);
-    for (float& light : picture->values) {
-      double electrons = static_cast<double>(light) * full_well;
-      if (On(Effect::kShotNoise)) electrons = draws.Poisson(electrons);
-      if (On(Effect::kReadNoise)) electrons += options.read_noise_electrons * draws.Normal();
-      light = static_cast<float>(electrons / full_well);
-    }
-  }
-
   const SceneSimulationOptions options;
   const SceneGeometry geometry;
   std::vector<SceneTexture> textures;  // of the layers
@@ -217,7 +205,8 @@ LinearPicture SceneSimulator::RenderNoiseless(const SceneRun& run) const {
 StoredPicture SceneSimulator::Store(const LinearPicture& noiseless) const {
   const SceneSimulationOptions& options = impl_->options;
   LinearPicture exposed = noiseless;
-  impl_->AddElectrons(&exposed);
+  AddSensorNoise({options.full_well_electrons, options.read_noise_electrons}, impl_->decision.on,
+                 options.seed, 0, &exposed);
   return ToStoredWithNoise(
       exposed, impl_->camera.sensor.transfer, impl_->On(Effect::kQuantisation) ? options.bits : 16,
       impl_->On(Effect::kReadNoise) ? options.noise_sigma_grey_levels / 255 : 0, options.seed);

@@ -11,6 +11,7 @@
 #include "edge_spread.h"
 #include "periodic_picture.h"
 #include "random_draws.h"
+#include "sensor_noise.h"
 #include "sweep_target.h"
 #include "thicklens/error.h"
 
@@ -40,7 +41,7 @@ struct SweepSimulator::Impl {
     std::string why;
     if (!options.IsValid(&why)) throw Error(why);
     Decide();
-    MakeFrames();
+    frames = FramesWith(decision.on);
     MakeTruth();
     MakeFalloff();
     if (!IsEdge(options.target.kind)) MakeTile(picture);
@@ -78,8 +79,8 @@ struct SweepSimulator::Impl {
   bool On(Effect effect) const { return decision.on.Has(effect); }
 
   // p/|m|, mm on the target, of one px at a depth.
-  double PixelMm(double depth_mm) const {
-    if (!On(Effect::kMagnification)) depth_mm = options.camera.focus_depth_mm();
+  double PixelMm(double depth_mm, const EffectSet& on) const {
+    if (!on.Has(Effect::kMagnification)) depth_mm = options.camera.focus_depth_mm();
     return options.camera.sensor.pixel_pitch_mm /
            std::abs(ChiefRayMagnification(options.camera.lens, options.camera.image_distance_mm(),
                                           depth_mm));
@@ -92,10 +93,11 @@ struct SweepSimulator::Impl {
            sensor.principal_point_px;
   }
 
-  void MakeFrames() {
+  std::vector<FrameState> FramesWith(const EffectSet& on) const {
     const Camera& camera = options.camera;
     const double focus_depth_mm = camera.focus_depth_mm();
-    const double focus_pixel_mm = PixelMm(focus_depth_mm);
+    const double focus_pixel_mm = PixelMm(focus_depth_mm, on);
+    std::vector<FrameState> states;
     for (int i = 0; i < options.frame_count; ++i) {
       using Purpose = RandomDraws::Purpose;
       const auto item = static_cast<std::uint32_t>(i);
@@ -106,27 +108,28 @@ struct SweepSimulator::Impl {
       frame.depth_mm = options.first_depth_mm + i * options.step_mm;
       frame.reading_mm =
           DirectionSign(options.direction) * (frame.depth_mm - options.bench_offset_mm) +
-          (On(Effect::kReadingError) ? options.reading_sigma_mm * bench.Normal() : 0);
+          (on.Has(Effect::kReadingError) ? options.reading_sigma_mm * bench.Normal() : 0);
       // The lamp stands at the camera: irradiance of the target (zf/z)^2, 1 in the plane of focus.
-      const double falloff = options.lamp_falloff && On(Effect::kLampFalloff)
+      const double falloff = options.lamp_falloff && on.Has(Effect::kLampFalloff)
                                  ? std::pow(focus_depth_mm / frame.depth_mm, 2)
                                  : 1.0;
-      const double flicker = On(Effect::kFlicker) ? options.flicker : 0;
+      const double flicker = on.Has(Effect::kFlicker) ? options.flicker : 0;
       frame.lamp = options.light_level * falloff * std::max(0.0, 1 + flicker * lamp.Normal());
       const double drift_sigma_mm =
-          On(Effect::kDrift) ? options.drift_sigma_px * focus_pixel_mm : 0;
+          on.Has(Effect::kDrift) ? options.drift_sigma_px * focus_pixel_mm : 0;
       frame.drift_mm.x() = drift_sigma_mm * drift.Normal();
       frame.drift_mm.y() = drift_sigma_mm * drift.Normal();
-      frame.pixel_mm = PixelMm(frame.depth_mm);
+      frame.pixel_mm = PixelMm(frame.depth_mm, on);
       // sigma = kappa r_defocus, here in px.
-      if (On(Effect::kDefocus)) {
+      if (on.Has(Effect::kDefocus)) {
         frame.defocus_sigma_px =
             camera.blur_ratio() *
             BlurRadiusMm(camera.lens, camera.image_distance_mm(), frame.depth_mm) /
             camera.sensor.pixel_pitch_mm;
       }
-      frames.push_back(frame);
+      states.push_back(frame);
     }
+    return states;
   }
 
   void MakeTruth() {
@@ -185,22 +188,27 @@ struct SweepSimulator::Impl {
 
   // Where the target's centre lies, mm: in the middle of the picture at the reference depth, which
   // is not on the axis where the principal point is not the middle.
-  Eigen::Vector2d TargetCentreMm() const { return CentrePx() * PixelMm(ReferenceDepthMm()); }
+  Eigen::Vector2d TargetCentreMm(const EffectSet& on) const {
+    return CentrePx() * PixelMm(ReferenceDepthMm(), on);
+  }
 
   // The tile must hold the field of every frame with its drift and blur (of a large blur a part:
   // beyond the tile the target repeats itself, it does not end), and its highest frequency
   // is one cycle per px in the nearest frame: what lies above is taken by the pixel box, whose
   // first zero is there, and what lies between that and half of it is the aliasing that a real
-  // sensor has.
+  // sensor has. Effects that are left out change nothing of what the target shows.
   void MakeTile(const LinearPicture& picture) {
     const Sensor& sensor = options.camera.sensor;
+    const EffectSet all = SweepEffects();
+    const std::vector<FrameState> with_all = FramesWith(all);
+    const double most_floor_px = options.camera.calibration->blur_floor_px->value;
     TileRequest request;
-    request.centre_mm = TargetCentreMm();
-    request.pixel_mm = PixelMm(ReferenceDepthMm());
+    request.centre_mm = TargetCentreMm(all);
+    request.pixel_mm = PixelMm(ReferenceDepthMm(), all);
     request.field_mm = std::min(sensor.width_px, sensor.height_px) * request.pixel_mm;
-    double nearest_pixel_mm = frames.front().pixel_mm;
-    for (const FrameState& frame : frames) {
-      const double margin_px = std::min(3 * std::hypot(floor_px, frame.defocus_sigma_px),
+    double nearest_pixel_mm = with_all.front().pixel_mm;
+    for (const FrameState& frame : with_all) {
+      const double margin_px = std::min(3 * std::hypot(most_floor_px, frame.defocus_sigma_px),
                                         std::min(sensor.width_px, sensor.height_px) / 4.0) +
                                1;
       const Eigen::Vector2d middle_mm = CentrePx() * frame.pixel_mm - frame.drift_mm;
@@ -269,7 +277,7 @@ struct SweepSimulator::Impl {
 
     const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad));
     const Eigen::Vector2d on_edge_px =
-        sensor.principal_point_px + (TargetCentreMm() + frame.drift_mm) / frame.pixel_mm;
+        sensor.principal_point_px + (TargetCentreMm(decision.on) + frame.drift_mm) / frame.pixel_mm;
     const double dark = frame.lamp * (1 - target.contrast);
     const double step = 2 * frame.lamp * target.contrast;
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
@@ -282,21 +290,6 @@ struct SweepSimulator::Impl {
       }
     }
     return picture;
-  }
-
-  // Electrons: Poisson with the mean light * full well, plus the reading's Gaussian.
-  void AddNoise(int frame_index, LinearPicture* picture) const {
-    const bool shot = On(Effect::kShotNoise);
-    const bool read = On(Effect::kReadNoise) && options.read_noise_electrons > 0;
-    if (!(options.full_well_electrons > 0) || !(shot || read)) return;
-    RandomDraws draws(options.seed, RandomDraws::Purpose::kSensor,
-                      static_cast<std::uint32_t>(frame_index));
-    for (float& light : picture->values) {
-      double electrons = light * options.full_well_electrons;
-      if (shot) electrons = draws.Poisson(electrons);
-      if (read) electrons += options.read_noise_electrons * draws.Normal();
-      light = static_cast<float>(electrons / options.full_well_electrons);
-    }
   }
 
   SweepSimulationOptions options;
@@ -322,9 +315,11 @@ LinearPicture SweepSimulator::RenderNoiseless(int frame_index) const {
 
 StoredPicture SweepSimulator::RenderFrame(int frame_index) const {
   LinearPicture picture = impl_->Render(frame_index);
-  impl_->AddNoise(frame_index, &picture);
+  const SweepSimulationOptions& options = impl_->options;
+  AddSensorNoise({options.full_well_electrons, options.read_noise_electrons}, impl_->decision.on,
+                 options.seed, static_cast<std::uint32_t>(frame_index), &picture);
   return ToStored(picture, impl_->stored_camera.sensor.transfer,
-                  impl_->On(Effect::kQuantisation) ? impl_->options.bits : 16);
+                  impl_->On(Effect::kQuantisation) ? options.bits : 16);
 }
 
 const SweepTruth& SweepSimulator::truth() const { return impl_->truth; }

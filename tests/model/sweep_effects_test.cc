@@ -92,6 +92,50 @@ TEST(SweepEffectsTest, EachIsSwitchedAlone) {
   }
 }
 
+// A frame in the plane of focus shows the same of the target without the effects that would widen
+// what frames see of it.
+TEST(SweepEffectsTest, TheTargetStaysTheSameWithoutThem) {
+  SweepSimulationOptions options = With({Effect::kPixelBox, Effect::kMagnification,
+                                         Effect::kDefocus, Effect::kLensFloor, Effect::kDrift});
+  options.first_depth_mm = kFocusMm - 2 * options.step_mm;
+  options.drift_sigma_px = 0;
+  const LinearPicture in_focus = Frames(options)[2];
+  for (const Effect effect : {Effect::kMagnification, Effect::kDefocus, Effect::kDrift}) {
+    SCOPED_TRACE(EffectName(effect));
+    SweepSimulationOptions without = options;
+    without.effects.without.Add(effect);
+    EXPECT_LT(Largest(Frames(without)[2], in_focus), 1e-6);
+  }
+}
+
+// What is read adds to the electrons that came, and does not change how many did.
+TEST(SweepEffectsTest, EachNoiseHasDrawsOfItsOwn) {
+  SweepSimulationOptions options = With({Effect::kShotNoise, Effect::kReadNoise});
+  options.bits = 16;
+  options.camera.sensor.transfer = TransferCurve::Linear();
+  const auto stored = [&](const EffectSet& effects) {
+    options.effects.given = effects;
+    return SweepSimulator(options, {}).RenderFrame(1);
+  };
+  const StoredPicture both = stored({Effect::kShotNoise, Effect::kReadNoise});
+  const StoredPicture none = stored({});
+  for (const Effect effect : {Effect::kShotNoise, Effect::kReadNoise}) {
+    SCOPED_TRACE(EffectName(effect));
+    const StoredPicture one = stored({effect});
+    double squares = 0;
+    for (std::size_t i = 0; i < both.values.size(); ++i) {
+      // The shot noise of one pixel is that of its light; the reading's is the same everywhere.
+      const double other_sd =
+          effect == Effect::kReadNoise
+              ? std::sqrt(none.values[i] / 65535.0 / options.full_well_electrons)
+              : options.read_noise_electrons / options.full_well_electrons;
+      squares += std::pow((both.values[i] - one.values[i]) / 65535.0 / other_sd, 2);
+    }
+    // 19200 pixels: a standard error of .5 %.
+    EXPECT_NEAR(std::sqrt(squares / static_cast<double>(both.values.size())), 1, 0.02);
+  }
+}
+
 // cos(alpha) cos^3(beta) of (12), written out once more for the aperture's middle, where rays make
 // the chief ray's angle atan(x/K) in front of the lens and atan(x/d1) behind it; K the image
 // distance of a thin lens of f1 that is focused alike.
