@@ -12,12 +12,14 @@
 #include <optional>
 #include <string>
 
+#include "attribution_page.h"
 #include "commands.h"
 #include "effect_options.h"
 #include "image_io.h"
 #include "interrupt.h"
 #include "progress_line.h"
 #include "simulate_scene.h"
+#include "simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/parallel.h"
@@ -35,44 +37,9 @@ struct SimulateOptions {
   std::string output_folder;
   std::optional<std::int64_t> seed;
   bool unknown_offset = false;
+  bool attribute = false;
   EffectOptions effects{{}, {}, {}, ""};  // auto has no choice
 };
-
-// Picture files of unknown origin are taken as sRGB, as a screen would show them.
-model::LinearPicture ReadTargetPicture(const model::TargetOptions& target) {
-  if (target.kind != model::TargetKind::kPicture) return {};
-  const model::StoredPicture stored = ToStoredPicture(ReadPictureFile(target.picture_path));
-  return model::ToGrey(model::ToLinear(stored, model::TransferCurve::Srgb()));
-}
-
-model::SweepTarget SweepTargetOf(model::TargetKind kind) {
-  switch (kind) {
-    case model::TargetKind::kPrintedEdge:
-      return model::SweepTarget::kPrintedEdge;
-    case model::TargetKind::kKnifeEdge:
-      return model::SweepTarget::kKnifeEdge;
-    default:
-      return model::SweepTarget::kTexture;
-  }
-}
-
-// The sweep as the person at the bench would describe it; paths as seen from its own folder.
-model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
-                               const model::SweepSimulator& simulator, bool unknown_offset) {
-  const model::SweepTruth& truth = simulator.truth();
-  model::SweepFile sweep;
-  sweep.camera_path = "camera.yaml";
-  if (simulator.effects().on.Has(model::Effect::kReadingError)) {
-    sweep.reading_sigma_mm = simulation.reading_sigma_mm;
-  }
-  sweep.reading_sigma_stated = true;
-  if (!unknown_offset) sweep.offset_mm = model::Estimate{simulation.bench_offset_mm, 0};
-  sweep.direction = simulation.direction;
-  sweep.target = SweepTargetOf(simulation.target.kind);
-  for (const model::SweepTruth::Frame& frame : truth.frames)
-    sweep.frames.push_back({frame.image, frame.reading_mm});
-  return sweep;
-}
 
 // Returns the bits of what is stored.
 int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
@@ -122,10 +89,12 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
   CheckEffectNames(options.effects, model::SweepEffects());
   ApplyEffectOptions(options.effects, &simulation.effects);
-  model::OutputFolder folder(options.output_folder, kMarkerFile,
-                             {"frames", "sweep.yaml", "camera.yaml", kMarkerFile});
+  model::OutputFolder folder(
+      options.output_folder, kMarkerFile,
+      {"frames", "sweep.yaml", "camera.yaml", kMarkerFile, kAttributionPage, kAttributionTable});
 
-  const model::SweepSimulator simulator(simulation, ReadTargetPicture(simulation.target));
+  const model::LinearPicture target_picture = ReadTargetPicture(simulation.target);
+  const model::SweepSimulator simulator(simulation, target_picture);
   const int bits = RenderFrames(simulator, options.common, &folder);
   model::Camera camera = simulator.camera();
   camera.calibration.reset();  // what a calibration of this sweep has to find
@@ -133,6 +102,13 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   folder.Write("sweep.yaml",
                model::SweepToYaml(DescribeSweep(simulation, simulator, options.unknown_offset)));
   folder.Write(kMarkerFile, model::SweepTruthToYaml(simulator.truth()));
+  Attribution attribution;
+  if (options.attribute) {
+    ProgressLine progress("attributing", options.common.quiet);
+    attribution.sweep = AttributeSweep(simulation, target_picture, options.unknown_offset,
+                                       AttributionRunWith(options.common, &progress));
+    WriteAttribution(attribution, options.config_path, &folder);
+  }
   ThrowIfInterrupted();
   folder.Commit();
 
@@ -145,7 +121,9 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
               fmt::format("{} frames of {} x {} px in {:.1f} s: {}\n", simulation.frame_count,
                           camera.sensor.width_px, camera.sensor.height_px, seconds.count(),
                           options.output_folder) +
-                  EffectsText(simulator.effects()));
+                  EffectsText(simulator.effects()) +
+                  (options.attribute ? AttributionText(attribution) : ""));
+  if (options.attribute) result.summary["attribution"] = AttributionJson(attribution);
   return result;
 }
 
@@ -170,6 +148,9 @@ void AddSimulateCommand(CLI::App* program, CommandAction* action) {
   command->add_flag("--unknown-offset", options->unknown_offset,
                     "Leave the bench offset out of sweep.yaml, to be found by a calibration");
   AddEffectOptions(command, &options->effects);
+  command->add_flag("--attribute", options->attribute,
+                    "Also simulate and calibrate it without each effect in turn, and tell what "
+                    "each changes: a table, attribution.csv and the page attribution.html");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] { RunCommand(options->common, [&] { return SimulateSweep(*options); }); };

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "attribution_page.h"
 #include "build_info.h"
 #include "depth_io.h"
 #include "effect_options.h"
@@ -20,7 +21,9 @@
 #include "interrupt.h"
 #include "light_field_io.h"
 #include "light_field_options.h"
+#include "option_values.h"
 #include "progress_line.h"
+#include "simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/scene_simulator.h"
@@ -39,6 +42,8 @@ struct SceneOptions {
   std::string output_folder;
   std::optional<std::int64_t> seed;
   EffectOptions effects;
+  bool attribute = false;      // picture
+  std::string sweep_path;      // picture; of the attribution
   ViewsOption views;           // light-field
   std::string format = "png";  // light-field
 };
@@ -108,13 +113,35 @@ std::string SamplingText(const model::SceneSimulationOptions& scene,
                          : "");
 }
 
+Attribution Attribute(const SceneOptions& options, const model::SceneSimulationOptions& scene,
+                      const std::vector<model::LinearPicture>& textures) {
+  Attribution attribution;
+  std::optional<model::SweepSimulationOptions> sweep;
+  if (!options.sweep_path.empty()) {  // read before anything long
+    sweep = model::ReadSweepSimulation(options.sweep_path);
+    if (options.seed) sweep->seed = static_cast<std::uint64_t>(*options.seed);
+  }
+  {
+    ProgressLine progress("attributing", options.common.quiet);
+    attribution.scene =
+        AttributeScene(scene, textures, AttributionRunWith(options.common, &progress));
+  }
+  if (!sweep) return attribution;
+  ProgressLine progress("attributing the sweep", options.common.quiet);
+  attribution.sweep = AttributeSweep(*sweep, ReadTargetPicture(sweep->target), false,
+                                     AttributionRunWith(options.common, &progress));
+  return attribution;
+}
+
 CommandResult SimulatePicture(const SceneOptions& options) {
   const auto start = Clock::now();
   const model::SceneSimulationOptions scene = ReadConfig(options);
   model::OutputFolder folder(options.output_folder, kPictureMarker,
-                             {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker});
+                             {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker,
+                              kAttributionPage, kAttributionTable});
 
-  const model::SceneSimulator simulator(scene, ReadTextures(scene), options.common.threads);
+  const std::vector<model::LinearPicture> textures = ReadTextures(scene);
+  const model::SceneSimulator simulator(scene, textures, options.common.threads);
   const model::RawDepthMap depth = simulator.RenderDepth();
   const model::SceneTruth truth = simulator.Truth(depth);
   int bits = 0;
@@ -129,6 +156,11 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   folder.Write("depth.pfm", EncodePfm(depth));
   folder.Write("camera.yaml", model::CameraToYaml(simulator.camera()));
   folder.Write(kPictureMarker, model::SceneTruthToYaml(truth));
+  Attribution attribution;
+  if (options.attribute) {
+    attribution = Attribute(options, scene, textures);
+    WriteAttribution(attribution, options.config_path, &folder);
+  }
   ThrowIfInterrupted();
   folder.Commit();
 
@@ -146,7 +178,9 @@ CommandResult SimulatePicture(const SceneOptions& options) {
                   scene.camera.sensor.width_px, scene.camera.sensor.height_px,
                   truth.nearest_depth_mm, truth.farthest_depth_mm, truth.largest_blur_sigma_px,
                   result.summary["seconds"].get<double>(), options.output_folder) +
-          EffectsText(simulator.effects()) + SamplingText(scene, simulator));
+          EffectsText(simulator.effects()) + SamplingText(scene, simulator) +
+          (options.attribute ? AttributionText(attribution) : ""));
+  if (options.attribute) result.summary["attribution"] = AttributionJson(attribution);
   return result;
 }
 
@@ -203,19 +237,32 @@ CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std
 
 void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
   const auto picture = std::make_shared<SceneOptions>();
-  AddSceneCommand(simulate, "picture",
-                  "A photograph of a scene: picture.png, depth.pfm (z in mm), camera.yaml (the "
-                  "true calibration) and truth.yaml",
-                  picture.get())
-      ->callback([picture, action] {
-        *action = [picture] {
-          RunCommand(picture->common, [&] { return SimulatePicture(*picture); });
-        };
-      });
+  CLI::App* command =
+      AddSceneCommand(simulate, "picture",
+                      "A photograph of a scene: picture.png, depth.pfm (z in mm), camera.yaml (the "
+                      "true calibration) and truth.yaml",
+                      picture.get());
+  command->add_flag("--attribute", picture->attribute,
+                    "Also simulate it without each effect in turn and estimate the light field of "
+                    "each, and tell what each changes: a table, attribution.csv and the page "
+                    "attribution.html");
+  command
+      ->add_option("--sweep", picture->sweep_path,
+                   "With --attribute: a simulated sweep (as of simulate sweep), to tell what each "
+                   "effect changes in its calibration")
+      ->type_name("SWEEP");
+  command->callback([picture, action] {
+    *action = [picture] {
+      if (!picture->sweep_path.empty() && !picture->attribute) {
+        throw UsageError("--sweep belongs to --attribute");
+      }
+      RunCommand(picture->common, [&] { return SimulatePicture(*picture); });
+    };
+  });
 
   const auto views = std::make_shared<SceneOptions>();
-  CLI::App* command = AddSceneCommand(simulate, "light-field",
-                                      "The true light field of a scene, as its views", views.get());
+  command = AddSceneCommand(simulate, "light-field",
+                            "The true light field of a scene, as its views", views.get());
   AddViewsOption(command, &views->views, "Replaces the config's views");
   command
       ->add_option("--format", views->format,
