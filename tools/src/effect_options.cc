@@ -28,6 +28,14 @@ std::string BoundText(const model::EffectFinding& finding) {
   return fmt::format("{:.3g}", grey_levels);
 }
 
+std::string CostText(model::Effect effect,
+                     const std::vector<std::pair<model::Effect, double>>& costs) {
+  for (const auto& [of, seconds] : costs) {
+    if (of == effect) return seconds == 0 ? "~0" : fmt::format("{:+.2g}", seconds);
+  }
+  return "-";
+}
+
 }  // namespace
 
 void AddEffectOptions(CLI::App* command, EffectOptions* options) {
@@ -114,22 +122,27 @@ std::string EffectsText(const model::EffectDecision& decision) {
                      model::JoinedNames(decision.on), left_out.empty() ? "none" : left_out);
 }
 
-std::string EffectsTable(const model::EffectDecision& decision) {
-  std::string text = fmt::format("{:<15} {:>22} {:>13}  {:<4} {}\n", "effect", "largest impact",
-                                 "grey levels", "", "where");
+std::string EffectsTable(const model::EffectDecision& decision,
+                         const std::vector<std::pair<model::Effect, double>>* cost_seconds) {
+  std::string text =
+      fmt::format("{:<15} {:>22} {:>13}{}  {:<4} {}\n", "effect", "largest impact", "grey levels",
+                  cost_seconds != nullptr ? fmt::format("{:>10}", "cost s") : "", "", "where");
   for (const model::EffectFinding& finding : decision.findings) {
     const model::EffectFacts& facts = model::FactsOf(finding.effect);
     const std::string unit =
         facts.unit == model::EffectUnit::kGreyLevels ? "levels" : model::EffectUnitName(facts.unit);
     const std::string on = decision.on.Has(finding.effect) ? "on" : "off";
+    const std::string cost = cost_seconds != nullptr
+                                 ? fmt::format("{:>10}", CostText(finding.effect, *cost_seconds))
+                                 : "";
     if (finding.impact.amount == 0 && finding.impact.grey_levels == 0) {
-      text += fmt::format("{:<15} {:>22} {:>13}  {}\n", facts.name, "none here", "0", on);
+      text += fmt::format("{:<15} {:>22} {:>13}{}  {}\n", facts.name, "none here", "0", cost, on);
       continue;
     }
     text += fmt::format(
-        "{:<15} {:>22} {:>13}  {:<4} {}\n", facts.name,
+        "{:<15} {:>22} {:>13}{}  {:<4} {}\n", facts.name,
         fmt::format("{}{:.4g} {}", facts.random ? "sd " : "", finding.impact.amount, unit),
-        BoundText(finding), on, EffectPlaceText(finding.place));
+        BoundText(finding), cost, on, EffectPlaceText(finding.place));
   }
   return text;
 }

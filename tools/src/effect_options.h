@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "thicklens/model/effect_choice.h"
 
@@ -27,8 +29,11 @@ std::string EffectPlaceText(const model::EffectPlace& place);
 nlohmann::json EffectsJson(const model::EffectDecision& decision);
 // One line on what was on and what was left out.
 std::string EffectsText(const model::EffectDecision& decision);
-// A line an effect.
-std::string EffectsTable(const model::EffectDecision& decision);
+// A line an effect. `cost_seconds`: null, or of some effects what they cost, in a column of its
+// own.
+std::string EffectsTable(
+    const model::EffectDecision& decision,
+    const std::vector<std::pair<model::Effect, double>>* cost_seconds = nullptr);
 
 }  // namespace thicklens::tools
 

@@ -10,12 +10,17 @@
 
 #include "commands.h"
 #include "depth_io.h"
+#include "effect_costs.h"
 #include "effect_options.h"
+#include "explain_figure.h"
 #include "explain_scene.h"
 #include "explain_table.h"
+#include "interrupt.h"
 #include "light_field_options.h"
 #include "option_values.h"
+#include "progress_line.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -34,6 +39,8 @@ struct ExplainOptions {
   bool as_sweep = false;
   model::BenchConditions bench;       // with as_sweep
   std::optional<double> uv_depth_mm;  // of the plane UV of a light field
+  bool costs = false;
+  std::string figure_path;
 };
 
 DepthRange ParseDepthRange(const std::string& text) {
@@ -98,19 +105,59 @@ model::EffectDecision Decide(const ExplainOptions& options, const model::Camera&
   return model::DecideEffects(choice, conditions, places, model::EffectSet::All());
 }
 
+EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
+                    const DepthRange& range, const model::EffectDecision& decision) {
+  model::SceneSimulationOptions sensor;
+  sensor.full_well_electrons = options.full_well_electrons;
+  sensor.read_noise_electrons = options.read_noise_electrons;
+  sensor.bits = options.bits;
+  ProgressLine progress("measuring costs", options.common.quiet);
+  return MeasureEffectCosts(camera, range, sensor, decision, [&progress](int done, int total) {
+    ThrowIfInterrupted();
+    progress.Show(done, total);
+  });
+}
+
+void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {
+  (*summary)["picture_seconds"] = costs.seconds;
+  for (nlohmann::json& effect : (*summary)["effects"]) {
+    for (const auto& [of, seconds] : costs.of_effect) {
+      if (effect["name"] == model::EffectName(of)) effect["cost_seconds"] = seconds;
+    }
+  }
+}
+
+std::string CostsText(const EffectCosts& costs) {
+  return fmt::format(
+      "cost: how much longer a simulated picture of this size takes with the effect than without "
+      "it, in\nseconds of one core of this machine, all others being as they are here; with these "
+      "it "
+      "takes {:.3g}, and\n~0 is nothing, or less than can be measured\n",
+      costs.seconds);
+}
+
 CommandResult Explain(const ExplainOptions& options) {
+  std::optional<model::OutputFile> figure;
+  if (!options.figure_path.empty()) figure.emplace(options.figure_path);
   const model::Camera camera = model::ReadCamera(options.camera_path);
   TellAssumedFields(camera);
   const ExplainedScene scene = SceneOf(options, camera);
   const Explanation explanation = ExplainCamera(camera, scene.range, options.steps);
   const model::EffectDecision decision = Decide(options, camera, scene.places);
+  CommandResult result{ExplanationJson(explanation), ""};
+  result.summary["effects"] = EffectsJson(decision);
+  std::optional<EffectCosts> costs;
+  if (options.costs) {
+    costs = CostsOf(options, camera, scene.range, decision);
+    AddCosts(*costs, &result.summary);
+  }
+  if (figure) figure->Commit(BlurCurveSvg(camera, scene.range));
   PrintResult(
       options.common,
       ExplanationText(explanation) +
           "\nwhat each effect can matter here, at most, to edges between black and white\n" +
-          EffectsTable(decision));
-  CommandResult result{ExplanationJson(explanation), ""};
-  result.summary["effects"] = EffectsJson(decision);
+          EffectsTable(decision, costs ? &costs->of_effect : nullptr) +
+          (costs ? CostsText(*costs) : ""));
   return result;
 }
 
@@ -126,6 +173,9 @@ void CheckUsage(const ExplainOptions& options) {
   if (!options.as_sweep && (bench.flicker > 0 || bench.drift_sigma_px > 0 ||
                             bench.reading_sigma_mm > 0 || bench.tilt_deg != 0)) {
     throw UsageError("--flicker, --drift, --tilt and --reading-error belong to --as-sweep");
+  }
+  if (options.costs && options.as_sweep) {
+    throw UsageError("--costs: effects of a sweep cost next to nothing; it is for pictures");
   }
   if (!options.depth_path.empty()) {
     if (ConventionOf(options.depth).kind == model::DepthKind::kDisparity) {
@@ -194,12 +244,19 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
                    "Depth of a light field's plane UV, whose ST lies in the plane of focus")
       ->check(Finite())
       ->type_name("MM");
+  command->add_flag("--costs", options->costs,
+                    "Measure, too, what each effect costs in a simulated picture of this camera at "
+                    "these depths; takes some seconds");
+  command
+      ->add_option("--figure", options->figure_path,
+                   "Draw the curve of blur against depth, with the band of its standard error")
+      ->type_name("FILE.svg");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {
       CheckUsage(*options);
       if (options->depth_path.empty()) ParseDepthRange(options->depth_range);
-      RequireDistinctFiles({options->common.json_path},
+      RequireDistinctFiles({options->common.json_path, options->figure_path},
                            {options->camera_path, options->depth_path});
       RunCommand(options->common, [&] { return Explain(*options); });
     };
