@@ -42,6 +42,7 @@ EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place
 EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   const double floor_px = optics.floor_px();
+  if (!(floor_px > 0)) return {};
   const double change = BlurChange(place, floor_px * floor_px, optics.SmoothingBy(others, place));
   const double of_diffraction =
       others.Has(Effect::kDiffraction)

@@ -352,6 +352,17 @@ TEST(EffectsTest, WhatIsLeftOutStaysWithinTheToleranceAllTogether) {
   EXPECT_EQ(last, EffectSet());
 }
 
+// Diffraction is there then with the floor as without it.
+TEST(EffectsTest, ALensFloorThatWasNotMeasuredIsNothing) {
+  EffectConditions conditions = ConditionsOf(TheCamera());
+  const EffectPlace place = PlacesBetween(conditions.camera, 300, 300, false).front();
+  const EffectSet others = EffectSet::All().Without({Effect::kLensFloor});
+  EXPECT_GT(ImpactAt(Effect::kLensFloor, conditions, place, others).grey_levels, 0);
+  conditions.camera.calibration->blur_floor_px.reset();
+  EXPECT_EQ(ImpactAt(Effect::kLensFloor, conditions, place, others).grey_levels, 0);
+  EXPECT_GT(ImpactAt(Effect::kDiffraction, conditions, place, others).grey_levels, 0);
+}
+
 TEST(EffectsTest, ToleranceInPxJudgesDisplacements) {
   const EffectConditions conditions = ConditionsOf(TheCamera());
   const double shift = 0.2 / (0.45 * 4.46 * conditions.camera.focal_scale_px());
