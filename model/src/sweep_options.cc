@@ -1,6 +1,7 @@
 // What a simulated sweep may be.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -8,9 +9,12 @@
 #include "simulated_camera.h"
 #include "thicklens/error.h"
 #include "thicklens/model/sweep_simulator.h"
+#include "tilted_target.h"
 
 namespace thicklens::model {
 namespace {
+
+constexpr double kPi = 3.14159265358979323846;
 
 bool Fail(std::string* why, const std::string& message) {
   if (why != nullptr) *why = message;
@@ -35,7 +39,25 @@ bool IsValidTarget(const TargetOptions& target, std::string* why) {
     return Fail(why,
                 fmt::format("target.ink_sigma_mm is {}: it must be >= 0", target.ink_sigma_mm));
   }
+  if (!(std::abs(target.tilt_deg) <= 80)) {
+    return Fail(
+        why, fmt::format("target.tilt_deg is {}: it must be between -80 and 80", target.tilt_deg));
+  }
   return true;
+}
+
+// Every ray must meet the target, and not too far away.
+bool IsSeenWhole(const Camera& camera, double tilt_deg, std::string* why) {
+  constexpr double kLeastNearness = 0.2;
+  const Sensor& sensor = camera.sensor;
+  const double axis_px = sensor.principal_point_px.x();
+  const TiltedTarget target(tilt_deg * kPi / 180, 1, camera.focal_scale_px());
+  const double least =
+      std::min(target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px));
+  if (least >= kLeastNearness) return true;
+  return Fail(why, fmt::format("target.tilt_deg is {}: a side of the picture would look past the "
+                               "target, or at more than five times its depth",
+                               tilt_deg));
 }
 
 }  // namespace
@@ -67,7 +89,8 @@ EffectSet SweepEffects() {
           Effect::kFalloff,       Effect::kPixelBox,    Effect::kLensFloor,
           Effect::kShotNoise,     Effect::kReadNoise,   Effect::kQuantisation,
           Effect::kTransferCurve, Effect::kLampFalloff, Effect::kFlicker,
-          Effect::kMagnification, Effect::kDrift,       Effect::kReadingError};
+          Effect::kMagnification, Effect::kDrift,       Effect::kTilt,
+          Effect::kReadingError};
 }
 
 bool SweepSimulationOptions::IsValid(std::string* why) const {
@@ -77,6 +100,7 @@ bool SweepSimulationOptions::IsValid(std::string* why) const {
                                  "the truth",
                                  camera.name));
   }
+  if (!IsSeenWhole(camera, target.tilt_deg, why)) return false;
   if (!(frame_count >= 1 && frame_count <= 100000)) {
     return Fail(why, fmt::format("bench.frames is {}: it must be from 1 to 100000", frame_count));
   }

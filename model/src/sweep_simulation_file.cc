@@ -74,8 +74,8 @@ TargetKind ReadKind(const YamlNode& node) {
 }
 
 TargetOptions ReadTarget(const YamlNode& node) {
-  node.RequireKeys(
-      {"kind", "contrast", "feature_size_mm", "edge_angle_deg", "ink_sigma_mm", "picture"});
+  node.RequireKeys({"kind", "contrast", "feature_size_mm", "edge_angle_deg", "ink_sigma_mm",
+                    "tilt_deg", "picture"});
   TargetOptions target;
   const YamlNode kind = node.At("kind");
   target.kind = ReadKind(kind);
@@ -83,6 +83,7 @@ TargetOptions ReadTarget(const YamlNode& node) {
   ReadNumber(node, "feature_size_mm", &target.feature_size_mm);
   ReadNumber(node, "edge_angle_deg", &target.edge_angle_deg);
   ReadNumber(node, "ink_sigma_mm", &target.ink_sigma_mm);
+  ReadNumber(node, "tilt_deg", &target.tilt_deg);
   if (const auto picture = node.Find("picture")) {
     if (target.kind != TargetKind::kPicture) {
       throw picture->ErrorHere("only a target of the kind 'picture' has one, found kind '" +

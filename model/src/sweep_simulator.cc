@@ -14,6 +14,7 @@
 #include "sensor_noise.h"
 #include "sweep_target.h"
 #include "thicklens/error.h"
+#include "tilted_target.h"
 
 namespace thicklens::model {
 namespace {
@@ -53,8 +54,9 @@ struct SweepSimulator::Impl {
     conditions.bits = options.bits;
     conditions.full_well_electrons = options.full_well_electrons;
     conditions.read_noise_electrons = options.read_noise_electrons;
-    conditions.bench = BenchConditions{options.lamp_falloff, options.flicker,
-                                       options.drift_sigma_px, options.reading_sigma_mm, 0};
+    conditions.bench =
+        BenchConditions{options.lamp_falloff, options.flicker, options.drift_sigma_px,
+                        options.reading_sigma_mm, options.target.tilt_deg};
     return conditions;
   }
 
@@ -93,6 +95,21 @@ struct SweepSimulator::Impl {
            sensor.principal_point_px;
   }
 
+  // sigma = kappa r_defocus, here in px.
+  double DefocusPx(double depth_mm) const {
+    const Camera& camera = options.camera;
+    return camera.blur_ratio() * BlurRadiusMm(camera.lens, camera.image_distance_mm(), depth_mm) /
+           camera.sensor.pixel_pitch_mm;
+  }
+
+  // The target of a frame; its scale is the frame's, whatever the depth.
+  TiltedTarget TargetOf(double depth_mm, double pixel_mm, const EffectSet& on) const {
+    const double scale_px = options.camera.focal_scale_px();
+    return {on.Has(Effect::kTilt) ? options.target.tilt_deg * kPi / 180 : 0, depth_mm, scale_px,
+            pixel_mm * scale_px / depth_mm};
+  }
+  bool IsTilted() const { return On(Effect::kTilt) && options.target.tilt_deg != 0; }
+
   std::vector<FrameState> FramesWith(const EffectSet& on) const {
     const Camera& camera = options.camera;
     const double focus_depth_mm = camera.focus_depth_mm();
@@ -120,13 +137,7 @@ struct SweepSimulator::Impl {
       frame.drift_mm.x() = drift_sigma_mm * drift.Normal();
       frame.drift_mm.y() = drift_sigma_mm * drift.Normal();
       frame.pixel_mm = PixelMm(frame.depth_mm, on);
-      // sigma = kappa r_defocus, here in px.
-      if (on.Has(Effect::kDefocus)) {
-        frame.defocus_sigma_px =
-            camera.blur_ratio() *
-            BlurRadiusMm(camera.lens, camera.image_distance_mm(), frame.depth_mm) /
-            camera.sensor.pixel_pitch_mm;
-      }
+      if (on.Has(Effect::kDefocus)) frame.defocus_sigma_px = DefocusPx(frame.depth_mm);
       states.push_back(frame);
     }
     return states;
@@ -141,6 +152,7 @@ struct SweepSimulator::Impl {
     truth.blur_ratio = camera.blur_ratio();
     truth.blur_floor_px = floor_px;
     truth.bench_offset_mm = options.bench_offset_mm;
+    if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
                               frames[i].reading_mm,
@@ -189,7 +201,8 @@ struct SweepSimulator::Impl {
   // Where the target's centre lies, mm: in the middle of the picture at the reference depth, which
   // is not on the axis where the principal point is not the middle.
   Eigen::Vector2d TargetCentreMm(const EffectSet& on) const {
-    return CentrePx() * PixelMm(ReferenceDepthMm(), on);
+    const double depth_mm = ReferenceDepthMm();
+    return TargetOf(depth_mm, PixelMm(depth_mm, on), on).At(CentrePx());
   }
 
   // The tile must hold the field of every frame with its drift and blur (of a large blur a part:
@@ -207,18 +220,23 @@ struct SweepSimulator::Impl {
     request.pixel_mm = PixelMm(ReferenceDepthMm(), all);
     request.field_mm = std::min(sensor.width_px, sensor.height_px) * request.pixel_mm;
     double nearest_pixel_mm = with_all.front().pixel_mm;
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
     for (const FrameState& frame : with_all) {
       const double margin_px = std::min(3 * std::hypot(most_floor_px, frame.defocus_sigma_px),
                                         std::min(sensor.width_px, sensor.height_px) / 4.0) +
                                1;
-      const Eigen::Vector2d middle_mm = CentrePx() * frame.pixel_mm - frame.drift_mm;
-      const Eigen::Vector2d half_mm =
-          (Eigen::Vector2d(sensor.width_px, sensor.height_px) / 2).array() * frame.pixel_mm +
-          margin_px * frame.pixel_mm;
-      const Eigen::Vector2d reach_mm = half_mm + (middle_mm - request.centre_mm).cwiseAbs();
-      request.width_mm = std::max(request.width_mm, 2 * reach_mm.x());
-      request.height_mm = std::max(request.height_mm, 2 * reach_mm.y());
-      nearest_pixel_mm = std::min(nearest_pixel_mm, frame.pixel_mm);
+      const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, all);
+      for (const double x_px : {-0.5 - margin_px, sensor.width_px - 0.5 + margin_px}) {
+        nearest_pixel_mm = std::min({nearest_pixel_mm, target.PixelAcrossMm(x_px - axis_px.x()),
+                                     target.PixelDownMm(x_px - axis_px.x())});
+        for (const double y_px : {-0.5 - margin_px, sensor.height_px - 0.5 + margin_px}) {
+          const Eigen::Vector2d reach_mm = (target.At(Eigen::Vector2d(x_px, y_px) - axis_px) -
+                                            frame.drift_mm - request.centre_mm)
+                                               .cwiseAbs();
+          request.width_mm = std::max(request.width_mm, 2 * reach_mm.x());
+          request.height_mm = std::max(request.height_mm, 2 * reach_mm.y());
+        }
+      }
     }
     request.spacing_mm = nearest_pixel_mm / 2;
     RandomDraws draws(options.seed, RandomDraws::Purpose::kTexture, 0);
@@ -239,23 +257,59 @@ struct SweepSimulator::Impl {
     return picture;
   }
 
+  // Without tilt one strip is the whole frame.
+  std::vector<ColumnStrip> Strips(const FrameState& frame) const {
+    const Sensor& sensor = options.camera.sensor;
+    if (!IsTilted()) return {{0, sensor.width_px}};
+    const double tangent = std::tan(std::abs(options.target.tilt_deg) * kPi / 180);
+    const double scale_px = options.camera.focal_scale_px();
+    const double far_px = std::max(sensor.principal_point_px.y(),
+                                   sensor.height_px - 1 - sensor.principal_point_px.y());
+    // d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|.
+    return StripsOf(sensor.width_px,
+                    options.camera.blur_ratio() * options.camera.lens.aperture_radius_mm * tangent /
+                        frame.depth_mm,
+                    far_px * tangent / scale_px);
+  }
+
+  // Sigma of defocus and light of a strip that lies at a depth.
+  double StripDefocusPx(const FrameState& frame, double depth_mm) const {
+    return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm) : frame.defocus_sigma_px;
+  }
+  double StripLamp(const FrameState& frame, double depth_mm) const {
+    const bool falls = options.lamp_falloff && On(Effect::kLampFalloff);
+    return frame.lamp * (falls ? std::pow(frame.depth_mm / depth_mm, 2) : 1);
+  }
+
   LinearPicture RenderTile(const FrameState& frame) const {
     const Sensor& sensor = options.camera.sensor;
-    // Pixel (x, y) looks at (x - cx) p/|m| from the axis: the picture shows the target upright.
-    const Eigen::Vector2d first_mm =
-        -sensor.principal_point_px * frame.pixel_mm - frame.drift_mm - tile_frame.origin_mm;
-    const AxisSampling x{first_mm.x() / tile_frame.width_mm, frame.pixel_mm / tile_frame.width_mm,
-                         sensor.width_px};
-    const AxisSampling y{first_mm.y() / tile_frame.height_mm, frame.pixel_mm / tile_frame.height_mm,
-                         sensor.height_px};
-    const cv::Mat light = tile_texture->Evaluate(
-        x, y, {floor_px, stored_camera.psf, frame.defocus_sigma_px, On(Effect::kPixelBox)});
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, decision.on);
+    const Eigen::Vector2d beside_mm = -frame.drift_mm - tile_frame.origin_mm;
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
-    picture.values.reserve(light.total());
-    for (int i = 0; i < light.rows; ++i) {
-      const double* row = light.ptr<double>(i);
-      for (int j = 0; j < light.cols; ++j) {
-        picture.values.push_back(static_cast<float>(frame.lamp * row[j]));
+    picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
+                          static_cast<std::size_t>(sensor.height_px));
+    for (const ColumnStrip& strip : Strips(frame)) {
+      // Pixel (x, y) looks at what its chief ray meets: the picture shows the target upright. The
+      // columns of a strip lie as in its middle.
+      const double middle_px = strip.middle_px() - axis_px.x();
+      const double across_mm = target.PixelAcrossMm(middle_px);
+      const double down_mm = target.PixelDownMm(middle_px);
+      const double first_mm = target.At({middle_px, 0}).x() -
+                              (strip.middle_px() - strip.first) * across_mm + beside_mm.x();
+      const AxisSampling x{first_mm / tile_frame.width_mm, across_mm / tile_frame.width_mm,
+                           strip.count};
+      const AxisSampling y{(-axis_px.y() * down_mm + beside_mm.y()) / tile_frame.height_mm,
+                           down_mm / tile_frame.height_mm, sensor.height_px};
+      const double depth_mm = target.DepthMm(middle_px);
+      const cv::Mat light = tile_texture->Evaluate(
+          x, y,
+          {floor_px, stored_camera.psf, StripDefocusPx(frame, depth_mm), On(Effect::kPixelBox)});
+      const double lamp = StripLamp(frame, depth_mm);
+      for (int i = 0; i < light.rows; ++i) {
+        const double* row = light.ptr<double>(i);
+        float* to = picture.values.data() + i * sensor.width_px + strip.first;
+        for (int j = 0; j < light.cols; ++j) to[j] = static_cast<float>(lamp * row[j]);
       }
     }
     return picture;
@@ -265,31 +319,56 @@ struct SweepSimulator::Impl {
   // upper end to the right.
   LinearPicture RenderEdge(const FrameState& frame) const {
     const Sensor& sensor = options.camera.sensor;
-    const TargetOptions& target = options.target;
-    const double ink_px =
-        target.kind == TargetKind::kPrintedEdge ? target.ink_sigma_mm / frame.pixel_mm : 0;
-    const bool disc = stored_camera.psf == Psf::kDisc;
-    const double gaussian_px =
-        std::hypot(std::hypot(floor_px, ink_px), disc ? 0 : frame.defocus_sigma_px);
-    const double angle_rad = target.edge_angle_deg * kPi / 180;
-    const EdgeSpread edge(angle_rad, gaussian_px, disc ? 2 * frame.defocus_sigma_px : 0,
-                          On(Effect::kPixelBox));
-
-    const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad));
-    const Eigen::Vector2d on_edge_px =
-        sensor.principal_point_px + (TargetCentreMm(decision.on) + frame.drift_mm) / frame.pixel_mm;
-    const double dark = frame.lamp * (1 - target.contrast);
-    const double step = 2 * frame.lamp * target.contrast;
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
-    picture.values.reserve(static_cast<std::size_t>(sensor.width_px) *
-                           static_cast<std::size_t>(sensor.height_px));
+    picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
+                          static_cast<std::size_t>(sensor.height_px));
+    for (const ColumnStrip& strip : Strips(frame)) RenderEdge(frame, strip, &picture);
+    return picture;
+  }
+
+  // An edge on the target is a line g = 0, g the distance on it in mm, whose gradient in the
+  // picture says how far, in px and which way, a pixel is from the line.
+  void RenderEdge(const FrameState& frame, const ColumnStrip& strip, LinearPicture* picture) const {
+    const Sensor& sensor = options.camera.sensor;
+    const TargetOptions& options_of = options.target;
+    const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, decision.on);
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const Eigen::Vector2d on_edge_mm = TargetCentreMm(decision.on) + frame.drift_mm;
+    const double angle_rad = options_of.edge_angle_deg * kPi / 180;
+    const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad));
+    const auto distance_mm = [&](const Eigen::Vector2d& from_axis_px) {
+      return normal.dot(target.At(from_axis_px) - on_edge_mm);
+    };
+
+    // Where the edge crosses the middle of the strip, or at the end of it that is nearest to that.
+    Eigen::Vector2d middle_px(strip.middle_px() - axis_px.x(), 0);
+    const double down_mm = target.PixelDownMm(middle_px.x());
+    const double row_px = -distance_mm(middle_px) / (normal.y() * down_mm);
+    middle_px.y() = std::clamp(std::isnan(row_px) ? 0 : row_px, -axis_px.y(),
+                               sensor.height_px - 1 - axis_px.y());
+    const Eigen::Vector2d gradient(normal.x() * target.PixelAcrossMm(middle_px.x()) +
+                                       normal.y() * target.DownPerColumnMm(middle_px),
+                                   normal.y() * down_mm);
+    const double pixel_mm = gradient.norm();
+
+    const double depth_mm = target.DepthMm(middle_px.x());
+    const double defocus_px = StripDefocusPx(frame, depth_mm);
+    const double ink_px =
+        options_of.kind == TargetKind::kPrintedEdge ? options_of.ink_sigma_mm / pixel_mm : 0;
+    const bool disc = stored_camera.psf == Psf::kDisc;
+    const EdgeSpread edge(std::atan2(gradient.y(), gradient.x()),
+                          std::hypot(std::hypot(floor_px, ink_px), disc ? 0 : defocus_px),
+                          disc ? 2 * defocus_px : 0, On(Effect::kPixelBox));
+    const double lamp = StripLamp(frame, depth_mm);
+    const double dark = lamp * (1 - options_of.contrast);
+    const double step = 2 * lamp * options_of.contrast;
     for (int y = 0; y < sensor.height_px; ++y) {
-      for (int x = 0; x < sensor.width_px; ++x) {
-        const double distance_px = normal.dot(Eigen::Vector2d(x, y) - on_edge_px);
-        picture.values.push_back(static_cast<float>(dark + step * edge.At(distance_px)));
+      for (int x = strip.first; x < strip.first + strip.count; ++x) {
+        const double distance_px = distance_mm(Eigen::Vector2d(x, y) - axis_px) / pixel_mm;
+        picture->values[static_cast<std::size_t>(y * sensor.width_px + x)] =
+            static_cast<float>(dark + step * edge.At(distance_px));
       }
     }
-    return picture;
   }
 
   SweepSimulationOptions options;

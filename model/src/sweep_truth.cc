@@ -16,13 +16,14 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kTruthSchema);
   root.RequireKeys({"schema", "image_distance_mm", "focus_depth_mm", "blur_ratio", "blur_floor_px",
-                    "bench_offset_mm", "effects", "left_out_grey_levels", "frames"});
+                    "bench_offset_mm", "tilt_deg", "effects", "left_out_grey_levels", "frames"});
   SweepTruth truth;
   truth.image_distance_mm = root.At("image_distance_mm").PositiveNumber();
   truth.focus_depth_mm = root.At("focus_depth_mm").PositiveNumber();
   truth.blur_ratio = root.At("blur_ratio").NonNegativeNumber();
   truth.blur_floor_px = root.At("blur_floor_px").NonNegativeNumber();
   truth.bench_offset_mm = root.At("bench_offset_mm").Number();
+  if (const auto tilt = root.Find("tilt_deg")) truth.tilt_deg = tilt->Number();
   for (const YamlNode& node : root.At("frames").Elements()) {
     node.RequireKeys({"image", "depth_mm", "reading_mm", "blur_sigma_px"});
     truth.frames.push_back({node.At("image").Text(), node.At("depth_mm").Number(),
@@ -43,6 +44,7 @@ std::string SweepTruthToYaml(const SweepTruth& truth) {
   number("blur_ratio", truth.blur_ratio);
   number("blur_floor_px", truth.blur_floor_px);
   number("bench_offset_mm", truth.bench_offset_mm);
+  if (truth.tilt_deg != 0) number("tilt_deg", truth.tilt_deg);
   EmitEffects(truth.effects, &out);
   out << YAML::Key << "frames" << YAML::Value << YAML::BeginSeq;
   for (const SweepTruth::Frame& frame : truth.frames) {

@@ -91,6 +91,25 @@ TEST(FieldMap, SlowATiltIsMeasuredInDegrees) {
   EXPECT_THAT(c.warnings, Contains(HasSubstr("tilted")));
 }
 
+// The same by a target that is simulated as tilted, for a lens whose focus tells depths well: to
+// what the map itself says of its error.
+TEST(FieldMap, FindsTheTiltThatWasSimulated) {
+  for (const double tilt_deg : {1.0, -2.0}) {
+    SCOPED_TRACE(tilt_deg);
+    model::SweepSimulationOptions options =
+        model::ReadSweepSimulation(THICKLENS_SOURCE_DIR "/configs/sweeps/demo.yaml");
+    options.target.tilt_deg = tilt_deg;
+    SimulatedSweep s = Simulate(options);
+    GiveFloor(&s);
+    const Calibration c = Calibrate(s.sweep, {});
+    ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
+    EXPECT_LT(c.field.tilt_right_deg->sigma, 0.05);
+    EXPECT_NEAR(c.field.tilt_right_deg->value, tilt_deg, 3.5 * c.field.tilt_right_deg->sigma);
+    EXPECT_NEAR(c.field.tilt_down_deg->value, 0, 3.5 * c.field.tilt_down_deg->sigma);
+    EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
+  }
+}
+
 TEST(FieldMap, SlowALongSweepIsMappedFromAPartOfItsFrames) {
   model::SweepSimulationOptions options = SweepCase("iii", 192, 3);
   options.target.kind = model::TargetKind::kWhiteNoise;

@@ -43,6 +43,7 @@ SweepSimulationOptions WideSweep() {
   options.frame_count = 5;
   options.bench_offset_mm = 10;
   options.reading_sigma_mm = 0.5;
+  options.target.tilt_deg = 0.1;
   options.flicker = 0.05;
   options.drift_sigma_px = 2;
   options.full_well_electrons = 5000;
@@ -74,10 +75,10 @@ double Largest(const LinearPicture& a, const LinearPicture& b) {
 
 TEST(SweepEffectsTest, EachIsSwitchedAlone) {
   const std::vector<LinearPicture> all = Frames(With(SweepEffects()));
-  const EffectSet of_light = {Effect::kThickness,    Effect::kDefocus,  Effect::kApertureShape,
-                              Effect::kFalloff,      Effect::kPixelBox, Effect::kLensFloor,
-                              Effect::kLampFalloff,  Effect::kFlicker,  Effect::kDrift,
-                              Effect::kMagnification};
+  const EffectSet of_light = {Effect::kThickness,     Effect::kDefocus,  Effect::kApertureShape,
+                              Effect::kFalloff,       Effect::kPixelBox, Effect::kLensFloor,
+                              Effect::kLampFalloff,   Effect::kFlicker,  Effect::kDrift,
+                              Effect::kMagnification, Effect::kTilt};
   for (const Effect effect : SweepEffects().Effects()) {
     SCOPED_TRACE(EffectName(effect));
     const std::vector<LinearPicture> without = Frames(With(SweepEffects().Without({effect})));

@@ -90,6 +90,7 @@ struct SweepTruth {
   double blur_ratio = 0;
   double blur_floor_px = 0;
   double bench_offset_mm = 0;
+  double tilt_deg = 0;  // of the target, as TargetOptions has it
   struct Frame {
     std::string image;
     double depth_mm = 0;       // true z

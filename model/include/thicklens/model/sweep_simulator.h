@@ -39,6 +39,8 @@ struct TargetOptions {
   // Of edges, from the vertical; positive: the upper end leans right. Bright is on the right.
   double edge_angle_deg = 5;
   double ink_sigma_mm = 0.1;  // kPrintedEdge
+  // About the vertical line through the axis; positive: the right side is nearer to the camera.
+  double tilt_deg = 0;
 };
 
 struct SweepSimulationOptions {
@@ -66,8 +68,7 @@ struct SweepSimulationOptions {
   bool IsValid(std::string* why) const;
 };
 
-// What a simulated sweep can have. A tilted target and diffraction are not among them (a lens floor
-// holds the latter).
+// What a simulated sweep can have. Diffraction is not among them: a lens floor holds it.
 EffectSet SweepEffects();
 
 // Reads schema thicklens/simulate-sweep/1 (docs/file-formats.md).
@@ -77,7 +78,9 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path);
 // transfer functions of defocus, lens floor and pixel box, at the image scale of its chief rays;
 // each of its effects can be left out.
 // Textures are periodic and band-limited by definition (what a frame sees beyond their tile is
-// their repetition); edges are in closed form. `target_picture` is linear light, for kPicture
+// their repetition); edges are in closed form. A tilted target is shown in strips of columns, each
+// at its own depth, which are within .01 px of blur and place of what each column has.
+// `target_picture` is linear light, for kPicture
 // alone.
 class SweepSimulator {
  public:
