@@ -8,6 +8,13 @@ namespace {
 
 using Flags = Eigen::Array<bool, Eigen::Dynamic, 1, Eigen::ColMajor, kRaysAtOnce, 1>;
 
+Flags Inside(const SceneMask& mask, const Eigen::Vector2d& centre_px, const RayNumbers& x_px,
+             const RayNumbers& y_px) {
+  Flags inside(x_px.size());
+  mask.AreInside(centre_px, x_px.data(), y_px.data(), static_cast<int>(x_px.size()), inside.data());
+  return inside;
+}
+
 // Of positions (x, y) from a point that lies at `from_centre` from the outline's centre, in its
 // unit. However large the outline is, its border is compared near the point, in double: float has
 // not the digits. Of a disc, |c + d|^2 <= R^2 is |d|^2 + 2 c.d <= (R - |c|)(R + |c|).
@@ -155,7 +162,9 @@ RayBundle::Shown RayBundle::NearestAlong(const Eigen::Vector2d& centre_px,
     Flags inside;
     if (outline.unit == OutlineOptions::Unit::kPx) {
       const auto [x_px, y_px] = ChiefOffsetsPx(chiefs[k], meeting);
-      inside = Inside(outline, centre_px - outline.centre, x_px, y_px);
+      inside = outline.shape == OutlineOptions::Shape::kMask
+                   ? Inside(geometry_.mask(layers[k]), centre_px, x_px, y_px)
+                   : Inside(outline, centre_px - outline.centre, x_px, y_px);
     } else {
       inside = Inside(outline, chiefs[k].position_mm - outline.centre, meeting.x_mm, meeting.y_mm);
     }
@@ -186,7 +195,9 @@ RayBundle::Shown RayBundle::NearestFromMiddle(const Eigen::Vector2d& centre_px,
     Flags inside;
     const Eigen::Vector2d& centre = layer.outline.centre;
     if (layer.outline.unit == OutlineOptions::Unit::kPx) {
-      inside = Inside(layer.outline, centre_px - centre, x_px, y_px);
+      inside = layer.outline.shape == OutlineOptions::Shape::kMask
+                   ? Inside(geometry_.mask(layers[k]), centre_px, x_px, y_px)
+                   : Inside(layer.outline, centre_px - centre, x_px, y_px);
     } else {
       const Eigen::Vector2d& middle_mm = chiefs[k].position_mm;
       inside = Inside(

@@ -25,7 +25,8 @@ std::string LayerPlace(std::size_t index, const SceneLayer& layer) {
                             : fmt::format("layers[{}] '{}'", index, layer.name);
 }
 
-SceneGeometry::SceneGeometry(const SceneSimulationOptions& options)
+SceneGeometry::SceneGeometry(const SceneSimulationOptions& options,
+                             const std::vector<LayerPixels>& pixels)
     : layers_(options.layers),
       sensor_(options.camera.sensor),
       focal_mm_(options.camera.lens.front_focal_length_mm),
@@ -34,16 +35,29 @@ SceneGeometry::SceneGeometry(const SceneSimulationOptions& options)
       aperture_sigma_mm_(options.camera.blur_ratio() * options.camera.lens.aperture_radius_mm) {
   const auto& floor = options.camera.calibration->blur_floor_px;
   if (floor) floor_px_ = floor->value;
+  masks_.resize(layers_.size());
+  const LayerPixels none;
+  for (std::size_t i = 0; i < layers_.size(); ++i) {
+    if (layers_[i].outline.shape != OutlineOptions::Shape::kMask) continue;
+    const LayerPixels& of_layer = i < pixels.size() ? pixels[i] : none;
+    masks_[i].emplace(of_layer.mask, sensor_.width_px, sensor_.height_px,
+                      fmt::format("{}: outline.mask '{}'", LayerPlace(i, layers_[i]),
+                                  layers_[i].outline.mask_path));
+  }
 }
 
 double SceneGeometry::DefocusPx(double depth_mm) const {
   return std::abs(aperture_sigma_mm_ * scale_px_ * (1 / depth_mm - 1 / focus_depth_mm_));
 }
 
-bool SceneGeometry::IsInside(const OutlineOptions& outline, const Eigen::Vector2d& point_mm,
+bool SceneGeometry::IsInside(std::size_t layer, const Eigen::Vector2d& point_mm,
                              double depth_mm) const {
   using Shape = OutlineOptions::Shape;
+  const OutlineOptions& outline = layers_[layer].outline;
   if (outline.shape == Shape::kWhole) return true;
+  if (outline.shape == Shape::kMask) {
+    return masks_[layer]->IsInside(ChiefPositionPx(point_mm, depth_mm));
+  }
   const Eigen::Vector2d from_centre =
       (outline.unit == OutlineOptions::Unit::kPx ? ChiefPositionPx(point_mm, depth_mm) : point_mm) -
       outline.centre;
@@ -56,7 +70,7 @@ void SceneGeometry::Consider(const SceneRay& ray, std::size_t layer, SceneHit* n
   const double depth_mm = HitDepthMm(layers_[layer].plane, ray);
   if (!(depth_mm < nearest->depth_mm)) return;
   const Eigen::Vector2d position_mm = ray.PositionMm(depth_mm);
-  if (IsInside(layers_[layer].outline, position_mm, depth_mm)) {
+  if (IsInside(layer, position_mm, depth_mm)) {
     *nearest = {layer, depth_mm, position_mm};
   }
 }
@@ -73,21 +87,26 @@ SceneHit SceneGeometry::Trace(const SceneRay& ray, const std::vector<std::size_t
   return nearest;
 }
 
-// What chief rays meet is convex where their corners' is, as are outlines.
-bool SceneGeometry::Covers(const SceneLayer& layer, const PictureRegion& region) const {
+// What chief rays meet is convex where their corners' is, as are outlines but for masks.
+bool SceneGeometry::Covers(std::size_t index, const PictureRegion& region) const {
+  const SceneLayer& layer = layers_[index];
   if (layer.outline.shape == OutlineOptions::Shape::kWhole) return true;
+  const bool is_mask = layer.outline.shape == OutlineOptions::Shape::kMask;
+  if (is_mask && !masks_[index]->Covers(region)) return false;
   for (const Eigen::Vector2d& corner_px : region.Corners()) {
     const SceneRay ray = RayAt(corner_px, {0, 0});
     if (!(layer.plane.slope.dot(ray.slope) < 1)) return false;
     const double depth_mm = HitDepthMm(layer.plane, ray);
-    if (!IsInside(layer.outline, ray.PositionMm(depth_mm), depth_mm)) return false;
+    if (!is_mask && !IsInside(index, ray.PositionMm(depth_mm), depth_mm)) return false;
   }
   return true;
 }
 
-bool SceneGeometry::MayTouch(const SceneLayer& layer, const PictureRegion& region) const {
+bool SceneGeometry::MayTouch(std::size_t index, const PictureRegion& region) const {
+  const SceneLayer& layer = layers_[index];
   const OutlineOptions& outline = layer.outline;
   if (outline.shape == OutlineOptions::Shape::kWhole) return true;
+  if (outline.shape == OutlineOptions::Shape::kMask) return masks_[index]->MayTouch(region);
   BoxMm box{region.low_px, region.high_px};  // in the outline's unit
   if (outline.unit == OutlineOptions::Unit::kMm) {
     const auto on_plane = BoxOf(layer.plane, region);
@@ -116,6 +135,18 @@ std::vector<SceneRay> SceneGeometry::OutermostRays(double deviations) const {
     }
   }
   return rays;
+}
+
+// Where chief rays show what rays meet of the plane.
+PictureRegion SceneGeometry::ChiefRegion(const PlaneOptions& plane) const {
+  PictureRegion region = WholePicture();
+  for (const SceneRay& ray : OutermostRays(kTextureDeviations)) {
+    const double depth_mm = HitDepthMm(plane, ray);
+    const Eigen::Vector2d at_px = ChiefPositionPx(ray.PositionMm(depth_mm), depth_mm);
+    region.low_px = region.low_px.cwiseMin(at_px);
+    region.high_px = region.high_px.cwiseMax(at_px);
+  }
+  return region;
 }
 
 // z > f1 as z0 + g . A > f1 (1 - g . slope) > 0, which is linear in the ray, so that corners
@@ -163,9 +194,16 @@ std::optional<SceneGeometry::BoxMm> SceneGeometry::BoxOf(const PlaneOptions& pla
 
 // The outline's bounding box on the plane; nothing if it is whole, or reaches so far beside the
 // picture that no chief ray meets the plane there.
-std::optional<SceneGeometry::BoxMm> SceneGeometry::OutlineBox(const SceneLayer& layer) const {
+std::optional<SceneGeometry::BoxMm> SceneGeometry::OutlineBox(std::size_t index) const {
+  const SceneLayer& layer = layers_[index];
   const OutlineOptions& outline = layer.outline;
   if (outline.shape == OutlineOptions::Shape::kWhole) return std::nullopt;
+  if (outline.shape == OutlineOptions::Shape::kMask) {
+    const PictureRegion met = ChiefRegion(layer.plane);  // an extent may be infinite
+    const PictureRegion& extent = masks_[index]->extent();
+    return BoxOf(layer.plane,
+                 {extent.low_px.cwiseMax(met.low_px), extent.high_px.cwiseMin(met.high_px)});
+  }
   const Eigen::Vector2d half = outline.shape == OutlineOptions::Shape::kDisc
                                    ? Eigen::Vector2d(outline.radius, outline.radius)
                                    : Eigen::Vector2d(outline.size / 2);
@@ -174,7 +212,8 @@ std::optional<SceneGeometry::BoxMm> SceneGeometry::OutlineBox(const SceneLayer& 
   return BoxOf(layer.plane, {box.first, box.second});
 }
 
-TextureRequest SceneGeometry::RequestFor(const SceneLayer& layer) const {
+TextureRequest SceneGeometry::RequestFor(std::size_t index) const {
+  const SceneLayer& layer = layers_[index];
   TextureRequest request;
   request.pixel_mm = layer.plane.depth_mm / scale_px_;
   request.coarsest_pixel_mm = CoarsestPixelMm(layer.plane);
@@ -186,7 +225,7 @@ TextureRequest SceneGeometry::RequestFor(const SceneLayer& layer) const {
     request.high_mm = request.high_mm.cwiseMax(at_mm);
   }
   request.centre_mm = (request.low_mm + request.high_mm) / 2;
-  if (const auto box = OutlineBox(layer)) {
+  if (const auto box = OutlineBox(index)) {
     request.centre_mm = (box->first + box->second) / 2;
     request.low_mm = request.low_mm.cwiseMax(box->first);
     request.high_mm = request.high_mm.cwiseMin(box->second);

@@ -2,13 +2,15 @@
 #define THICKLENS_MODEL_SRC_SCENE_GEOMETRY_H_
 
 #include <Eigen/Core>
-#include <array>
+#include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "picture_region.h"
+#include "scene_mask.h"
 #include "scene_texture.h"
 #include "thicklens/model/scene_simulator.h"
 
@@ -38,25 +40,17 @@ struct SceneHit {
   Eigen::Vector2d position_mm{0, 0};
 };
 
-// An upright rectangle of the picture, px.
-struct PictureRegion {
-  Eigen::Vector2d low_px, high_px;
-
-  PictureRegion Widened(double margin_px) const {
-    return {low_px.array() - margin_px, high_px.array() + margin_px};
-  }
-  std::array<Eigen::Vector2d, 4> Corners() const {
-    return {{low_px, {high_px.x(), low_px.y()}, {low_px.x(), high_px.y()}, high_px}};
-  }
-};
-
 // Where the rays of a picture run and what they meet: geometry alone, no light.
 class SceneGeometry {
  public:
-  explicit SceneGeometry(const SceneSimulationOptions& options);
+  // Throws Error if a mask is not what it must be.
+  explicit SceneGeometry(const SceneSimulationOptions& options,
+                         const std::vector<LayerPixels>& pixels = {});
 
   const Sensor& sensor() const { return sensor_; }
   const std::vector<SceneLayer>& layers() const { return layers_; }
+  // Of a layer whose outline is one.
+  const SceneMask& mask(std::size_t layer) const { return *masks_[layer]; }
   double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
   double floor_px() const { return floor_px_; }
   double scale_px() const { return scale_px_; }  // K/p
@@ -74,8 +68,8 @@ class SceneGeometry {
   // Sigma of the defocus of a depth, px.
   double DefocusPx(double depth_mm) const;
 
-  bool IsInside(const OutlineOptions& outline, const Eigen::Vector2d& point_mm,
-                double depth_mm) const;
+  // Whether the layer's outline holds a point of its plane.
+  bool IsInside(std::size_t layer, const Eigen::Vector2d& point_mm, double depth_mm) const;
   // The nearest of all layers along the ray.
   SceneHit Trace(const SceneRay& ray) const;
   // The nearest of some.
@@ -83,24 +77,26 @@ class SceneGeometry {
 
   // Of what chief rays through the region meet of the layer: whether its outline holds all of it,
   // and whether it may hold any of it (false only if it does not).
-  bool Covers(const SceneLayer& layer, const PictureRegion& region) const;
-  bool MayTouch(const SceneLayer& layer, const PictureRegion& region) const;
+  bool Covers(std::size_t layer, const PictureRegion& region) const;
+  bool MayTouch(std::size_t layer, const PictureRegion& region) const;
 
   // Throws unless every ray meets the plane beyond the front focal point.
   void CheckPlane(const std::string& place, const PlaneOptions& plane) const;
-  TextureRequest RequestFor(const SceneLayer& layer) const;
+  TextureRequest RequestFor(std::size_t layer) const;
 
  private:
   using BoxMm = std::pair<Eigen::Vector2d, Eigen::Vector2d>;
 
   void Consider(const SceneRay& ray, std::size_t layer, SceneHit* nearest) const;
   PictureRegion WholePicture() const;
+  PictureRegion ChiefRegion(const PlaneOptions& plane) const;
   std::vector<SceneRay> OutermostRays(double deviations) const;
   double CoarsestPixelMm(const PlaneOptions& plane) const;
   std::optional<BoxMm> BoxOf(const PlaneOptions& plane, const PictureRegion& region) const;
-  std::optional<BoxMm> OutlineBox(const SceneLayer& layer) const;
+  std::optional<BoxMm> OutlineBox(std::size_t layer) const;
 
   std::vector<SceneLayer> layers_;
+  std::vector<std::optional<SceneMask>> masks_;  // of the layers
   Sensor sensor_;
   double focal_mm_ = 0;
   double scale_px_ = 0;

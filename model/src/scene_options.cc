@@ -45,6 +45,9 @@ std::string TextureComplaint(const TextureOptions& texture) {
 
 std::string OutlineComplaint(const OutlineOptions& outline) {
   using Shape = OutlineOptions::Shape;
+  if (outline.shape == Shape::kMask && outline.unit != OutlineOptions::Unit::kPx) {
+    return "outline: a mask is given in mm: it is one of the picture, in px";
+  }
   if (!outline.centre.allFinite()) {
     return fmt::format("outline: its centre is [{}, {}]: it must be finite", outline.centre.x(),
                        outline.centre.y());

@@ -58,8 +58,8 @@ std::vector<std::size_t> ScenePhotograph::LayersFor(const PictureRegion& region,
   if (on_.Has(Effect::kOcclusion)) return MetLayers(geometry_, region, landing_px, deviations);
   double farthest_px = landing_px;
   for (const std::size_t surface : MetLayers(geometry_, region, 0, 0)) {
-    farthest_px = std::max(farthest_px, ReachPx(geometry_, geometry_.layers()[surface], region,
-                                                landing_px, deviations));
+    farthest_px =
+        std::max(farthest_px, ReachPx(geometry_, surface, region, landing_px, deviations));
   }
   return MetLayers(geometry_, region, farthest_px, 0);
 }

@@ -81,10 +81,17 @@ PlaneOptions ReadPlane(const YamlNode& node) {
   return plane;
 }
 
-// Rectangle and disc, each in px of the picture or in mm; the keys say which.
+// Rectangle and disc, each in px of the picture or in mm; the keys say which. A mask is alone.
 OutlineOptions ReadOutline(const YamlNode& node) {
-  node.RequireKeys({"centre_px", "centre_mm", "size_px", "size_mm", "radius_px", "radius_mm"});
   OutlineOptions outline;
+  if (const auto mask = node.Find("mask")) {
+    node.RequireKeys({"mask"});
+    outline.shape = OutlineOptions::Shape::kMask;
+    outline.mask_path = node.ResolvePath(mask->Text());
+    return outline;
+  }
+  node.RequireKeys(
+      {"centre_px", "centre_mm", "size_px", "size_mm", "radius_px", "radius_mm", "mask"});
   const bool in_mm = node.Has("centre_mm");
   const std::string unit = in_mm ? "_mm" : "_px";
   const std::string other = in_mm ? "_px" : "_mm";

@@ -45,9 +45,9 @@ EffectConditions ConditionsOf(const SceneSimulationOptions& options) {
 }  // namespace
 
 struct SceneSimulator::Impl {
-  Impl(const SceneSimulationOptions& given, const std::vector<LinearPicture>& pictures, int threads)
-      : options(Checked(given)), geometry(options) {
-    MakeTextures(pictures, threads);
+  Impl(const SceneSimulationOptions& given, const std::vector<LayerPixels>& pixels, int threads)
+      : options(Checked(given)), geometry(options, pixels) {
+    MakeTextures(pixels, threads);
     Decide(threads);
     MakeViewRays();
     photograph.emplace(options, geometry, textures, *survey, decision.on, camera.sensor.transfer);
@@ -145,8 +145,8 @@ struct SceneSimulator::Impl {
     return picture;
   }
 
-  void MakeTextures(const std::vector<LinearPicture>& pictures, int threads) {
-    const LinearPicture none;
+  void MakeTextures(const std::vector<LayerPixels>& pixels, int threads) {
+    const LayerPixels none;
     std::vector<std::optional<SceneTexture>> drawn(options.layers.size());
     const int in_texture =
         std::max(1, ResolveThreads(threads) / static_cast<int>(options.layers.size()));
@@ -158,8 +158,8 @@ struct SceneSimulator::Impl {
       RandomDraws draws(options.seed, RandomDraws::Purpose::kTexture,
                         static_cast<std::uint32_t>(i));
       try {
-        drawn[i].emplace(layer.texture, geometry.RequestFor(layer),
-                         i < pictures.size() ? pictures[i] : none, &draws, in_texture);
+        drawn[i].emplace(layer.texture, geometry.RequestFor(i),
+                         (i < pixels.size() ? pixels[i] : none).texture, &draws, in_texture);
       } catch (const Error& error) {
         throw Error(place + ": " + error.what());
       }
@@ -179,8 +179,8 @@ struct SceneSimulator::Impl {
 };
 
 SceneSimulator::SceneSimulator(const SceneSimulationOptions& options,
-                               const std::vector<LinearPicture>& pictures, int threads)
-    : impl_(std::make_unique<Impl>(options, pictures, threads)) {}
+                               const std::vector<LayerPixels>& pixels, int threads)
+    : impl_(std::make_unique<Impl>(options, pixels, threads)) {}
 
 SceneSimulator::~SceneSimulator() = default;
 

@@ -247,8 +247,9 @@ Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& tex
   return light;
 }
 
-double ReachPx(const SceneGeometry& geometry, const SceneLayer& layer, const PictureRegion& region,
+double ReachPx(const SceneGeometry& geometry, std::size_t index, const PictureRegion& region,
                double landing_px, double deviations) {
+  const SceneLayer& layer = geometry.layers()[index];
   const PlaneOptions& plane = layer.plane;
   double sigma_px = 0;
   for (const GlossOptions& gloss : layer.gloss) {
@@ -274,10 +275,10 @@ std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureR
   for (std::size_t i = 0; i < geometry.layers().size(); ++i) {
     const SceneLayer& layer = geometry.layers()[i];
     const PictureRegion reached =
-        region.Widened(ReachPx(geometry, layer, region, landing_px, deviations));
-    if (!geometry.MayTouch(layer, reached)) continue;
+        region.Widened(ReachPx(geometry, i, region, landing_px, deviations));
+    if (!geometry.MayTouch(i, reached)) continue;
     const auto [least, most] = InverseDepths(geometry, layer.plane, reached);
-    candidates.push_back({i, least, most, geometry.Covers(layer, reached)});
+    candidates.push_back({i, least, most, geometry.Covers(i, reached)});
   }
   double nearest_cover = -std::numeric_limits<double>::infinity();
   for (const Candidate& candidate : candidates) {
@@ -308,8 +309,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
       const PictureRegion region = grid.RegionOf(column, row);
       block.layers = MetLayers(geometry, region, landing_px, kReachDeviations);
       for (const std::size_t layer : block.layers) {
-        reaches.push_back(
-            ReachPx(geometry, geometry.layers()[layer], region, landing_px, kReachDeviations));
+        reaches.push_back(ReachPx(geometry, layer, region, landing_px, kReachDeviations));
       }
       blocks_.push_back(std::move(block));
     }

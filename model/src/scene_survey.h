@@ -30,7 +30,7 @@ struct SceneBlock {
 // How far from a region of the picture the chief positions of what its rays meet on a layer, or in
 // its gloss, may lie, px, if they land up to `landing_px` from where they would and go through the
 // aperture up to so many of its standard deviations from its middle.
-double ReachPx(const SceneGeometry& geometry, const SceneLayer& layer, const PictureRegion& region,
+double ReachPx(const SceneGeometry& geometry, std::size_t layer, const PictureRegion& region,
                double landing_px, double deviations);
 // The layers that such rays can meet, in ascending order: not those that lie behind one that fills
 // what they reach.

@@ -66,7 +66,7 @@ Simulated Simulate(bool falloff) {
   options.sampling_error_grey_levels = 0;
   options.noise_sigma_grey_levels = 1;
   options.rays_per_pixel = 200;
-  const model::SceneSimulator simulator(options, std::vector<model::LinearPicture>(2));
+  const model::SceneSimulator simulator(options, std::vector<model::LayerPixels>(2));
   Simulated simulated;
   simulated.truth = simulator.RenderLightField(5, 5, {});
   const model::RawDepthMap depth = simulator.RenderDepth();

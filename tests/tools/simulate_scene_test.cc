@@ -210,6 +210,35 @@ TEST_F(SimulateSceneTest, TextureMayBeAPictureFile) {
   EXPECT_FALSE(fs::exists(folder_ / "other"));
 }
 
+TEST_F(SimulateSceneTest, OutlineMayBeAMaskFile) {
+  model::StoredPicture mask{40, 30, 1, 8, std::vector<std::uint16_t>(40 * 30, 0)};
+  for (int y = 10; y < 20; ++y) std::fill_n(mask.values.begin() + 40 * y + 5, 10, 128);
+  const std::string outline = "{centre_px: [20, 15], size_px: [15, 11]}";
+  const std::string text = SceneConfig("");
+  const std::string config = folder_.Put(
+      "scene.yaml",
+      std::string(text).replace(text.find(outline), outline.size(), "{mask: masks/card.png}"));
+  folder_.Put("masks/card.png", EncodePng(mask));
+  Succeed({"picture", config, "-o", folder_ / "out", "--quiet"});
+  const model::RawDepthMap depth = ReadDepthMap(folder_ / "out/depth.pfm");
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 40; ++x) {
+      const bool card = x >= 5 && x < 15 && y >= 10 && y < 20;
+      EXPECT_EQ(depth.values[static_cast<std::size_t>(40 * y + x)] == 297, card) << x << ", " << y;
+    }
+  }
+
+  mask.width_px = 20;
+  mask.height_px = 60;
+  folder_.Put("masks/card.png", EncodePng(mask));
+  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "other"}),
+              AllOf(HasSubstr("layers[1]: outline.mask"), HasSubstr("card.png"),
+                    HasSubstr("is 20x60 px, the scene's picture 40x30 px")));
+  folder_.Put("masks/card.png", "none");
+  EXPECT_THAT(Failure({"light-field", config, "-o", folder_ / "other"}), HasSubstr("card.png"));
+  EXPECT_FALSE(fs::exists(folder_ / "other"));
+}
+
 TEST_F(SimulateSceneTest, RefusesInOneLineAndWritesNothing) {
   const std::string config = folder_.Put("scene.yaml", SceneConfig("viewss: [3, 3]\n"));
   for (const char* command : {"picture", "light-field"}) {

@@ -37,9 +37,9 @@ struct Step {
 class SceneWorld {
  public:
   SceneWorld(const model::SceneSimulationOptions& options,
-             const std::vector<model::LinearPicture>& pictures, const Step& step)
+             const std::vector<model::LayerPixels>& pixels, const Step& step)
       : start_(Clock::now()),
-        simulator_(options, pictures, step.run.threads),
+        simulator_(options, pixels, step.run.threads),
         noiseless_(simulator_.RenderNoiseless(step.OfSimulator())),
         stored_(simulator_.Store(noiseless_)),
         seconds_(SecondsSince(start_)) {}
@@ -100,17 +100,17 @@ double EstimatedPsnrDb(const EstimateOf& what, const model::RawDepthMap& depth, 
 class SceneAttributor {
  public:
   SceneAttributor(const model::SceneSimulationOptions& scene,
-                  const std::vector<model::LinearPicture>& pictures, const AttributionRun& run)
-      : scene_(scene), pictures_(pictures), step_{run} {}
+                  const std::vector<model::LayerPixels>& pixels, const AttributionRun& run)
+      : scene_(scene), pixels_(pixels), step_{run} {}
 
   SceneAttribution Run() {
     model::SceneSimulationOptions by_auto = scene_;
     by_auto.effects.base = model::EffectChoice::Base::kAuto;
     const EffectSet kept =
-        model::SceneSimulator(by_auto, pictures_, step_.run.threads).effects().on;
+        model::SceneSimulator(by_auto, pixels_, step_.run.threads).effects().on;
 
     scene_.effects = AllInsteadOfAuto(scene_.effects);
-    base_.emplace(scene_, pictures_, step_);
+    base_.emplace(scene_, pixels_, step_);
     const model::SceneSimulator& simulator = base_->simulator();
     depth_ = simulator.RenderDepth();
     truth_ = TrueViews(simulator);
@@ -154,7 +154,7 @@ class SceneAttributor {
     options.effects.without.Add(row->effect);
     // A lens that has the other shape, whose views lie where an estimate with that shape has them.
     if (row->effect == Effect::kApertureShape) options.camera.psf = model::Psf::kGaussian;
-    const SceneWorld world(options, pictures_, step_);
+    const SceneWorld world(options, pixels_, step_);
     row->picture_seconds = world.seconds();
     Compare(world, row);
     row->absent = row->picture.nothing();
@@ -193,7 +193,7 @@ class SceneAttributor {
   }
 
   model::SceneSimulationOptions scene_;
-  const std::vector<model::LinearPicture>& pictures_;
+  const std::vector<model::LayerPixels>& pixels_;
   Step step_;
   std::optional<SceneWorld> base_;
   model::RawDepthMap depth_;
@@ -204,9 +204,9 @@ class SceneAttributor {
 }  // namespace
 
 SceneAttribution AttributeScene(const model::SceneSimulationOptions& scene,
-                                const std::vector<model::LinearPicture>& pictures,
+                                const std::vector<model::LayerPixels>& pixels,
                                 const AttributionRun& run) {
-  return SceneAttributor(scene, pictures, run).Run();
+  return SceneAttributor(scene, pixels, run).Run();
 }
 
 }  // namespace thicklens::tools

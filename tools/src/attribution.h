@@ -87,11 +87,11 @@ struct AttributionRun {
   std::function<void(int done, int total)> progress;
 };
 
-// `pictures`: of the layers' textures. What is compared is the picture with all effects that
+// `pixels`: as SceneSimulator has it. What is compared is the picture with all effects that
 // `scene.effects` does not exclude: auto counts as all. Deterministic effects are judged before
 // noise and rounding. Throws Error as SceneSimulator and the estimate do.
 SceneAttribution AttributeScene(const model::SceneSimulationOptions& scene,
-                                const std::vector<model::LinearPicture>& pictures,
+                                const std::vector<model::LayerPixels>& pixels,
                                 const AttributionRun& run);
 
 // `unknown_offset`: the calibration is to find the offset of the bench. Throws Error as

@@ -61,16 +61,23 @@ model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   return scene;
 }
 
-// Picture files of unknown origin are taken as sRGB, as a screen would show them.
-std::vector<model::LinearPicture> ReadTextures(const model::SceneSimulationOptions& scene) {
-  std::vector<model::LinearPicture> pictures(scene.layers.size());
+// Picture files of unknown origin are taken as sRGB, as a screen would show them. What a mask
+// stores is no light.
+std::vector<model::LayerPixels> ReadPixels(const model::SceneSimulationOptions& scene) {
+  std::vector<model::LayerPixels> pixels(scene.layers.size());
   for (std::size_t i = 0; i < scene.layers.size(); ++i) {
-    const model::TextureOptions& texture = scene.layers[i].texture;
-    if (texture.kind != model::TextureKind::kPicture) continue;
-    pictures[i] = model::ToLinear(ToStoredPicture(ReadPictureFile(texture.picture_path)),
-                                  model::TransferCurve::Srgb());
+    const model::SceneLayer& layer = scene.layers[i];
+    if (layer.texture.kind == model::TextureKind::kPicture) {
+      pixels[i].texture =
+          model::ToLinear(ToStoredPicture(ReadPictureFile(layer.texture.picture_path)),
+                          model::TransferCurve::Srgb());
+    }
+    if (layer.outline.shape == model::OutlineOptions::Shape::kMask) {
+      pixels[i].mask = model::ToLinear(ToStoredPicture(ReadPictureFile(layer.outline.mask_path)),
+                                       model::TransferCurve::Linear());
+    }
   }
-  return pictures;
+  return pixels;
 }
 
 // Progress on the terminal, and an end when the person asks for one.
@@ -114,7 +121,7 @@ std::string SamplingText(const model::SceneSimulationOptions& scene,
 }
 
 Attribution Attribute(const SceneOptions& options, const model::SceneSimulationOptions& scene,
-                      const std::vector<model::LinearPicture>& textures) {
+                      const std::vector<model::LayerPixels>& pixels) {
   Attribution attribution;
   std::optional<model::SweepSimulationOptions> sweep;
   if (!options.sweep_path.empty()) {  // read before anything long
@@ -124,7 +131,7 @@ Attribution Attribute(const SceneOptions& options, const model::SceneSimulationO
   {
     ProgressLine progress("attributing", options.common.quiet);
     attribution.scene =
-        AttributeScene(scene, textures, AttributionRunWith(options.common, &progress));
+        AttributeScene(scene, pixels, AttributionRunWith(options.common, &progress));
   }
   if (!sweep) return attribution;
   ProgressLine progress("attributing the sweep", options.common.quiet);
@@ -140,8 +147,8 @@ CommandResult SimulatePicture(const SceneOptions& options) {
                              {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker,
                               kAttributionPage, kAttributionTable});
 
-  const std::vector<model::LinearPicture> textures = ReadTextures(scene);
-  const model::SceneSimulator simulator(scene, textures, options.common.threads);
+  const std::vector<model::LayerPixels> pixels = ReadPixels(scene);
+  const model::SceneSimulator simulator(scene, pixels, options.common.threads);
   const model::RawDepthMap depth = simulator.RenderDepth();
   const model::SceneTruth truth = simulator.Truth(depth);
   int bits = 0;
@@ -158,7 +165,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   folder.Write(kPictureMarker, model::SceneTruthToYaml(truth));
   Attribution attribution;
   if (options.attribute) {
-    attribution = Attribute(options, scene, textures);
+    attribution = Attribute(options, scene, pixels);
     WriteAttribution(attribution, options.config_path, &folder);
   }
   ThrowIfInterrupted();
@@ -189,7 +196,7 @@ CommandResult SimulateLightField(const SceneOptions& options) {
   const model::SceneSimulationOptions scene = ReadConfig(options);
   model::OutputFolder folder(options.output_folder, kLightFieldMarker, LightFieldEntries());
 
-  const model::SceneSimulator simulator(scene, ReadTextures(scene), options.common.threads);
+  const model::SceneSimulator simulator(scene, ReadPixels(scene), options.common.threads);
   std::size_t clipped = 0;
   {
     ProgressLine progress("rendering", options.common.quiet);

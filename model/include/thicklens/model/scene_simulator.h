@@ -64,15 +64,18 @@ struct PlaneOptions {
 };
 
 // Which part of its plane a layer fills. In px it is the part that chief rays meet inside these
-// positions of the picture; in mm, inside these (X, Y).
+// positions of the picture; in mm, inside these (X, Y). A mask is a grey picture of the scene's
+// size: inside is where its values, bilinear between pixel centres and beyond the outermost as
+// there, are at least half of full scale.
 struct OutlineOptions {
-  enum class Shape { kWhole, kRectangle, kDisc };
+  enum class Shape { kWhole, kRectangle, kDisc, kMask };
   enum class Unit { kPx, kMm };
   Shape shape = Shape::kWhole;
   Unit unit = Unit::kPx;
   Eigen::Vector2d centre{0, 0};  // in `unit`, as the two below
   Eigen::Vector2d size{0, 0};    // kRectangle
   double radius = 0;             // kDisc
+  std::string mask_path;         // kMask, in px; for messages
 };
 
 // The mirror image of a lamp in the gloss of a layer: light added to the layer's own, which differs
@@ -92,6 +95,12 @@ struct SceneLayer {
   OutlineOptions outline;
   TextureOptions texture;
   std::vector<GlossOptions> gloss;
+};
+
+// What the files that a layer names hold; empty for those that it does not.
+struct LayerPixels {
+  LinearPicture texture;  // kPicture, in linear light
+  LinearPicture mask;     // kMask: one channel, stored values, 1 at full scale
 };
 
 // What a picture of a scene can have.
@@ -160,11 +169,11 @@ struct SceneRun {
 // Everything is RGB. The same options give the same bits on any number of threads.
 class SceneSimulator {
  public:
-  // `pictures`: linear light of the layers of kPicture, one entry a layer (empty ones for others).
-  // Throws Error if the options are not valid, a ray can miss or meet behind the front focal point
-  // one of the planes, no layer is whole, a texture cannot be drawn, or an effect is named that a
-  // picture of a scene cannot have. `threads` (0: one per core) draw the layers.
-  SceneSimulator(const SceneSimulationOptions& options, const std::vector<LinearPicture>& pictures,
+  // `pixels`: one entry a layer; missing ones are empty. Throws Error if the options are not valid,
+  // a file's picture is not what its layer needs, a ray can miss or meet behind the front focal
+  // point one of the planes, no layer is whole, a texture cannot be drawn, or an effect is named
+  // that a picture of a scene cannot have. `threads` (0: one per core) draw the layers.
+  SceneSimulator(const SceneSimulationOptions& options, const std::vector<LayerPixels>& pixels,
                  int threads = 0);
   ~SceneSimulator();
   SceneSimulator(const SceneSimulator&) = delete;
