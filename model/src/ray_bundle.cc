@@ -66,8 +66,18 @@ class Nearest {
 
 }  // namespace
 
-RayBundle::RayBundle(const SceneGeometry& geometry, const std::vector<SceneRay>& rays)
-    : geometry_(geometry), rays_(rays) {
+RayBundle::RayBundle(const SceneGeometry& geometry, const std::vector<SceneRay>& rays,
+                     bool occlusion)
+    : geometry_(geometry), occlusion_(occlusion), rays_(rays) {
+  for (const SceneRay& ray : rays_) {
+    const Eigen::Vector2d landing_px =
+        geometry_.PositionOf(ray) - geometry_.sensor().principal_point_px;
+    landings_px_.push_back(landing_px);
+    farthest_landing_.low_px = farthest_landing_.low_px.cwiseMin(landing_px);
+    farthest_landing_.high_px = farthest_landing_.high_px.cwiseMax(landing_px);
+    aperture_.low_mm = aperture_.low_mm.cwiseMin(ray.aperture_mm);
+    aperture_.high_mm = aperture_.high_mm.cwiseMax(ray.aperture_mm);
+  }
   const auto count = static_cast<Eigen::Index>(rays.size());
   slope_x_.resize(count);
   slope_y_.resize(count);
@@ -103,19 +113,37 @@ ChiefHit RayBundle::ChiefAt(const Eigen::Vector2d& centre_px, std::size_t layer)
   const PlaneOptions& plane = geometry_.layers()[layer].plane;
   ChiefHit chief;
   chief.slope = geometry_.RayAt(centre_px, {0, 0}).slope;
+  if (const HeightField* field = geometry_.height_field(layer)) {
+    chief.shift = field->ShiftAt(centre_px);
+    chief.depth_mm = field->DepthMm(chief.shift);
+    chief.on_texture = centre_px;
+    const PictureRegion landing = {centre_px + farthest_landing_.low_px,
+                                   centre_px + farthest_landing_.high_px};
+    chief.shifts = field->MetFrom(landing, aperture_);
+    // Where V grows by less along x + A V than V itself does.
+    const double farthest_mm =
+        aperture_.low_mm.cwiseAbs().cwiseMax(aperture_.high_mm.cwiseAbs()).norm();
+    chief.is_met_once =
+        farthest_mm * field->SteepestOver(HeightField::Reached(landing, aperture_, chief.shifts)) <
+        1;
+    return chief;
+  }
   chief.facing = 1 - plane.slope.dot(chief.slope);
   chief.depth_mm = plane.depth_mm / chief.facing;
-  chief.position_mm = chief.depth_mm * chief.slope;
+  chief.on_texture = chief.depth_mm * chief.slope;
   return chief;
 }
 
 RayBundle::Meeting RayBundle::Meet(std::size_t layer, const ChiefHit& chief,
                                    const RayPart& part) const {
+  if (const HeightField* field = geometry_.height_field(layer)) {
+    return MeetHeights(*field, chief, part);
+  }
   const OnLayer& on = on_layer_[layer];
   Meeting meeting;
   if (!on.tilted) {
-    meeting.x_mm = on.across_x.segment(part.first, part.count);
-    meeting.y_mm = on.across_y.segment(part.first, part.count);
+    meeting.x = on.across_x.segment(part.first, part.count);
+    meeting.y = on.across_y.segment(part.first, part.count);
     meeting.beyond_mm.setZero(part.count);
     return meeting;
   }
@@ -127,23 +155,44 @@ RayBundle::Meeting RayBundle::Meet(std::size_t layer, const ChiefHit& chief,
   const auto tilt = on.tilt.segment(part.first, part.count);
   meeting.beyond_mm = (on.lift.segment(part.first, part.count) + chief_mm * tilt) / (facing - tilt);
   const RayNumbers along_mm = meeting.beyond_mm + from_axis_mm;
-  meeting.x_mm = on.across_x.segment(part.first, part.count) +
-                 along_mm * slope_x_.segment(part.first, part.count) +
-                 slope.x() * meeting.beyond_mm;
-  meeting.y_mm = on.across_y.segment(part.first, part.count) +
-                 along_mm * slope_y_.segment(part.first, part.count) +
-                 slope.y() * meeting.beyond_mm;
+  meeting.x = on.across_x.segment(part.first, part.count) +
+              along_mm * slope_x_.segment(part.first, part.count) + slope.x() * meeting.beyond_mm;
+  meeting.y = on.across_y.segment(part.first, part.count) +
+              along_mm * slope_y_.segment(part.first, part.count) + slope.y() * meeting.beyond_mm;
+  return meeting;
+}
+
+RayBundle::Meeting RayBundle::MeetHeights(const HeightField& field, const ChiefHit& chief,
+                                          const RayPart& part) const {
+  Meeting meeting;
+  meeting.x.resize(part.count);
+  meeting.y.resize(part.count);
+  meeting.beyond_mm.resize(part.count);
+  for (Eigen::Index i = 0; i < part.count; ++i) {
+    const auto ray = static_cast<std::size_t>(part.first + i);
+    const Eigen::Vector2d& aperture_mm = rays_[ray].aperture_mm;
+    const Eigen::Vector2d position_px = chief.on_texture + landings_px_[ray];
+    const double shift =
+        occlusion_ && !chief.is_met_once
+            ? field.FirstMet(position_px, aperture_mm, chief.shifts.high, chief.shifts.low)
+            : field.MetNearShift(position_px, aperture_mm, chief.shift, chief.shifts);
+    const Eigen::Vector2d from_chief_px = landings_px_[ray] + shift * aperture_mm;
+    meeting.x(i) = static_cast<float>(from_chief_px.x());
+    meeting.y(i) = static_cast<float>(from_chief_px.y());
+    meeting.beyond_mm(i) = static_cast<float>(field.DepthMm(shift) - chief.depth_mm);
+  }
   return meeting;
 }
 
 // K/p (X/z - t) = K/p ((X - Xc) - (z - zc) t)/z.
-std::array<RayNumbers, 2> RayBundle::ChiefOffsetsPx(const ChiefHit& chief,
+std::array<RayNumbers, 2> RayBundle::ChiefOffsetsPx(std::size_t layer, const ChiefHit& chief,
                                                     const Meeting& meeting) const {
+  if (geometry_.height_field(layer) != nullptr) return {{meeting.x, meeting.y}};
   const Eigen::Vector2f slope = chief.slope.cast<float>();
   const RayNumbers px_per_mm = static_cast<float>(geometry_.scale_px()) /
                                (static_cast<float>(chief.depth_mm) + meeting.beyond_mm);
-  return {{px_per_mm * (meeting.x_mm - slope.x() * meeting.beyond_mm),
-           px_per_mm * (meeting.y_mm - slope.y() * meeting.beyond_mm)}};
+  return {{px_per_mm * (meeting.x - slope.x() * meeting.beyond_mm),
+           px_per_mm * (meeting.y - slope.y() * meeting.beyond_mm)}};
 }
 
 RayBundle::Shown RayBundle::NearestAlong(const Eigen::Vector2d& centre_px,
@@ -161,12 +210,12 @@ RayBundle::Shown RayBundle::NearestAlong(const Eigen::Vector2d& centre_px,
     }
     Flags inside;
     if (outline.unit == OutlineOptions::Unit::kPx) {
-      const auto [x_px, y_px] = ChiefOffsetsPx(chiefs[k], meeting);
+      const auto [x_px, y_px] = ChiefOffsetsPx(layers[k], chiefs[k], meeting);
       inside = outline.shape == OutlineOptions::Shape::kMask
                    ? Inside(geometry_.mask(layers[k]), centre_px, x_px, y_px)
                    : Inside(outline, centre_px - outline.centre, x_px, y_px);
     } else {
-      inside = Inside(outline, chiefs[k].position_mm - outline.centre, meeting.x_mm, meeting.y_mm);
+      inside = Inside(outline, chiefs[k].on_texture - outline.centre, meeting.x, meeting.y);
     }
     nearest.Offer(k, depth_mm, &inside);
   }
@@ -178,12 +227,22 @@ RayBundle::Shown RayBundle::NearestFromMiddle(const Eigen::Vector2d& centre_px,
                                               const std::vector<ChiefHit>& chiefs,
                                               std::size_t surface, const RayPart& part) const {
   const Meeting meeting = Meet(layers[surface], chiefs[surface], part);
-  const auto [x_px, y_px] = ChiefOffsetsPx(chiefs[surface], meeting);
+  const auto [x_px, y_px] = ChiefOffsetsPx(layers[surface], chiefs[surface], meeting);
   const double scale_px = geometry_.scale_px();
   const Eigen::Vector2d& slope = chiefs[surface].slope;
   Nearest nearest(part.count);
   for (std::size_t k = 0; k < layers.size(); ++k) {
     const SceneLayer& layer = geometry_.layers()[layers[k]];
+    if (const HeightField* field = geometry_.height_field(layers[k])) {
+      nearest.Offer(
+          k,
+          [&, &x = x_px, &y = y_px](Eigen::Index i) {
+            return field->DepthMm(
+                field->ShiftAt(centre_px + Eigen::Vector2f(x(i), y(i)).cast<double>()));
+          },
+          nullptr);
+      continue;
+    }
     const Eigen::Vector2d per_px = layer.plane.slope / scale_px;
     const Eigen::Array<double, Eigen::Dynamic, 1, Eigen::ColMajor, kRaysAtOnce, 1> depth_mm =
         layer.plane.depth_mm /
@@ -199,7 +258,7 @@ RayBundle::Shown RayBundle::NearestFromMiddle(const Eigen::Vector2d& centre_px,
                    ? Inside(geometry_.mask(layers[k]), centre_px, x_px, y_px)
                    : Inside(layer.outline, centre_px - centre, x_px, y_px);
     } else {
-      const Eigen::Vector2d& middle_mm = chiefs[k].position_mm;
+      const Eigen::Vector2d& middle_mm = chiefs[k].on_texture;
       inside = Inside(
           layer.outline, middle_mm - centre,
           (depth_mm * (slope.x() + x_px.cast<double>() / scale_px) - middle_mm.x()).cast<float>(),

@@ -36,14 +36,34 @@ SceneGeometry::SceneGeometry(const SceneSimulationOptions& options,
   const auto& floor = options.camera.calibration->blur_floor_px;
   if (floor) floor_px_ = floor->value;
   masks_.resize(layers_.size());
+  heights_.resize(layers_.size());
   const LayerPixels none;
   for (std::size_t i = 0; i < layers_.size(); ++i) {
-    if (layers_[i].outline.shape != OutlineOptions::Shape::kMask) continue;
-    const LayerPixels& of_layer = i < pixels.size() ? pixels[i] : none;
-    masks_[i].emplace(of_layer.mask, sensor_.width_px, sensor_.height_px,
-                      fmt::format("{}: outline.mask '{}'", LayerPlace(i, layers_[i]),
-                                  layers_[i].outline.mask_path));
+    AddPixels(options.camera, i, i < pixels.size() ? pixels[i] : none);
   }
+}
+
+void SceneGeometry::AddPixels(const Camera& camera, std::size_t index, const LayerPixels& pixels) {
+  const SceneLayer& layer = layers_[index];
+  const std::string place = LayerPlace(index, layer);
+  if (layer.outline.shape == OutlineOptions::Shape::kMask) {
+    masks_[index].emplace(pixels.mask, sensor_.width_px, sensor_.height_px,
+                          fmt::format("{}: outline.mask '{}'", place, layer.outline.mask_path));
+  }
+  if (!layer.depth) return;
+  const std::string name = fmt::format("{}: depth.map '{}'", place, layer.depth->map_path);
+  if (pixels.depth.values.empty()) throw Error(name + " is empty");
+  LinearPicture same_size{sensor_.width_px, sensor_.height_px, 1, {}};
+  same_size.values.resize(static_cast<std::size_t>(sensor_.width_px) *
+                          static_cast<std::size_t>(sensor_.height_px));
+  const Scene scene =
+      MakeScene(camera, std::move(same_size), pixels.depth, layer.depth->convention, name);
+  if (scene.depth.holes > 0) {
+    throw Error(fmt::format("{}: {} of its {} values are holes: a surface needs a depth everywhere",
+                            name, scene.depth.holes, scene.depth_mm.size()));
+  }
+  heights_[index].emplace(sensor_.width_px, sensor_.height_px, scene.depth_mm, scale_px_,
+                          focus_depth_mm_);
 }
 
 double SceneGeometry::DefocusPx(double depth_mm) const {
@@ -66,7 +86,29 @@ bool SceneGeometry::IsInside(std::size_t layer, const Eigen::Vector2d& point_mm,
   return (2 * from_centre.cwiseAbs().array() <= outline.size.array()).all();
 }
 
+SceneHit SceneGeometry::HitOn(std::size_t layer, const SceneRay& ray) const {
+  if (!heights_[layer]) {
+    const double depth_mm = HitDepthMm(layers_[layer].plane, ray);
+    return {layer, depth_mm, ray.PositionMm(depth_mm)};
+  }
+  const HeightField& field = *heights_[layer];
+  const Eigen::Vector2d position_px = PositionOf(ray);
+  // A chief ray meets what is at its own position.
+  if (ray.aperture_mm == Eigen::Vector2d(0, 0)) {
+    return {layer, field.DepthMm(field.ShiftAt(position_px)), position_px};
+  }
+  const ValueRange shifts =
+      field.MetFrom({position_px, position_px}, {ray.aperture_mm, ray.aperture_mm});
+  const double shift = field.FirstMet(position_px, ray.aperture_mm, shifts.high, shifts.low);
+  return {layer, field.DepthMm(shift), position_px + shift * ray.aperture_mm};
+}
+
 void SceneGeometry::Consider(const SceneRay& ray, std::size_t layer, SceneHit* nearest) const {
+  if (heights_[layer]) {
+    const SceneHit hit = HitOn(layer, ray);
+    if (hit.depth_mm < nearest->depth_mm) *nearest = hit;
+    return;
+  }
   const double depth_mm = HitDepthMm(layers_[layer].plane, ray);
   if (!(depth_mm < nearest->depth_mm)) return;
   const Eigen::Vector2d position_mm = ray.PositionMm(depth_mm);
@@ -215,6 +257,14 @@ std::optional<SceneGeometry::BoxMm> SceneGeometry::OutlineBox(std::size_t index)
 TextureRequest SceneGeometry::RequestFor(std::size_t index) const {
   const SceneLayer& layer = layers_[index];
   TextureRequest request;
+  if (layer.depth) {
+    const PictureRegion picture = WholePicture();
+    request.pixel_mm = request.coarsest_pixel_mm = 1;
+    request.low_mm = picture.low_px;
+    request.high_mm = picture.high_px;
+    request.centre_mm = (picture.low_px + picture.high_px) / 2;
+    return request;
+  }
   request.pixel_mm = layer.plane.depth_mm / scale_px_;
   request.coarsest_pixel_mm = CoarsestPixelMm(layer.plane);
   request.low_mm.setConstant(std::numeric_limits<double>::infinity());

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "height_field.h"
 #include "picture_region.h"
 #include "scene_mask.h"
 #include "scene_texture.h"
@@ -37,18 +38,23 @@ inline double HitDepthMm(const PlaneOptions& plane, const SceneRay& ray) {
 struct SceneHit {
   std::size_t layer = 0;
   double depth_mm = std::numeric_limits<double>::infinity();
-  Eigen::Vector2d position_mm{0, 0};
+  // Where its texture has it: (X, Y), mm; of a height field the chief position x', px.
+  Eigen::Vector2d on_texture{0, 0};
 };
 
 // Where the rays of a picture run and what they meet: geometry alone, no light.
 class SceneGeometry {
  public:
-  // Throws Error if a mask is not what it must be.
+  // Throws Error if a mask or a depth map is not what it must be.
   explicit SceneGeometry(const SceneSimulationOptions& options,
                          const std::vector<LayerPixels>& pixels = {});
 
   const Sensor& sensor() const { return sensor_; }
   const std::vector<SceneLayer>& layers() const { return layers_; }
+  // Of a layer that has one instead of a plane; else null.
+  const HeightField* height_field(std::size_t layer) const {
+    return heights_[layer] ? &*heights_[layer] : nullptr;
+  }
   // Of a layer whose outline is one.
   const SceneMask& mask(std::size_t layer) const { return *masks_[layer]; }
   double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
@@ -61,6 +67,10 @@ class SceneGeometry {
     return {aperture_mm,
             (position_px - sensor_.principal_point_px) / scale_px_ - aperture_mm / focus_depth_mm_};
   }
+  // The position that RayAt has it of.
+  Eigen::Vector2d PositionOf(const SceneRay& ray) const {
+    return sensor_.principal_point_px + scale_px_ * (ray.slope + ray.aperture_mm / focus_depth_mm_);
+  }
   // Where the picture shows what a point's chief ray meets.
   Eigen::Vector2d ChiefPositionPx(const Eigen::Vector2d& point_mm, double depth_mm) const {
     return sensor_.principal_point_px + scale_px_ / depth_mm * point_mm;
@@ -70,6 +80,8 @@ class SceneGeometry {
 
   // Whether the layer's outline holds a point of its plane.
   bool IsInside(std::size_t layer, const Eigen::Vector2d& point_mm, double depth_mm) const;
+  // Where the ray meets the layer, its outline left out.
+  SceneHit HitOn(std::size_t layer, const SceneRay& ray) const;
   // The nearest of all layers along the ray.
   SceneHit Trace(const SceneRay& ray) const;
   // The nearest of some.
@@ -87,6 +99,7 @@ class SceneGeometry {
  private:
   using BoxMm = std::pair<Eigen::Vector2d, Eigen::Vector2d>;
 
+  void AddPixels(const Camera& camera, std::size_t layer, const LayerPixels& pixels);
   void Consider(const SceneRay& ray, std::size_t layer, SceneHit* nearest) const;
   PictureRegion WholePicture() const;
   PictureRegion ChiefRegion(const PlaneOptions& plane) const;
@@ -96,7 +109,8 @@ class SceneGeometry {
   std::optional<BoxMm> OutlineBox(std::size_t layer) const;
 
   std::vector<SceneLayer> layers_;
-  std::vector<std::optional<SceneMask>> masks_;  // of the layers
+  std::vector<std::optional<SceneMask>> masks_;      // of the layers
+  std::vector<std::optional<HeightField>> heights_;  // of the layers
   Sensor sensor_;
   double focal_mm_ = 0;
   double scale_px_ = 0;

@@ -80,7 +80,17 @@ std::string GlossComplaint(const GlossOptions& gloss) {
   return "";
 }
 
-std::string LayerComplaint(const SceneLayer& layer) {
+std::string DepthComplaint(const SceneLayer& layer) {
+  if (layer.depth->convention.kind == DepthKind::kDisparity) {
+    return "depth.kind is disparity: it must be z or range";
+  }
+  if (layer.outline.shape != OutlineOptions::Shape::kWhole) {
+    return "outline: a layer with a depth map is whole and has none";
+  }
+  return "";
+}
+
+std::string PlaneComplaint(const SceneLayer& layer) {
   if (!(layer.plane.depth_mm > 0) || !std::isfinite(layer.plane.depth_mm)) {
     return fmt::format("plane.depth_mm is {}: it must be finite and > 0", layer.plane.depth_mm);
   }
@@ -88,6 +98,12 @@ std::string LayerComplaint(const SceneLayer& layer) {
     return fmt::format("plane.slope is [{}, {}]: it must be finite", layer.plane.slope.x(),
                        layer.plane.slope.y());
   }
+  return "";
+}
+
+std::string LayerComplaint(const SceneLayer& layer) {
+  const std::string surface = layer.depth ? DepthComplaint(layer) : PlaneComplaint(layer);
+  if (!surface.empty()) return surface;
   for (const GlossOptions& gloss : layer.gloss) {
     const std::string complaint = GlossComplaint(gloss);
     if (!complaint.empty()) return complaint;

@@ -72,7 +72,7 @@ void ScenePhotograph::LookCloser(const RaySpread& spread) {
     block.layers.clear();
     std::set_intersection(surveyed.begin(), surveyed.end(), met.begin(), met.end(),
                           std::back_inserter(block.layers));
-    if (block.layers.size() > 1) continue;
+    if (block.layers.size() > 1 || block.has_folds) continue;
     for (EffectPlace& place : block.places) place.jump = 0;
   }
 }
@@ -143,8 +143,8 @@ ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& r
     // (12) fixes its constant k by exposure: uniform radiance 1 gives 1 at the principal point.
     sum += Irradiance(axis_px, geometry_.RayAt(axis_px, aperture_mm));
   }
-  return {RayBundle(geometry_, bundle), static_cast<double>(rays.size()) / sum, std::move(behind_x),
-          std::move(behind_y)};
+  return {RayBundle(geometry_, bundle, on_.Has(Effect::kOcclusion)),
+          static_cast<double>(rays.size()) / sum, std::move(behind_x), std::move(behind_y)};
 }
 
 double ScenePhotograph::Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const {
@@ -203,13 +203,13 @@ Eigen::Array4f ScenePhotograph::LayerSum(const Pixel& pixel, std::size_t which,
   if (count < part.count) {
     for (Eigen::Index i = 0; i < count; ++i) {
       const Eigen::Index ray = showing[static_cast<std::size_t>(i)];
-      meeting.x_mm(i) = meeting.x_mm(ray);
-      meeting.y_mm(i) = meeting.y_mm(ray);
+      meeting.x(i) = meeting.x(ray);
+      meeting.y(i) = meeting.y(ray);
       of_these(i) = weights(ray);
     }
   }
   if (geometry_.layers()[layer].gloss.empty()) {
-    return textures_[layer].SumAround(chief.position_mm, meeting.x_mm.data(), meeting.y_mm.data(),
+    return textures_[layer].SumAround(chief.on_texture, meeting.x.data(), meeting.y.data(),
                                       of_these.data(), static_cast<int>(count));
   }
   Eigen::Array4f sum(0, 0, 0, 0);
@@ -217,9 +217,11 @@ Eigen::Array4f ScenePhotograph::LayerSum(const Pixel& pixel, std::size_t which,
     const Eigen::Index ray = part.first + showing[static_cast<std::size_t>(i)];
     SceneRay along = pixel.set.rays.rays()[static_cast<std::size_t>(ray)];
     along.slope += chief.slope;
-    sum += of_these(i) *
-           LayerLight(geometry_, textures_[layer], layer, along,
-                      along.PositionMm(HitDepthMm(geometry_.layers()[layer].plane, along)));
+    const Eigen::Vector2d on_texture =
+        geometry_.height_field(layer) == nullptr
+            ? geometry_.HitOn(layer, along).on_texture
+            : chief.on_texture + Eigen::Vector2f(meeting.x(i), meeting.y(i)).cast<double>();
+    sum += of_these(i) * LayerLight(geometry_, textures_[layer], layer, along, on_texture);
   }
   return sum;
 }

@@ -81,6 +81,15 @@ PlaneOptions ReadPlane(const YamlNode& node) {
   return plane;
 }
 
+DepthMapOptions ReadDepth(const YamlNode& node) {
+  node.RequireKeys({"map", "kind", "unit"});
+  DepthMapOptions depth;
+  depth.map_path = node.ResolvePath(node.At("map").Text());
+  depth.convention.kind = DepthKindFromName(node.At("kind").OneOf({"z", "range"}));
+  depth.convention.unit_mm = DepthUnitMm(node.At("unit").OneOf({"mm", "cm", "m", "tum5000"}));
+  return depth;
+}
+
 // Rectangle and disc, each in px of the picture or in mm; the keys say which. A mask is alone.
 OutlineOptions ReadOutline(const YamlNode& node) {
   OutlineOptions outline;
@@ -181,10 +190,17 @@ GlossOptions ReadGloss(const YamlNode& node) {
 }
 
 SceneLayer ReadLayer(const YamlNode& node) {
-  node.RequireKeys({"name", "plane", "outline", "texture", "gloss"});
+  node.RequireKeys({"name", "plane", "depth", "outline", "texture", "gloss"});
   SceneLayer layer;
   if (const auto name = node.Find("name")) layer.name = name->Text();
-  layer.plane = ReadPlane(node.At("plane"));
+  if (const auto depth = node.Find("depth")) {
+    if (const auto plane = node.Find("plane")) {
+      throw plane->ErrorHere("the layer has a depth map: one of plane and depth is right");
+    }
+    layer.depth = ReadDepth(*depth);
+  } else {
+    layer.plane = ReadPlane(node.At("plane"));
+  }
   if (const auto outline = node.Find("outline")) layer.outline = ReadOutline(*outline);
   layer.texture = ReadTexture(node.At("texture"));
   if (const auto gloss = node.Find("gloss")) {

@@ -110,7 +110,7 @@ struct SceneSimulator::Impl {
       const SceneRay ray = geometry.RayAt(Eigen::Vector2d(x, y) + sample.offset_px, aperture_mm);
       const SceneHit hit = geometry.Trace(ray);
       sum +=
-          LayerLight(geometry, textures[hit.layer], hit.layer, ray, hit.position_mm).cast<double>();
+          LayerLight(geometry, textures[hit.layer], hit.layer, ray, hit.on_texture).cast<double>();
     }
     return sum.head<3>() / static_cast<double>(view_rays.size());
   }
@@ -154,7 +154,7 @@ struct SceneSimulator::Impl {
       const auto i = static_cast<std::size_t>(index);
       const SceneLayer& layer = options.layers[i];
       const std::string place = LayerPlace(i, layer);
-      geometry.CheckPlane(place, layer.plane);
+      if (!layer.depth) geometry.CheckPlane(place, layer.plane);
       RandomDraws draws(options.seed, RandomDraws::Purpose::kTexture,
                         static_cast<std::uint32_t>(i));
       try {

@@ -98,12 +98,13 @@ class LayerDetail {
       const double x_px = (first + static_cast<int>(i) + 0.5) / kSamples - 0.5;
       const SceneRay ray = geometry_.RayAt({x_px, y_px}, {0, 0});
       const PlaneOptions& plane = geometry_.layers()[layer_].plane;
-      if (!(plane.slope.dot(ray.slope) < 1)) {
+      const bool is_plane = geometry_.height_field(layer_) == nullptr;
+      if (is_plane && !(plane.slope.dot(ray.slope) < 1)) {
         (*lights)[i].setConstant(std::numeric_limits<float>::quiet_NaN());
         continue;
       }
       (*lights)[i] =
-          LayerLight(geometry_, texture_, layer_, ray, ray.PositionMm(HitDepthMm(plane, ray)));
+          LayerLight(geometry_, texture_, layer_, ray, geometry_.HitOn(layer_, ray).on_texture);
     }
   }
 
@@ -141,9 +142,14 @@ class LayerDetail {
   Detail anything_;
 };
 
-// The most and the least 1/z of the plane over the region; linear there.
-std::pair<double, double> InverseDepths(const SceneGeometry& geometry, const PlaneOptions& plane,
+// The most and the least 1/z of the layer over the region; of a plane it is linear there.
+std::pair<double, double> InverseDepths(const SceneGeometry& geometry, std::size_t layer,
                                         const PictureRegion& region) {
+  if (const HeightField* field = geometry.height_field(layer)) {
+    const ValueRange shifts = field->ShiftsOver(region);
+    return {1 / field->DepthMm(shifts.low), 1 / field->DepthMm(shifts.high)};
+  }
+  const PlaneOptions& plane = geometry.layers()[layer].plane;
   double least = std::numeric_limits<double>::infinity(), most = -least;
   for (const Eigen::Vector2d& corner_px : region.Corners()) {
     const double inverse =
@@ -185,6 +191,22 @@ Detail GlossOf(const SceneLayer& layer) {
     detail.bend += static_cast<float>(2 * gloss.strength / (gloss.sigma_px * gloss.sigma_px));
   }
   return detail;
+}
+
+// What rays through aperture positions of up to so many mm see of a height field in a region is
+// what chief rays see, compressed. Derived here: x' = x + A V(x'), so that dx'/dx is at most m =
+// 1/(1 - a), a = |A| |grad V|, and jumps by at most m^3 |A| jump(grad V) from pixel to pixel. False
+// where a is too large for these to mean anything: there they may meet it more than once.
+bool Compress(const HeightField& field, const PictureRegion& region, double aperture_mm,
+              Detail* detail) {
+  constexpr double kSteepest = 0.3;
+  const double steepness = aperture_mm * field.SteepestOver(region);
+  if (!(steepness <= kSteepest)) return false;
+  const auto most = static_cast<float>(1 / (1 - steepness));
+  const auto jump = static_cast<float>(aperture_mm * field.SharpestOver(region));
+  detail->bend = most * most * (detail->bend + 2 * most * jump * detail->slope);
+  detail->slope *= most;
+  return true;
 }
 
 // The depths from which blur spreads to a block.
@@ -236,8 +258,8 @@ class BlurDepths {
 
 Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& texture,
                           std::size_t layer, const SceneRay& ray,
-                          const Eigen::Vector2d& position_mm) {
-  Eigen::Array4f light = texture.At(position_mm.x(), position_mm.y());
+                          const Eigen::Vector2d& on_texture) {
+  Eigen::Array4f light = texture.At(on_texture.x(), on_texture.y());
   for (const GlossOptions& gloss : geometry.layers()[layer].gloss) {
     const Eigen::Vector2d from_centre_px =
         geometry.ChiefPositionPx(ray.PositionMm(gloss.depth_mm), gloss.depth_mm) - gloss.centre_px;
@@ -254,6 +276,14 @@ double ReachPx(const SceneGeometry& geometry, std::size_t index, const PictureRe
   double sigma_px = 0;
   for (const GlossOptions& gloss : layer.gloss) {
     sigma_px = std::max(sigma_px, geometry.DefocusPx(gloss.depth_mm));
+  }
+  if (const HeightField* field = geometry.height_field(index)) {
+    const double aperture_mm = deviations * geometry.aperture_sigma_mm();
+    const ApertureBox aperture = {Eigen::Vector2d::Constant(-aperture_mm),
+                                  Eigen::Vector2d::Constant(aperture_mm)};
+    const ValueRange met = field->MetFrom(region.Widened(landing_px), aperture);
+    return landing_px + std::max(deviations * sigma_px,
+                                 aperture_mm * std::max(std::abs(met.low), std::abs(met.high)));
   }
   for (const Eigen::Vector2d& corner_px : region.Corners()) {
     const SceneRay ray = geometry.RayAt(corner_px, {0, 0});
@@ -273,11 +303,10 @@ std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureR
   };
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < geometry.layers().size(); ++i) {
-    const SceneLayer& layer = geometry.layers()[i];
     const PictureRegion reached =
         region.Widened(ReachPx(geometry, i, region, landing_px, deviations));
     if (!geometry.MayTouch(i, reached)) continue;
-    const auto [least, most] = InverseDepths(geometry, layer.plane, reached);
+    const auto [least, most] = InverseDepths(geometry, i, reached);
     candidates.push_back({i, least, most, geometry.Covers(i, reached)});
   }
   double nearest_cover = -std::numeric_limits<double>::infinity();
@@ -333,9 +362,23 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
       BlurDepths depths(geometry, 1 / camera.focus_depth_mm());
       for (const std::size_t i : block.layers) {
         const SceneLayer& layer = geometry.layers()[i];
-        seen.Add(details[i].Around(column, row, *reach++));
-        const auto [least, most] = InverseDepths(geometry, layer.plane, grid.RegionOf(column, row));
-        depths.Add(least, most);
+        const double reach_px = *reach++;
+        Detail around = details[i].Around(column, row, reach_px);
+        if (const HeightField* field = geometry.height_field(i)) {
+          const PictureRegion reached = grid.RegionOf(column, row).Widened(reach_px);
+          const auto [least, most] = InverseDepths(geometry, i, reached);
+          if (Compress(*field, reached, kReachDeviations * geometry.aperture_sigma_mm(), &around)) {
+            depths.Add(least, most);
+          } else {
+            block.has_folds = true;
+            depths.Add(least, least);
+            depths.Add(most, most);
+          }
+        } else {
+          const auto [least, most] = InverseDepths(geometry, i, grid.RegionOf(column, row));
+          depths.Add(least, most);
+        }
+        seen.Add(around);
         for (const GlossOptions& image : layer.gloss) {
           depths.Add(1 / image.depth_mm, 1 / image.depth_mm);
         }
@@ -355,7 +398,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
         place.bright = static_cast<double>(seen.bright(c) + gloss.bright(c));
         place.slope = static_cast<double>(seen.slope(c) + gloss.slope(c));
         place.bend = static_cast<double>(seen.bend(c) + gloss.bend(c));
-        place.jump = block.layers.size() > 1 ? place.bright - place.dark : 0;
+        place.jump = block.layers.size() > 1 || block.has_folds ? place.bright - place.dark : 0;
         block.places[static_cast<std::size_t>(c)] = place;
       }
     }

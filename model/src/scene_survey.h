@@ -16,13 +16,15 @@ namespace thicklens::model {
 // means nothing.
 Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& texture,
                           std::size_t layer, const SceneRay& ray,
-                          const Eigen::Vector2d& position_mm);
+                          const Eigen::Vector2d& on_texture);
 
 // A block of a picture's pixels, [x0, x1) x [y0, y1).
 struct SceneBlock {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   std::vector<std::size_t> layers;  // all that its rays can meet
   double sigma_px = 0;              // the largest defocus of these
+  // One of these is a height field so uneven that rays may meet it more than once.
+  bool has_folds = false;
   // What is photographed there, of each channel.
   std::array<EffectPlace, 3> places;
 };

@@ -13,7 +13,8 @@
 
 namespace thicklens::model {
 
-// What a layer's texture must do. Positions are (X, Y), mm from the optical axis.
+// What a layer's texture must do. Positions are (X, Y), mm from the optical axis; of a height field
+// they are those of the picture, and its mm are px.
 struct TextureRequest {
   Eigen::Vector2d low_mm{0, 0}, high_mm{0, 0};  // what can be seen of the layer
   Eigen::Vector2d centre_mm{0, 0};              // of an edge, a star or a picture

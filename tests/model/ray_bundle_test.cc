@@ -93,9 +93,9 @@ TEST_F(RayBundleTest, MeetsPlanesWhereEachRayDoes) {
           // A px is 0.02 mm there.
           EXPECT_NEAR(chiefs[k].depth_mm + static_cast<double>(meeting.beyond_mm(i)), depth_mm,
                       2e-6);
-          EXPECT_NEAR(chiefs[k].position_mm.x() + static_cast<double>(meeting.x_mm(i)), at_mm.x(),
+          EXPECT_NEAR(chiefs[k].on_texture.x() + static_cast<double>(meeting.x(i)), at_mm.x(),
                       2e-6);
-          EXPECT_NEAR(chiefs[k].position_mm.y() + static_cast<double>(meeting.y_mm(i)), at_mm.y(),
+          EXPECT_NEAR(chiefs[k].on_texture.y() + static_cast<double>(meeting.y(i)), at_mm.y(),
                       2e-6);
         }
       }

@@ -215,6 +215,22 @@ TEST_F(SceneSimulationFileTest, EveryKindOfTextureHasItsName) {
   }
 }
 
+TEST_F(SceneSimulationFileTest, LayersMayHaveAMaskOrADepthMap) {
+  const SceneSimulationOptions options =
+      Read(std::string(kHead) + kTruth +
+           "layers:\n"
+           "- {depth: {map: maps/hill.png, kind: range, unit: cm}, texture: {kind: noise}}\n"
+           "- {plane: {depth_mm: 310}, outline: {mask: card.png}, texture: {kind: noise}}\n");
+  ASSERT_TRUE(options.layers[0].depth.has_value());
+  EXPECT_EQ(options.layers[0].depth->map_path, folder_ / "maps/hill.png");
+  EXPECT_EQ(options.layers[0].depth->convention.kind, DepthKind::kRange);
+  EXPECT_EQ(options.layers[0].depth->convention.unit_mm, 10);
+  EXPECT_FALSE(options.layers[1].depth.has_value());
+  EXPECT_EQ(options.layers[1].outline.shape, OutlineOptions::Shape::kMask);
+  EXPECT_EQ(options.layers[1].outline.unit, OutlineOptions::Unit::kPx);
+  EXPECT_EQ(options.layers[1].outline.mask_path, folder_ / "card.png");
+}
+
 TEST_F(SceneSimulationFileTest, TellsWhatIsWrongAndWhere) {
   const std::string head = std::string(kHead) + kTruth;
   const auto layer = [&](const std::string& text) { return head + "layers: [{" + text + "}]\n"; };
@@ -233,6 +249,14 @@ TEST_F(SceneSimulationFileTest, TellsWhatIsWrongAndWhere) {
       {kHead + std::string("truth: {focus_depth_m: 0.3}\n") + kLayers, "wrong unit"},
       {head + "size_px: [641, 10]\n" + kLayers, "from 1 to 640"},
       {layer("texture: {kind: noise}"), "'plane' is missing"},
+      {layer("depth: {map: a.pfm, kind: z}" + leaves), "'unit' is missing"},
+      {layer("depth: {map: a.pfm, unit: mm}" + leaves), "'kind' is missing"},
+      {layer("depth: {map: a.pfm, kind: disparity, unit: mm}" + leaves), "z, range"},
+      {layer("depth: {map: a.pfm, kind: z, unit: px}" + leaves), "mm, cm, m, tum5000"},
+      {layer(plane + "depth: {map: a.pfm, kind: z, unit: mm}" + leaves),
+       "layers[0].plane: the layer has a depth map: one of plane and depth is right"},
+      {layer("depth: {map: a.pfm, kind: z, unit: mm}, outline: {mask: a.png}" + leaves),
+       "a layer with a depth map is whole"},
       {layer("plane: {depth_mm: 310}"), "'texture' is missing"},
       {layer("plane: {depth_mm: 0}" + leaves), "layers[0].plane.depth_mm"},
       {layer("plane: {depth_mm: 3, slope: [1]}" + leaves), "a list of 2"},

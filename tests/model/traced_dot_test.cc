@@ -91,7 +91,7 @@ TEST(TracedDotTest, ADotsPictureIsWhereAndAsWideAsTheTracedLensPutsIt) {
       dot.outline.size.setConstant(kDotSamples / 4 * kPitchMm / std::abs(per_object));
       const SceneSimulator simulator(
           MacroScene::Options(camera, {dot, MacroScene::Uniform(2 * focus_mm, 0)}, kEffects, 1000),
-          {{DotPicture(), {}}});
+          {{DotPicture(), {}, {}}});
 
       // (25), (26): sigma = kappa r |c(z)|, c = [f1 D - (D - f2) z]/(f2 z), D = d1 - rho.
       const ThickLens& thick = camera.lens;

@@ -239,6 +239,46 @@ TEST_F(SimulateSceneTest, OutlineMayBeAMaskFile) {
   EXPECT_FALSE(fs::exists(folder_ / "other"));
 }
 
+TEST_F(SimulateSceneTest, LayerMayBeAPictureWithItsDepthMap) {
+  model::RawDepthMap map{40, 30, {}, false};
+  for (int i = 0; i < 40 * 30; ++i) {
+    map.values.push_back(i % 40 < 20 ? 0.298F : 0.302F + 1e-5F * static_cast<float>(i / 40));
+  }
+  folder_.Put("map.pfm", EncodePfm(map));
+  model::StoredPicture texture{40, 30, 3, 8, {}};
+  for (int i = 0; i < 40 * 30; ++i) {
+    for (int c = 0; c < 3; ++c) {
+      texture.values.push_back(static_cast<std::uint16_t>(i % 40 < 20 ? 188 : 0));
+    }
+  }
+  folder_.Put("texture.png", EncodePng(texture));
+  const std::string text = SceneConfig("without: [falloff]\n");
+  const std::size_t layer = text.find("- {name: wall");
+  const std::string config =
+      folder_.Put("scene.yaml", text.substr(0, layer) +
+                                    "- {depth: {map: map.pfm, kind: z, unit: m},\n"
+                                    "   texture: {kind: picture, picture: texture.png}}\n" +
+                                    text.substr(text.find("without")));
+  Succeed({"picture", config, "-o", folder_ / "out", "--quiet"});
+  const model::RawDepthMap depth = ReadDepthMap(folder_ / "out/depth.pfm");
+  ASSERT_EQ(depth.values.size(), map.values.size());
+  for (std::size_t i = 0; i < map.values.size(); ++i) {
+    EXPECT_NEAR(depth.values[i], 1000 * map.values[i], 1e-4F);
+  }
+  const model::StoredPicture picture =
+      ToStoredPicture(ReadPictureFile(folder_ / "out/picture.png"));
+  EXPECT_NEAR(picture.values[3 * (40 * 15 + 2)], 128, 3);
+  EXPECT_NEAR(picture.values[3 * (40 * 15 + 37)], 0, 3);
+
+  map.values[5] = 0;
+  folder_.Put("map.pfm", EncodePfm(map));
+  EXPECT_THAT(
+      Failure({"picture", config, "-o", folder_ / "other"}),
+      AllOf(HasSubstr("layers[0]: depth.map"), HasSubstr("1 of its 1200 values are holes")));
+  fs::remove(folder_ / "map.pfm");
+  EXPECT_THAT(Failure({"picture", config, "-o", folder_ / "other"}), HasSubstr("map.pfm"));
+}
+
 TEST_F(SimulateSceneTest, RefusesInOneLineAndWritesNothing) {
   const std::string config = folder_.Put("scene.yaml", SceneConfig("viewss: [3, 3]\n"));
   for (const char* command : {"picture", "light-field"}) {

@@ -76,6 +76,7 @@ std::vector<model::LayerPixels> ReadPixels(const model::SceneSimulationOptions& 
       pixels[i].mask = model::ToLinear(ToStoredPicture(ReadPictureFile(layer.outline.mask_path)),
                                        model::TransferCurve::Linear());
     }
+    if (layer.depth) pixels[i].depth = ReadDepthMap(layer.depth->map_path);
   }
   return pixels;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -63,6 +64,17 @@ struct PlaneOptions {
   Eigen::Vector2d slope{0, 0};  // mm deeper per mm to the right and down
 };
 
+// A surface of any shape in place of a plane: 1/z = W(x') at the position x' of the picture at
+// which the chief ray shows it, W from a depth map of the scene's size, bilinear between pixel
+// centres and beyond the outermost as there. Its texture is painted on x': a picture, as wide as
+// the scene's if nothing else is said, has its pixels where the map has them. Across an edge of
+// depth the surface is stretched from one pixel to the next like a sheet of rubber, with what is
+// painted between them.
+struct DepthMapOptions {
+  std::string map_path;        // for messages
+  DepthConvention convention;  // kZ or kRange
+};
+
 // Which part of its plane a layer fills. In px it is the part that chief rays meet inside these
 // positions of the picture; in mm, inside these (X, Y). A mask is a grey picture of the scene's
 // size: inside is where its values, bilinear between pixel centres and beyond the outermost as
@@ -92,6 +104,7 @@ struct GlossOptions {
 struct SceneLayer {
   std::string name;  // for messages; may be empty
   PlaneOptions plane;
+  std::optional<DepthMapOptions> depth;  // the plane is left out then, and the outline is whole
   OutlineOptions outline;
   TextureOptions texture;
   std::vector<GlossOptions> gloss;
@@ -101,6 +114,7 @@ struct SceneLayer {
 struct LayerPixels {
   LinearPicture texture;  // kPicture, in linear light
   LinearPicture mask;     // kMask: one channel, stored values, 1 at full scale
+  RawDepthMap depth;      // of SceneLayer::depth
 };
 
 // What a picture of a scene can have.
@@ -151,12 +165,13 @@ struct SceneRun {
   std::function<void(int done, int total)> progress;
 };
 
-// Image formation from a scene of textured planes to a photograph and its true light field, by the
-// geometric optics of the thick lens. It knows no light-field samples: the ray of picture position
-// x through aperture position A meets depth z at
+// Image formation from a scene of textured surfaces to a photograph and its true light field, by
+// the geometric optics of the thick lens. It knows no light-field samples: the ray of picture
+// position x through aperture position A meets depth z at
 //   X(z) = (x - cx) z p/K + A (1 - z/zf),
 // the line that lands A c(z)/p to the left of the chief ray of what it meets there (derived here
-// from (16) with UV on the aperture). A layer is met in closed form.
+// from (16) with UV on the aperture). A plane is met in closed form, a depth map by a search from
+// pixel to pixel and in closed form between four of them.
 //
 // A pixel of the photograph is the mean over a set of rays (Hammersley points), as many as its blur
 // and its surroundings ask for (see sampling_plan.h); pixels with as many have the same set. It
@@ -171,8 +186,9 @@ class SceneSimulator {
  public:
   // `pixels`: one entry a layer; missing ones are empty. Throws Error if the options are not valid,
   // a file's picture is not what its layer needs, a ray can miss or meet behind the front focal
-  // point one of the planes, no layer is whole, a texture cannot be drawn, or an effect is named
-  // that a picture of a scene cannot have. `threads` (0: one per core) draw the layers.
+  // point one of the planes, a depth map has holes, no layer is whole, a texture cannot be drawn,
+  // or an effect is named that a picture of a scene cannot have. `threads` (0: one per core) draw
+  // the layers.
   SceneSimulator(const SceneSimulationOptions& options, const std::vector<LayerPixels>& pixels,
                  int threads = 0);
   ~SceneSimulator();
