@@ -18,7 +18,6 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 5;
 constexpr int kFewestModesOfFrame = 16;
-constexpr double kUsualRatio = 0.45;  // kappa to start with
 constexpr double kUsualFloor = 0.25;  // S0 to start with, px^2
 constexpr double kWholeField = 0.98;
 constexpr std::size_t kFramesForBound = 9;
@@ -40,6 +39,7 @@ class Measurement {
     setup.lens = task.sweep.camera.lens;
     setup.pixel_pitch_mm = task.sweep.camera.sensor.pixel_pitch_mm;
     setup.law = task.law;
+    setup.weighed_psf = task.sweep.camera.psf;
     setup.offset_mm = task.offset_mm;
     setup.direction = task.sweep.direction;
     setup.reading_sigma_mm = task.reading_sigma_mm;

@@ -14,6 +14,8 @@
 
 namespace thicklens::calib {
 
+inline constexpr double kUsualRatio = 0.45;  // kappa to start with
+
 // Everything that is known of a sweep when its blur is to be measured.
 struct BlurTask {
   BlurTask(const FocusSweep& its_sweep, FrameStore& its_store)

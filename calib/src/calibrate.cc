@@ -24,9 +24,13 @@
 #include "thicklens/calib/sharpness.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
+#include "thicklens/model/weighed_aperture.h"
 
 namespace thicklens::calib {
 namespace {
+
+constexpr double kZeroReach = 2;    // standard deviations of a zero that contradicts another
+constexpr double kZeroMoves = 0.1;  // of the zero's standard deviation, and what moves it matters
 
 class Calibrator {
  public:
@@ -170,6 +174,7 @@ class Calibrator {
         options_.threads, [this] { Tick(); });
     result_.scale = FitScaleLaw(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
                                 sweep_.direction, RegionCornerRadiusPx(sweep_));
+    ReckonWithFalloff(kUsualRatio, result_.scale.reference_depth_mm, &result_.scale);
     const bool is_lone_edge = IsLoneEdge(sweep_, used().size(), samples.size(), result_.scale);
     if (is_lone_edge) ForgetScales(sweep_, &samples, &result_.scale);
     for (const ScaleSample& sample : samples) {
@@ -205,12 +210,26 @@ class Calibrator {
     slip_ = FindSlip(scales_, result_.scale);
     if (slip_) WarnOfSlip(*slip_, &result_);
     bend_ = CheckBend(sweep_, scales_, &result_);
-    const double sign = model::DirectionSign(sweep_.direction);
-    for (FrameMeasurement& frame : result_.frames) {
-      frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
-    }
+    PlaceFrames();
     return Passed(selection_.KeepPossibleDepths(result_.bench_offset_mm->value,
                                                 sweep_.camera.lens.front_focal_length_mm));
+  }
+
+  void PlaceFrames() {
+    const double sign = model::DirectionSign(sweep_.direction);
+    for (FrameMeasurement& frame : result_.frames)
+      frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
+  }
+
+  // The image scale's zero is the centre of perspective, which fall-off puts in front of the
+  // aperture: how far depends on the blur.
+  void ReckonWithFalloff(double blur_ratio, double focus_depth_mm, ScaleLaw* law) const {
+    const model::Camera& camera = sweep_.camera;
+    if (!law->done || !(focus_depth_mm > camera.lens.front_focal_length_mm)) return;
+    const double line_zero_mm = law->line_zero_mm();
+    law->centre_mm =
+        model::CentreOfPerspectiveMm(camera.lens, camera.psf, blur_ratio, focus_depth_mm);
+    law->offset_mm.value = line_zero_mm + law->centre_mm;
   }
 
   // The sharpest frame may be the one whose reading is wrong: the next sharpest takes its place,
@@ -269,7 +288,7 @@ class Calibrator {
     BlurFitResult fit;
     const Calibration before = result_;
     SolveFocus(sweep_, &evidence, &fit, &result_);
-    if (ReplaceRejectedReference(before)) return MeasureAndSolve();
+    if (ReplaceRejectedReference(before) || MovesZero(before)) return MeasureAndSolve();
     if (!result_.frames[reference_].rejection.empty()) return;
     if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
     if (result_.outcome == Outcome::kRefused) return;
@@ -280,8 +299,12 @@ class Calibrator {
   // What the checks found, as far as it moves the results.
   void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
     if (conflicting_offset_mm_) {
+      // Believing it is believing its error too.
+      const model::Estimate& zero = *conflicting_offset_mm_;
+      const double reach_mm = kZeroReach * zero.sigma;
       WidenByTrials("given offset_mm", "measure offset_mm again: the image scale contradicts it",
-                    WithOffsets(setup, {*conflicting_offset_mm_}), fit, &result_);
+                    WithOffsets(setup, {zero.value - reach_mm, zero.value + reach_mm}), fit,
+                    &result_);
     }
     if (slip_) {
       WidenByTrials("jump of the readings", "find what slipped, or take the sweep again",
@@ -318,6 +341,22 @@ class Calibrator {
     return true;
   }
 
+  // The bench zero of the image scale was found with a usual blur ratio; once more where the one
+  // that was found moves it by a part of its error.
+  bool MovesZero(const Calibration& before) {
+    if (sweep_.offset_mm || zero_is_settled_ || !result_.blur_ratio) return false;
+    zero_is_settled_ = true;
+    Calibration again = before;
+    ReckonWithFalloff(result_.blur_ratio->value, result_.focus_depth_mm->value, &again.scale);
+    const Result& zero_mm = again.scale.offset_mm;
+    if (!(std::abs(zero_mm.value - before.scale.offset_mm.value) > kZeroMoves * zero_mm.sigma))
+      return false;
+    result_ = std::move(again);
+    result_.bench_offset_mm = result_.scale.offset_mm;
+    PlaceFrames();
+    return true;
+  }
+
   std::pair<double, double> DepthRange() const {
     const auto [low, high] =
         std::minmax_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
@@ -335,7 +374,9 @@ class Calibrator {
   std::vector<ScaleSample> scales_;            // registered frames
   std::optional<Slip> slip_;
   std::optional<Bend> bend_;
-  std::optional<double> conflicting_offset_mm_;  // what the image scale says of a given bench zero
+  bool zero_is_settled_ = false;
+  // What the image scale says of a given bench zero.
+  std::optional<model::Estimate> conflicting_offset_mm_;
   std::mutex progress_mutex_;
   int steps_done_ = 0;
   int total_steps_ = 0;

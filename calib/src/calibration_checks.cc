@@ -55,7 +55,7 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) 
     return check;
   }
   calibration->warnings.push_back(found);
-  check.conflicting_mm = law.offset_mm.value;
+  check.conflicting_mm = model::Estimate{law.offset_mm.value, law.offset_mm.sigma};
   return check;
 }
 
@@ -119,7 +119,7 @@ std::vector<BlurFitSetup> WithoutSlip(const FocusSweep& sweep, const BlurFitSetu
   const ScaleLaw law = FitScaleLaw(scales, static_cast<int>(reference), setup.reading_sigma_mm,
                                    sweep.direction, RegionCornerRadiusPx(sweep));
   if (!law.done) return {later, earlier};
-  later.offset_mm.value = law.offset_mm.value;
+  later.offset_mm.value = law.offset_mm.value + calibration.scale.centre_mm;
   return {later};
 }
 

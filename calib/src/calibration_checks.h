@@ -20,7 +20,7 @@ namespace thicklens::calib {
 // each other. A refusal where they lie so far apart that one of them is plain wrong.
 struct OffsetCheck {
   std::optional<std::string> refusal;
-  std::optional<double> conflicting_mm;
+  std::optional<model::Estimate> conflicting_mm;
 };
 OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration);
 

@@ -30,7 +30,7 @@ std::vector<WrongReading> FindWrongReadings(const FocusSweep& sweep,
   const double sign = model::DirectionSign(sweep.direction);
   for (const ScaleSample& sample : samples) {
     const double depth_mm = law.reference_depth_mm / sample.scale;
-    const double error_mm = sample.reading_mm - sign * (depth_mm - law.offset_mm.value);
+    const double error_mm = sample.reading_mm - sign * (depth_mm - law.line_zero_mm());
     const double sigma_mm = std::hypot(std::max(sweep.reading_sigma_mm, law.reading_rms_mm),
                                        depth_mm * sample.registration.scale_sigma / sample.scale);
     if (std::abs(error_mm) > kFarOff * sigma_mm)

@@ -117,9 +117,11 @@ class Parts {
   }
 
   // Another set of samples in a meter's place. Frames that were thrown out stay out.
-  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter) const {
+  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter,
+                            model::Psf psf) const {
     if (!samples || meter < 0) return std::nullopt;
     BlurFitSetup setup = evidence_.setup;
+    if (setup.weighed_psf) setup.weighed_psf = psf;
     BlurSamples& place = setup.meters[static_cast<std::size_t>(meter)];
     std::vector<Eigen::Index> kept;
     for (std::size_t i = 0; i < samples->frames.size(); ++i) {
@@ -139,7 +141,8 @@ class Parts {
   }
 
   void AddBand() {
-    const std::optional<Trial> trial = With(evidence_.narrow_band, evidence_.spectrum);
+    const std::optional<Trial> trial =
+        With(evidence_.narrow_band, evidence_.spectrum, sweep_.camera.psf);
     if (!trial) return;
     SystematicPart part;
     part.name = "frequency band";
@@ -166,7 +169,8 @@ class Parts {
   // and only the depth can be compared.
   void AddShape() {
     const std::optional<Trial> trial =
-        With(evidence_.other_psf, evidence_.spectrum >= 0 ? evidence_.spectrum : evidence_.edges);
+        With(evidence_.other_psf, evidence_.spectrum >= 0 ? evidence_.spectrum : evidence_.edges,
+             OtherPsf(sweep_.camera.psf));
     if (!trial) return;
     SystematicPart part;
     part.name = kShapePart;

@@ -45,12 +45,11 @@ struct MeasuredSweep {
       if (truth.frames[i].blur_sigma_px < truth.frames[task->reference].blur_sigma_px)
         task->reference = i;
     }
-    const double reference_mm = truth.frames[task->reference].depth_mm;
     for (const std::size_t i : task->frames) {
       calib::ScaleSample sample;
       sample.frame = i;
       sample.reading_mm = sweep.frames[i].reading_mm;
-      sample.scale = sample.registration.scale = reference_mm / truth.frames[i].depth_mm;
+      sample.scale = sample.registration.scale = simulated.TrueScale(i, task->reference);
       sample.registration.scale_sigma = 1e-5;
       task->scales.push_back(sample);
     }
@@ -103,8 +102,7 @@ inline void ExpectTrueVariances(const MeasuredSweep& m, const calib::BlurEvidenc
   ASSERT_EQ(samples.covariance.rows(), samples.variances_px2.size());
   for (std::size_t i = 0; i < samples.frames.size(); ++i) {
     const std::size_t frame = evidence.frames[samples.frames[i]];
-    const double scale = m.simulated.truth.frames[m.task->reference].depth_mm /
-                         m.simulated.truth.frames[frame].depth_mm;
+    const double scale = m.simulated.TrueScale(frame, m.task->reference);
     const auto k = static_cast<Eigen::Index>(i);
     EXPECT_NEAR(samples.variances_px2[k], m.TrueVariance(frame) / (scale * scale),
                 within_px2 + 4 * std::sqrt(samples.covariance(k, k)))

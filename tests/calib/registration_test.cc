@@ -211,8 +211,7 @@ Frames Simulated(const std::string& name, model::TargetKind kind, std::uint64_t 
   frames.middle = static_cast<std::size_t>(count / 2);
   for (std::size_t i = 0; i < simulated.stored->size(); ++i) {
     frames.grey.push_back(LinearGrey((*simulated.stored)[i], simulated.sweep, i));
-    frames.scale.push_back(simulated.truth.frames[frames.middle].depth_mm /
-                           simulated.truth.frames[i].depth_mm);
+    frames.scale.push_back(simulated.TrueScale(i, frames.middle));
   }
   return frames;
 }

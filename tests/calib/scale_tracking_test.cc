@@ -58,10 +58,9 @@ GreyReader Reader(const SimulatedSweep& s) {
 }
 
 void ExpectTrueScales(const SimulatedSweep& s, const std::vector<ScaleSample>& samples) {
-  const double middle_mm = s.truth.frames[s.truth.frames.size() / 2].depth_mm;
   EXPECT_EQ(samples.size(), s.truth.frames.size());
   for (const ScaleSample& sample : samples) {
-    const double scale = middle_mm / s.truth.frames[sample.frame].depth_mm;
+    const double scale = s.TrueScale(sample.frame, s.truth.frames.size() / 2);
     EXPECT_NEAR(sample.scale, scale, 5 * sample.registration.scale_sigma + 1e-9) << sample.frame;
     EXPECT_LT(sample.registration.scale_sigma, 1e-3);
     EXPECT_EQ(sample.scale, sample.registration.scale);
@@ -79,7 +78,7 @@ TEST(TrackScale, FindsTheScalesWithAndWithoutAnOffset) {
     ExpectTrueScales(s, samples);
     const ScaleLaw law = Fit(s.sweep, samples);
     ASSERT_TRUE(law.done) << law.message;
-    EXPECT_NEAR(law.offset_mm.value, 0, 3 * law.offset_mm.sigma);
+    EXPECT_NEAR(law.offset_mm.value, -s.centre_mm, 3 * law.offset_mm.sigma);
     EXPECT_LT(law.offset_mm.sigma, 2);
   }
 }
@@ -174,7 +173,7 @@ TEST(TrackScale, AFrameWithAWrongReadingIsRegistered) {
     const ScaleLaw law = Fit(s.sweep, samples);
     ASSERT_TRUE(law.done) << law.message;
     EXPECT_EQ(law.frames_used, 14);
-    EXPECT_NEAR(law.offset_mm.value, 0, 3 * law.offset_mm.sigma);
+    EXPECT_NEAR(law.offset_mm.value, -s.centre_mm, 3 * law.offset_mm.sigma);
   }
 }
 

@@ -174,7 +174,8 @@ TEST(TargetPeriod, LinesThatWanderHaveNone) {
 }
 
 TEST(TargetPeriod, FollowsTheMagnificationOfASimulatedCheckerboard) {
-  // m = f1 D/(f2 z), through focus and out of it.
+  // m = f1 D/(f2 z) from the middle of the aperture, through focus and out of it; from the centre
+  // of perspective the same in the plane of focus.
   model::SweepSimulationOptions options = SweepCase("iii", 384, 1);
   options.target.kind = model::TargetKind::kCheckerboard;
   options.target.feature_size_mm = 1.5;
@@ -183,10 +184,12 @@ TEST(TargetPeriod, FollowsTheMagnificationOfASimulatedCheckerboard) {
   auto simulated = thicklens::testing::Simulate(options);
   const model::ThickLens& lens = options.camera.lens;
   const double rear_mm = simulated.truth.image_distance_mm - lens.lens_thickness_mm;
+  const double focus_mm = simulated.truth.focus_depth_mm;
   for (int i = 0; i < options.frame_count; ++i) {
     const double depth_mm = simulated.truth.frames[static_cast<std::size_t>(i)].depth_mm;
     const double magnification =
-        lens.front_focal_length_mm * rear_mm / (lens.rear_focal_length_mm * depth_mm);
+        lens.front_focal_length_mm * rear_mm / (lens.rear_focal_length_mm * focus_mm) *
+        (focus_mm - simulated.centre_mm) / (depth_mm - simulated.centre_mm);
     ExpectPeriod(LinearGrey(simulated.frame(i), simulated.sweep, 0),
                  3 * magnification / options.camera.sensor.pixel_pitch_mm, 1e-4);
   }

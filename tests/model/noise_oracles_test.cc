@@ -112,6 +112,7 @@ TEST(NoiseOraclesTest, FramesOfSweepsFollowTheirDistribution) {
         options.light_level = level;
         options.full_well_electrons = sensor.full_well;
         options.read_noise_electrons = sensor.read_noise;
+        options.effects.without = {Effect::kFalloff};
         const SweepSimulator simulator(options, {});
         EXPECT_NEAR(simulator.RenderNoiseless(0).at(204, 100, 0), 1.5 * level, 1e-6);
         const StoredPicture frame = simulator.RenderFrame(0);

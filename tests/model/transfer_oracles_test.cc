@@ -52,6 +52,7 @@ TEST(TransferOraclesTest, FramesOfAnEdgeAreExactToAMillionth) {
         options.first_depth_mm = MacroScene::DepthOf(defocus_px);
         options.frame_count = 1;
         options.lamp_falloff = false;
+        options.effects.without = {Effect::kFalloff};
         const LinearPicture frame = SweepSimulator(options, {}).RenderNoiseless(0);
         // Through the middle of the frame; the upper end leans right, bright is on the right.
         const Eigen::Vector2d direction = MacroScene::Direction(6), edge_px(24, 4);

@@ -7,6 +7,7 @@
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
+#include "thicklens/model/weighed_aperture.h"
 
 namespace thicklens::tools {
 
@@ -14,7 +15,8 @@ bool IsDepth(double depth_mm);  // finite and in front of the camera
 bool HasBlur(const calib::FrameMeasurement& frame);
 
 // Blur by the fitted law, sigma = sqrt(S0 + (kappa r_defocus/p)^2), px per axis, without the pixel
-// box. Exact for all depths z > 0; at z = zf it is the floor. The sweep must outlive it.
+// box, kappa^2 as it is seen with fall-off (model::SeeBlurRatio). Exact for all depths z > 0; at z
+// = zf it is the floor. The sweep must outlive it.
 class BlurLaw {
  public:
   // Nothing where the fit gave no image distance or no blur ratio that a lens can have.
@@ -40,8 +42,8 @@ class BlurLaw {
   bool floor_from_frames() const { return floor_from_frames_; }
 
  private:
-  BlurLaw(const calib::FocusSweep& sweep, double image_distance_mm, double blur_ratio)
-      : sweep_(&sweep), image_distance_mm_(image_distance_mm), blur_ratio_(blur_ratio) {}
+  BlurLaw(const calib::FocusSweep& sweep, double image_distance_mm)
+      : sweep_(&sweep), image_distance_mm_(image_distance_mm) {}
 
   void TakeFloor(const calib::Calibration& calibration);
   void TakeCovariance(const calib::Calibration& calibration);
@@ -50,7 +52,7 @@ class BlurLaw {
 
   const calib::FocusSweep* sweep_;
   double image_distance_mm_ = 0;
-  double blur_ratio_ = 0;
+  model::SeenBlurRatio seen_;
   double floor_squared_px2_ = 0;
   bool floor_from_frames_ = false;
   // Of d1, kappa, floor and bench offset; rows of what is not in the fit's covariance are 0.

@@ -57,7 +57,7 @@ ScalePoints ScalePointsOf(const FocusSweep& sweep, const Calibration& calibratio
       continue;
     }
     const double law_reading_mm =
-        sign * (scale.reference_depth_mm * inverse - scale.offset_mm.value);
+        sign * (scale.reference_depth_mm * inverse - scale.line_zero_mm());
     const double residual_mm = frame.reading_mm - law_reading_mm;
     name += fmt::format(", reading off by {:+.2g} mm", residual_mm);
     AddPoint(series, frame.reading_mm, inverse, name);
@@ -199,7 +199,7 @@ ReportFigure ScaleFigure(const FocusSweep& sweep, const Calibration& calibration
       range = {std::min(range.first, reading_mm), std::max(range.second, reading_mm)};
   Plot law = ScalePlot();
   const auto law_at = [&](double reading_mm) {
-    return (scale.offset_mm.value + sign * reading_mm) / scale.reference_depth_mm;
+    return (scale.line_zero_mm() + sign * reading_mm) / scale.reference_depth_mm;
   };
   law.series = {Curve(sign > 0 ? "1/scale = (offset + b)/z of the reference"
                                : "1/scale = (offset − b)/z of the reference",

@@ -108,9 +108,14 @@ struct ScaleLaw {
   bool contradicts_readings = false;  // frames were registered, and most agree with no law at all
   bool shows_no_scale = false;  // the target looks the same at every scale (spokes): not looked for
   int reference_frame = -1;
-  Result offset_mm;
-  double reference_depth_mm = 0;  // z of the reference frame by the fit; scale = z_reference/z
-  double reading_rms_mm = 0;      // scatter of the readings about the law
+  Result offset_mm;  // the bench zero: where the aperture is
+  // Where the size on the sensor goes to infinity lies this far in front of the aperture, because
+  // fall-off weighs its rays (model::CentreOfPerspectiveMm); reckoned with in offset_mm.
+  double centre_mm = 0;
+  // Of the reference frame, from there: 1/scale = (line_zero_mm + direction reading)/it.
+  double reference_depth_mm = 0;
+  double line_zero_mm() const { return offset_mm.value - centre_mm; }
+  double reading_rms_mm = 0;  // scatter of the readings about the law
   int frames_used = 0;
   // Radial distortion that the registrations show: relative change of the image height at the
   // corner of the region (positive: pincushion), if there were enough of them to tell.

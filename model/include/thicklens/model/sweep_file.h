@@ -93,9 +93,11 @@ struct SweepTruth {
   double tilt_deg = 0;  // of the target, as TargetOptions has it
   struct Frame {
     std::string image;
-    double depth_mm = 0;       // true z
-    double reading_mm = 0;     // as the bench showed it, with its error
-    double blur_sigma_px = 0;  // sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel box
+    double depth_mm = 0;    // true z
+    double reading_mm = 0;  // as the bench showed it, with its error
+    // sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel box, with fall-off of the aperture
+    // that it weighs.
+    double blur_sigma_px = 0;
   };
   std::vector<Frame> frames;
   EffectRecord effects;  // not read

@@ -61,7 +61,7 @@ struct SweepSimulationOptions {
   double full_well_electrons = 0;  // shot noise: electrons at full scale; 0: no shot noise
   double read_noise_electrons = 0;
   int bits = 8;
-  // Of SweepEffects. kAuto has all but fall-off and thickness, which are for those who ask.
+  // Of SweepEffects; kAuto has them all.
   EffectChoice effects;
   std::uint64_t seed = 1;
 
