@@ -33,10 +33,10 @@ constexpr Bounds kLeaves[] = {{"i", 0.5, 0.007},
                               {"iv", 0.23, 0.004},
                               {"v", 0.035, 0.015}};
 // A knife edge, floor fitted.
-constexpr Bounds kEdge[] = {{"i", 0.4, 0.003},
+constexpr Bounds kEdge[] = {{"i", 0.4, 0.007},
                             {"ii", 0.05, 0.006},
                             {"iii", 0.12, 0.002},
-                            {"iv", 0.35, 0.002},
+                            {"iv", 0.35, 0.005},
                             {"v", 0.045, 0.02}};
 
 SimulatedSweep Sweep(const std::string& name, model::TargetKind kind, std::uint64_t seed) {
