@@ -40,8 +40,7 @@ Rule OfDisc() {
 }
 
 double ScaleMm(const ThickLens& lens, double focus_depth_mm) {
-  return lens.front_focal_length_mm /
-         (1 - lens.front_focal_length_mm / focus_depth_mm);
+  return lens.front_focal_length_mm / (1 - lens.front_focal_length_mm / focus_depth_mm);
 }
 
 ApertureOptics OpticsOf(const ThickLens& lens, Psf psf, double blur_ratio, double focus_depth_mm) {
@@ -76,17 +75,16 @@ WeighedAperture WeighAperture(const ApertureOptics& optics, double scale_mm) {
   weighed.by_log_focus_depth = slope(by_focus);
   weighed.by_log_image_distance = slope(by_distance);
   weighed.by_log_sigma = -weighed.by_log_focus_depth - weighed.by_log_image_distance;
-  weighed.mean_per_landing =
-      optics.sigma_mm * optics.sigma_mm *
-      mean(half * (1 / (scale_mm * optics.focus_depth_mm * (1 + front)) -
-                   3 / (d1_squared * (1 + behind))));
+  weighed.mean_per_landing = optics.sigma_mm * optics.sigma_mm *
+                             mean(half * (1 / (scale_mm * optics.focus_depth_mm * (1 + front)) -
+                                          3 / (d1_squared * (1 + behind))));
   return weighed;
 }
 
 SeenBlurRatio SeeBlurRatio(const ThickLens& lens, Psf psf, double blur_ratio,
                            double focus_depth_mm) {
-  const WeighedAperture weighed = WeighAperture(
-      OpticsOf(lens, psf, blur_ratio, focus_depth_mm), ScaleMm(lens, focus_depth_mm));
+  const WeighedAperture weighed =
+      WeighAperture(OpticsOf(lens, psf, blur_ratio, focus_depth_mm), ScaleMm(lens, focus_depth_mm));
   const double log_distance_slope =
       ImageDistanceSlope(lens, focus_depth_mm) / ImageDistanceMm(lens, focus_depth_mm);
   SeenBlurRatio seen;

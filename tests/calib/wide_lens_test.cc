@@ -78,9 +78,9 @@ TEST(WideLens, FramesWithoutFallOffShowAWiderAperture) {
     const Calibration c = Calibrated(s);
     ASSERT_TRUE(c.blur_ratio) << c.reason;
     EXPECT_GT(Pull(c.blur_ratio, kRatio), 6);
-    const double seen = std::sqrt(model::SeeBlurRatio(s.sweep.camera.lens, psf,
-                                                      c.blur_ratio->value, c.focus_depth_mm->value)
-                                      .squared);
+    const double seen = std::sqrt(
+        model::SeeBlurRatio(s.sweep.camera.lens, psf, c.blur_ratio->value, c.focus_depth_mm->value)
+            .squared);
     EXPECT_NEAR(seen, kRatio, 4 * c.blur_ratio->sigma);
   }
 }
@@ -95,9 +95,9 @@ TEST(WideLens, SlopesOfThePredictionAreThoseOfItsValues) {
   for (const int k : {kFocusDepth, kBlurRatio, kFloorVariance}) {
     Eigen::Vector4d step = Eigen::Vector4d::Zero();
     step[k] = 1e-4;
-    const double slope =
-        (PredictBlur(setup, at + step, 52, 1.1).value - PredictBlur(setup, at - step, 52, 1.1).value) /
-        2e-4;
+    const double slope = (PredictBlur(setup, at + step, 52, 1.1).value -
+                          PredictBlur(setup, at - step, 52, 1.1).value) /
+                         2e-4;
     EXPECT_NEAR(prediction.by_global[k] / slope, 1, 1e-6) << k;
   }
   BlurFitSetup even = setup;

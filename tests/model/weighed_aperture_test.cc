@@ -74,8 +74,8 @@ TEST(WeighedAperture, SlopesOfTheSeenBlurRatioAreThoseOfItsValues) {
       };
       const SeenBlurRatio seen = SeeBlurRatio(kWide, psf, 0.45, zf_mm);
       EXPECT_LT(seen.squared, 0.45 * 0.45);
-      EXPECT_NEAR(seen.by_blur_ratio,
-                  (squared(0.4501, zf_mm) - squared(0.4499, zf_mm)) / 0.0002, 1e-6);
+      EXPECT_NEAR(seen.by_blur_ratio, (squared(0.4501, zf_mm) - squared(0.4499, zf_mm)) / 0.0002,
+                  1e-6);
       EXPECT_NEAR(seen.by_focus_depth,
                   (squared(0.45, zf_mm + 0.01) - squared(0.45, zf_mm - 0.01)) / 0.02, 1e-9);
     }
@@ -101,7 +101,8 @@ TEST(WeighedAperture, SeesFromTheCentreOfPerspective) {
   const double centre_mm = CentreOfPerspectiveMm(kWide, Psf::kDisc, 0.5, zf_mm);
   EXPECT_GT(centre_mm, 0.3);
   for (const double z_mm : {100.0, 250.0, 900.0}) {
-    const double seen = z_mm * (1 + weighed.mean_per_landing * DefocusPerAperture(kWide, d1_mm, z_mm));
+    const double seen =
+        z_mm * (1 + weighed.mean_per_landing * DefocusPerAperture(kWide, d1_mm, z_mm));
     EXPECT_NEAR(seen / zf_mm, (z_mm - centre_mm) / (zf_mm - centre_mm), 1e-12);
   }
 }

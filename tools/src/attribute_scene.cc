@@ -106,8 +106,7 @@ class SceneAttributor {
   SceneAttribution Run() {
     model::SceneSimulationOptions by_auto = scene_;
     by_auto.effects.base = model::EffectChoice::Base::kAuto;
-    const EffectSet kept =
-        model::SceneSimulator(by_auto, pixels_, step_.run.threads).effects().on;
+    const EffectSet kept = model::SceneSimulator(by_auto, pixels_, step_.run.threads).effects().on;
 
     scene_.effects = AllInsteadOfAuto(scene_.effects);
     base_.emplace(scene_, pixels_, step_);

@@ -20,8 +20,8 @@ struct ApertureOptics {
 // so that blur is that of T w, not of T. Derived here, to the first order in i:
 //   variance of A per axis  = E[w A_x^2]/E[w]                                    at i = 0,
 //   mean of A               = i E[w A_x^2 (1/(K zf (1 + A^2/zf^2)) - 3/(d1^2 + A^2))]/E[w],
-// E the mean over T; about sigma^2 (1 - 3 sigma^2/d1^2) of a Gaussian and sigma^2 (1 - sigma^2/d1^2)
-// of a disc, and -3 i sigma^2/d1^2. By Gauss's rules, to 1e-6 for sigma below d1/4.
+// E the mean over T; about sigma^2 (1 - 3 sigma^2/d1^2) of a Gaussian and sigma^2 (1 -
+// sigma^2/d1^2) of a disc, and -3 i sigma^2/d1^2. By Gauss's rules, to 1e-6 for sigma below d1/4.
 struct WeighedAperture {
   double variance_ratio = 1;  // of the variance over sigma^2
   // Derivatives of variance_ratio by the logarithm of each.
@@ -42,8 +42,9 @@ SeenBlurRatio SeeBlurRatio(const ThickLens& lens, Psf psf, double blur_ratio,
 
 // The mean of A displaces what is out of focus by c(z) times it, c(z) = K (1/z - 1/zf), in
 // proportion to i: the picture looks as if the rays came through a point in front of the aperture,
-// at this depth, mm: g K/(g K/zf - 1), g the mean per landing. Derived here: the size in the picture
-// goes as 1/(z (1 + c g)), and z (1 + c g) is a straight line in z with its zero there. zf > f1.
+// at this depth, mm: g K/(g K/zf - 1), g the mean per landing. Derived here: the size in the
+// picture goes as 1/(z (1 + c g)), and z (1 + c g) is a straight line in z with its zero there. zf
+// > f1.
 double CentreOfPerspectiveMm(const ThickLens& lens, Psf psf, double blur_ratio,
                              double focus_depth_mm);
 
