@@ -74,11 +74,15 @@ class Measurement {
            model::DirectionSign(task_.sweep.direction) * task_.sweep.frames[frame].reading_mm;
   }
 
+  // From where the image scale has its zero.
+  double FromCentreMm(std::size_t frame) const { return DepthMm(frame) - task_.scale_centre_mm; }
+
   FitFrame PlaceOf(std::size_t frame) const {
     FitFrame place;
     place.reading_mm = task_.sweep.frames[frame].reading_mm;
-    place.scale =
-        task_.law == BlurLaw::kPerspective ? DepthMm(task_.reference) / DepthMm(frame) : 1.0;
+    place.scale = task_.law == BlurLaw::kPerspective
+                      ? FromCentreMm(task_.reference) / FromCentreMm(frame)
+                      : 1.0;
     if (const ScaleSample* sample = Registered(frame)) {
       // A lone edge registers badly along itself; then the readings know the scale better.
       if (std::abs(sample->scale / place.scale - 1) < 0.05) place.scale = sample->scale;

@@ -29,6 +29,7 @@ struct BlurTask {
   bool scale_follows_readings = false;  // the scales obey a law: they may tell readings' errors
   BlurLaw law = BlurLaw::kPerspective;
   model::Estimate offset_mm;
+  double scale_centre_mm = 0;  // depth of the centre of perspective
   double reading_sigma_mm = 0;
   bool reading_sigma_is_known = true;
   double start_focus_depth_mm = 0;

@@ -269,6 +269,7 @@ class Calibrator {
     task.frames = used();
     task.reference = reference_;
     task.scales = scales_;
+    task.scale_centre_mm = result_.scale.centre_mm;
     task.law =
         result_.scale.kind == ScaleKind::kConstant ? BlurLaw::kTelecentric : BlurLaw::kPerspective;
     task.scale_follows_readings = result_.scale.done;

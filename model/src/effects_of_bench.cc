@@ -73,16 +73,33 @@ EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
                                  ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
-// Tilt. Formula: the depth of the target at X beside the axis is off by X tan(tilt). Bound: what
-// that changes of the blur. Enters: the depth of each column of a frame.
+// Tilt. Formula: the target's depth where a chief ray meets it is z0/N, N = 1 + (x p/K) tan(tilt),
+// and what is met lies at x/(N cos(tilt)) and y/N of the picture of a target across the axis.
+// Bound: what the depth changes of the blur, of either sign of the tilt, the displacement, and the
+// light of a lamp at the camera, which goes as N^2. Enters: the depth of each column of a frame.
 EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
                         const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
-  if (!bench || !std::isfinite(place.depth_mm)) return {};
-  const double beside_mm =
-      std::abs(FromAxisPx(optics, place).x()) * place.depth_mm / optics.scale_px();
-  const double shift_mm = beside_mm * std::tan(std::abs(bench->tilt_deg) * kPi / 180);
-  return {shift_mm, StoredChange(optics, place, ChangeByDepth(optics, place, shift_mm, others))};
+  if (!bench || bench->tilt_deg == 0 || !std::isfinite(place.depth_mm)) return {};
+  const double tilt_rad = std::abs(bench->tilt_deg) * kPi / 180;
+  const Eigen::Vector2d from_axis_px = FromAxisPx(optics, place).cwiseAbs();
+  // No target is seen at more than five times the depth of its middle.
+  const double beside = std::min(0.8, from_axis_px.x() / optics.scale_px() * std::tan(tilt_rad));
+  // `place` may lie anywhere between the middle's depth and the column's.
+  const double shift_mm = place.depth_mm * beside / (1 - beside);
+  double displaced_px = 0;
+  for (const double nearness : {1 - beside, 1 + beside}) {
+    displaced_px = std::max(displaced_px,
+                            std::hypot(from_axis_px.x() * (1 / (nearness * std::cos(tilt_rad)) - 1),
+                                       from_axis_px.y() * (1 / nearness - 1)));
+  }
+  const double change = ChangeByDepth(optics, place, shift_mm, others) +
+                        ShiftChange(place, displaced_px, optics.SmoothingBy(others, place));
+  double grey_levels = StoredChange(optics, place, std::min(change, place.bright - place.dark));
+  if (bench->lamp_at_camera && others.Has(Effect::kLampFalloff)) {
+    grey_levels += StoredScaling(optics, place, 1 - std::pow(1 - beside, 2));
+  }
+  return {place.depth_mm * beside, grey_levels};
 }
 
 // Reading error. Formula: a normal error of what is written, not of where the target stands: no

@@ -74,7 +74,8 @@ AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_s
   plan.first_node.resize(static_cast<std::size_t>(axis.count));
   plan.taps.resize(static_cast<std::size_t>(axis.count) * kTaps);
   for (int j = 0; j < axis.count; ++j) {
-    const double periods = axis.start + j * axis.step;
+    const double periods =
+        axis.at.empty() ? axis.start + j * axis.step : axis.at[static_cast<std::size_t>(j)];
     const double position = (periods - std::floor(periods)) * plan.grid_size;
     const int first = static_cast<int>(std::ceil(position - kTaps / 2.0));
     plan.first_node[static_cast<std::size_t>(j)] =

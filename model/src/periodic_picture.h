@@ -10,11 +10,12 @@
 namespace thicklens::model {
 
 // Where a row (or column) of pixel centres lies on a periodic picture, in periods: pixel j at
-// start + j * step.
+// start + j * step, or at at[j] where they are not evenly spaced. What blurs is measured in steps.
 struct AxisSampling {
   double start = 0;
   double step = 0;
   int count = 0;
+  std::vector<double> at = {};  // `count` of them, or none
 };
 
 // What happens to the light between the picture and the stored pixel; lengths in px of the frame.

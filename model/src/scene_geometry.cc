@@ -263,22 +263,22 @@ TextureRequest SceneGeometry::RequestFor(std::size_t index) const {
     request.low_mm = picture.low_px;
     request.high_mm = picture.high_px;
     request.centre_mm = (picture.low_px + picture.high_px) / 2;
-    return request;
-  }
-  request.pixel_mm = layer.plane.depth_mm / scale_px_;
-  request.coarsest_pixel_mm = CoarsestPixelMm(layer.plane);
-  request.low_mm.setConstant(std::numeric_limits<double>::infinity());
-  request.high_mm = -request.low_mm;
-  for (const SceneRay& ray : OutermostRays(kTextureDeviations)) {
-    const Eigen::Vector2d at_mm = ray.PositionMm(HitDepthMm(layer.plane, ray));
-    request.low_mm = request.low_mm.cwiseMin(at_mm);
-    request.high_mm = request.high_mm.cwiseMax(at_mm);
-  }
-  request.centre_mm = (request.low_mm + request.high_mm) / 2;
-  if (const auto box = OutlineBox(index)) {
-    request.centre_mm = (box->first + box->second) / 2;
-    request.low_mm = request.low_mm.cwiseMax(box->first);
-    request.high_mm = request.high_mm.cwiseMin(box->second);
+  } else {
+    request.pixel_mm = layer.plane.depth_mm / scale_px_;
+    request.coarsest_pixel_mm = CoarsestPixelMm(layer.plane);
+    request.low_mm.setConstant(std::numeric_limits<double>::infinity());
+    request.high_mm = -request.low_mm;
+    for (const SceneRay& ray : OutermostRays(kTextureDeviations)) {
+      const Eigen::Vector2d at_mm = ray.PositionMm(HitDepthMm(layer.plane, ray));
+      request.low_mm = request.low_mm.cwiseMin(at_mm);
+      request.high_mm = request.high_mm.cwiseMax(at_mm);
+    }
+    request.centre_mm = (request.low_mm + request.high_mm) / 2;
+    if (const auto box = OutlineBox(index)) {
+      request.centre_mm = (box->first + box->second) / 2;
+      request.low_mm = request.low_mm.cwiseMax(box->first);
+      request.high_mm = request.high_mm.cwiseMin(box->second);
+    }
   }
   const Eigen::Vector2d middle_mm = (request.low_mm + request.high_mm) / 2;
   const Eigen::Vector2d half_mm =

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "aperture_irradiance.h"
 #include "edge_spread.h"
@@ -21,6 +23,8 @@ namespace thicklens::model {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+// Of a tilted target whose field is still drawn: what is five times as far away as its middle.
+constexpr double kLeastNearness = 0.2;
 
 bool IsEdge(TargetKind kind) {
   return kind == TargetKind::kPrintedEdge || kind == TargetKind::kKnifeEdge;
@@ -34,8 +38,6 @@ struct FrameState {
   Eigen::Vector2d drift_mm{0, 0};  // of the target, X right, Y down
   double pixel_mm = 0;             // one px on the target: p/|m|
   double defocus_sigma_px = 0;     // kappa r_defocus
-  // The same of what is seen: fall-off weighs the rays.
-  double seen_pixel_mm = 0, seen_sigma_px = 0;
 };
 
 }  // namespace
@@ -71,7 +73,11 @@ struct SweepSimulator::Impl {
     const double last_depth_mm =
         options.first_depth_mm + (options.frame_count - 1) * options.step_mm;
     const auto [near, far] = std::minmax(options.first_depth_mm, last_depth_mm);
-    decision = DecideEffects(choice, Conditions(), PlacesBetween(options.camera, near, far, false),
+    // The sides of a tilted target lie nearer and farther than its middle.
+    const auto [least, most] = Nearnesses(options.target.tilt_deg * kPi / 180);
+    decision = DecideEffects(choice, Conditions(),
+                             PlacesBetween(options.camera, near / std::max(1.0, most),
+                                           far / std::min(1.0, least), false),
                              SweepEffects());
     stored_camera = options.camera;
     if (!On(Effect::kTransferCurve)) stored_camera.sensor.transfer = TransferCurve::Linear();
@@ -79,6 +85,15 @@ struct SweepSimulator::Impl {
   }
 
   bool On(Effect effect) const { return decision.on.Has(effect); }
+
+  // Of the picture's sides (TiltedTarget), the lesser first.
+  std::pair<double, double> Nearnesses(double tilt_rad) const {
+    const Sensor& sensor = options.camera.sensor;
+    const TiltedTarget target(tilt_rad, 1, options.camera.focal_scale_px());
+    const double axis_px = sensor.principal_point_px.x();
+    return std::minmax(
+        {target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px)});
+  }
 
   // p/|m|, mm on the target, of one px at a depth.
   double PixelMm(double depth_mm, const EffectSet& on) const {
@@ -107,6 +122,11 @@ struct SweepSimulator::Impl {
     const double scale_px = options.camera.focal_scale_px();
     return {on.Has(Effect::kTilt) ? options.target.tilt_deg * kPi / 180 : 0, depth_mm, scale_px,
             pixel_mm * scale_px / depth_mm};
+  }
+  // The same as seen by the columns about one, px from the axis.
+  TiltedTarget SeenTarget(const FrameState& frame, double x_px) const {
+    const double depth_mm = TargetOf(frame.depth_mm, frame.pixel_mm, decision.on).DepthMm(x_px);
+    return TargetOf(frame.depth_mm, frame.pixel_mm * SeenScale(depth_mm), decision.on);
   }
   bool IsTilted() const { return On(Effect::kTilt) && options.target.tilt_deg != 0; }
 
@@ -138,8 +158,6 @@ struct SweepSimulator::Impl {
       frame.drift_mm.y() = drift_sigma_mm * drift.Normal();
       frame.pixel_mm = PixelMm(frame.depth_mm, on);
       if (on.Has(Effect::kDefocus)) frame.defocus_sigma_px = DefocusPx(frame.depth_mm);
-      frame.seen_pixel_mm = frame.pixel_mm;
-      frame.seen_sigma_px = frame.defocus_sigma_px;
       states.push_back(frame);
     }
     return states;
@@ -158,12 +176,13 @@ struct SweepSimulator::Impl {
          camera.focus_depth_mm(), distance_mm},
         scale_mm);
     seen_share = std::sqrt(weighed.variance_ratio);
-    for (FrameState& frame : frames) {
-      frame.seen_sigma_px *= seen_share;
-      frame.seen_pixel_mm *=
-          1 + weighed.mean_per_landing *
-                  DefocusPerAperture(camera.lens, camera.image_distance_mm(), frame.depth_mm);
-    }
+    mean_per_landing = weighed.mean_per_landing;
+  }
+  // How much larger what a pixel sees at a depth lies, for the mean of the rays that bring it.
+  double SeenScale(double depth_mm) const {
+    const Camera& camera = options.camera;
+    return 1 +
+           mean_per_landing * DefocusPerAperture(camera.lens, camera.image_distance_mm(), depth_mm);
   }
 
   void MakeTruth() {
@@ -178,7 +197,8 @@ struct SweepSimulator::Impl {
     if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
-                              frames[i].reading_mm, std::hypot(floor_px, frames[i].seen_sigma_px)});
+                              frames[i].reading_mm,
+                              std::hypot(floor_px, seen_share * frames[i].defocus_sigma_px)});
     }
   }
 
@@ -248,7 +268,11 @@ struct SweepSimulator::Impl {
                                         std::min(sensor.width_px, sensor.height_px) / 4.0) +
                                1;
       const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, all);
-      for (const double x_px : {-0.5 - margin_px, sensor.width_px - 0.5 + margin_px}) {
+      for (double x_px : {-0.5 - margin_px, sensor.width_px - 0.5 + margin_px}) {
+        // Beyond a side that is that far away the target repeats itself.
+        if (target.Nearness(x_px - axis_px.x()) < kLeastNearness) {
+          x_px = std::clamp(x_px, -0.5, sensor.width_px - 0.5);
+        }
         nearest_pixel_mm = std::min({nearest_pixel_mm, target.PixelAcrossMm(x_px - axis_px.x()),
                                      target.PixelDownMm(x_px - axis_px.x())});
         for (const double y_px : {-0.5 - margin_px, sensor.height_px - 0.5 + margin_px}) {
@@ -279,61 +303,87 @@ struct SweepSimulator::Impl {
     return picture;
   }
 
-  // Without tilt one strip is the whole frame.
-  std::vector<ColumnStrip> Strips(const FrameState& frame) const {
-    const Sensor& sensor = options.camera.sensor;
-    if (!IsTilted()) return {{0, sensor.width_px}};
-    const double tangent = std::tan(std::abs(options.target.tilt_deg) * kPi / 180);
-    const double scale_px = options.camera.focal_scale_px();
-    const double far_px = std::max(sensor.principal_point_px.y(),
-                                   sensor.height_px - 1 - sensor.principal_point_px.y());
-    // d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|.
-    return StripsOf(sensor.width_px,
-                    options.camera.blur_ratio() * options.camera.lens.aperture_radius_mm * tangent /
-                        frame.depth_mm,
-                    far_px * tangent / scale_px);
+  // The most by which blur, or the place of what is shown in the outermost rows, changes from one
+  // column to the next: d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|; a row
+  // y shows Y = (y p/K) z, and dz/z = -tan(tilt)/(N K/p) dx.
+  double ChangePerColumnPx(const FrameState& frame) const {
+    if (!IsTilted()) return 0;
+    const Camera& camera = options.camera;
+    const double tilt_rad = std::abs(options.target.tilt_deg) * kPi / 180;
+    const double far_px =
+        std::max(camera.sensor.principal_point_px.y(),
+                 camera.sensor.height_px - 1 - camera.sensor.principal_point_px.y());
+    const double least = Nearnesses(options.target.tilt_deg * kPi / 180).first;
+    return std::tan(tilt_rad) *
+           std::max(camera.blur_ratio() * camera.lens.aperture_radius_mm / frame.depth_mm,
+                    std::max(far_px, 1.0) / (camera.focal_scale_px() * least));
   }
 
-  // Sigma of defocus and light of a strip that lies at a depth.
-  double StripDefocusPx(const FrameState& frame, double depth_mm) const {
-    return IsTilted() && On(Effect::kDefocus) ? seen_share * DefocusPx(depth_mm)
-                                              : frame.seen_sigma_px;
+  // Sigma of defocus and light of a column that lies at a depth.
+  double SeenDefocusPx(const FrameState& frame, double depth_mm) const {
+    return seen_share *
+           (IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm) : frame.defocus_sigma_px);
   }
-  double StripLamp(const FrameState& frame, double depth_mm) const {
+  double LampAt(const FrameState& frame, double depth_mm) const {
     const bool falls = options.lamp_falloff && On(Effect::kLampFalloff);
     return frame.lamp * (falls ? std::pow(frame.depth_mm / depth_mm, 2) : 1);
   }
 
-  LinearPicture RenderTile(const FrameState& frame) const {
+  // Columns `first` .. `last` of a frame with the blur and the scale of one of them. Pixel (x, y)
+  // looks at what its chief ray meets: the picture shows the target upright.
+  cv::Mat TileColumns(const FrameState& frame, int first, int last, double node_px) const {
     const Sensor& sensor = options.camera.sensor;
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
-    const TiltedTarget target = TargetOf(frame.depth_mm, frame.seen_pixel_mm, decision.on);
     const Eigen::Vector2d beside_mm = -frame.drift_mm - tile_frame.origin_mm;
+    const TiltedTarget target = SeenTarget(frame, node_px - axis_px.x());
+    const double across_mm = target.PixelAcrossMm(node_px - axis_px.x());
+    const double down_mm = target.PixelDownMm(node_px - axis_px.x());
+    const auto periods_at = [&](const TiltedTarget& seen, double column_px) {
+      return (seen.At({column_px - axis_px.x(), 0}).x() + beside_mm.x()) / tile_frame.width_mm;
+    };
+    AxisSampling x{periods_at(target, first), across_mm / tile_frame.width_mm, last - first + 1};
+    if (IsTilted()) {
+      for (int column = first; column <= last; ++column) {
+        x.at.push_back(periods_at(SeenTarget(frame, column - axis_px.x()), column));
+      }
+    }
+    const AxisSampling y{(-axis_px.y() * down_mm + beside_mm.y()) / tile_frame.height_mm,
+                         down_mm / tile_frame.height_mm, sensor.height_px};
+    const double defocus_px = SeenDefocusPx(frame, target.DepthMm(node_px - axis_px.x()));
+    return tile_texture->Evaluate(x, y,
+                                  {floor_px, stored_camera.psf, defocus_px, On(Effect::kPixelBox)});
+  }
+
+  LinearPicture RenderTile(const FrameState& frame) const {
+    const Sensor& sensor = options.camera.sensor;
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
     picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
                           static_cast<std::size_t>(sensor.height_px));
-    for (const ColumnStrip& strip : Strips(frame)) {
-      // Pixel (x, y) looks at what its chief ray meets: the picture shows the target upright. The
-      // columns of a strip lie as in its middle.
-      const double middle_px = strip.middle_px() - axis_px.x();
-      const double across_mm = target.PixelAcrossMm(middle_px);
-      const double down_mm = target.PixelDownMm(middle_px);
-      const double first_mm = target.At({middle_px, 0}).x() -
-                              (strip.middle_px() - strip.first) * across_mm + beside_mm.x();
-      const AxisSampling x{first_mm / tile_frame.width_mm, across_mm / tile_frame.width_mm,
-                           strip.count};
-      const AxisSampling y{(-axis_px.y() * down_mm + beside_mm.y()) / tile_frame.height_mm,
-                           down_mm / tile_frame.height_mm, sensor.height_px};
-      const double depth_mm = target.DepthMm(middle_px);
-      const cv::Mat light = tile_texture->Evaluate(
-          x, y,
-          {floor_px, stored_camera.psf, StripDefocusPx(frame, depth_mm), On(Effect::kPixelBox)});
-      const double lamp = StripLamp(frame, depth_mm);
+    const auto add = [&](const cv::Mat& light, int first, const auto& factor) {
       for (int i = 0; i < light.rows; ++i) {
         const double* row = light.ptr<double>(i);
-        float* to = picture.values.data() + i * sensor.width_px + strip.first;
-        for (int j = 0; j < light.cols; ++j) to[j] = static_cast<float>(lamp * row[j]);
+        float* to =
+            picture.values.data() + static_cast<std::ptrdiff_t>(i) * sensor.width_px + first;
+        for (int j = 0; j < light.cols; ++j)
+          to[j] += static_cast<float>(factor(first + j) * row[j]);
       }
+    };
+    if (!IsTilted()) {
+      add(TileColumns(frame, 0, sensor.width_px - 1, sensor.principal_point_px.x()), 0,
+          [&](int) { return frame.lamp; });
+      return picture;
+    }
+    const std::vector<int> nodes = NodesOf(sensor.width_px, ChangePerColumnPx(frame));
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      const int node = nodes[n];
+      const int before = n > 0 ? nodes[n - 1] : node - 1;
+      const int after = n + 1 < nodes.size() ? nodes[n + 1] : node + 1;
+      add(TileColumns(frame, before + 1, after - 1, node), before + 1, [&](int column) {
+        const double share = column < node ? static_cast<double>(column - before) / (node - before)
+                                           : static_cast<double>(after - column) / (after - node);
+        const double x_px = column - sensor.principal_point_px.x();
+        return share * LampAt(frame, SeenTarget(frame, x_px).DepthMm(x_px));
+      });
     }
     return picture;
   }
@@ -345,7 +395,9 @@ struct SweepSimulator::Impl {
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
     picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
                           static_cast<std::size_t>(sensor.height_px));
-    for (const ColumnStrip& strip : Strips(frame)) RenderEdge(frame, strip, &picture);
+    for (const ColumnStrip& strip : StripsOf(sensor.width_px, ChangePerColumnPx(frame))) {
+      RenderEdge(frame, strip, &picture);
+    }
     return picture;
   }
 
@@ -354,8 +406,8 @@ struct SweepSimulator::Impl {
   void RenderEdge(const FrameState& frame, const ColumnStrip& strip, LinearPicture* picture) const {
     const Sensor& sensor = options.camera.sensor;
     const TargetOptions& options_of = options.target;
-    const TiltedTarget target = TargetOf(frame.depth_mm, frame.seen_pixel_mm, decision.on);
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const TiltedTarget target = SeenTarget(frame, strip.middle_px() - axis_px.x());
     const Eigen::Vector2d on_edge_mm = TargetCentreMm(decision.on) + frame.drift_mm;
     const double angle_rad = options_of.edge_angle_deg * kPi / 180;
     const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad));
@@ -375,14 +427,14 @@ struct SweepSimulator::Impl {
     const double pixel_mm = gradient.norm();
 
     const double depth_mm = target.DepthMm(middle_px.x());
-    const double defocus_px = StripDefocusPx(frame, depth_mm);
+    const double defocus_px = SeenDefocusPx(frame, depth_mm);
     const double ink_px =
         options_of.kind == TargetKind::kPrintedEdge ? options_of.ink_sigma_mm / pixel_mm : 0;
     const bool disc = stored_camera.psf == Psf::kDisc;
     const EdgeSpread edge(std::atan2(gradient.y(), gradient.x()),
                           std::hypot(std::hypot(floor_px, ink_px), disc ? 0 : defocus_px),
                           disc ? 2 * defocus_px : 0, On(Effect::kPixelBox));
-    const double lamp = StripLamp(frame, depth_mm);
+    const double lamp = LampAt(frame, depth_mm);
     const double dark = lamp * (1 - options_of.contrast);
     const double step = 2 * lamp * options_of.contrast;
     for (int y = 0; y < sensor.height_px; ++y) {
@@ -398,7 +450,8 @@ struct SweepSimulator::Impl {
   EffectDecision decision;
   Camera stored_camera;
   double floor_px = 0;
-  double seen_share = 1;              // of sigma, that fall-off leaves
+  // What fall-off makes of the aperture: the share of sigma that is left, and where its middle is.
+  double seen_share = 1, mean_per_landing = 0;
   std::vector<float> light_of_pixel;  // none without fall-off
   std::vector<FrameState> frames;
   SweepTruth truth;

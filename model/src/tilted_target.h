@@ -51,9 +51,14 @@ struct ColumnStrip {
   double middle_px() const { return first + (count - 1) / 2.0; }
 };
 
-// As wide as may be where a column's blur changes by `blur_px_per_px` from one to the next, and its
-// scale moves what it shows at its ends by `shift_px_per_px`: within .01 px of each in a strip.
-std::vector<ColumnStrip> StripsOf(int width_px, double blur_px_per_px, double shift_px_per_px);
+// As wide as may be where blur, and the place of what the ends of a column show, change by up to
+// `change_px_per_px` from one column to the next: within .01 px in a strip.
+std::vector<ColumnStrip> StripsOf(int width_px, double change_px_per_px);
+
+// Columns, first and last among them, between which a picture of each column's own blur and scale
+// is linear: of two waves of half a cycle per px that are d px apart the mean is off by (pi d)^2/8,
+// as much as by a displacement of (pi/8) d^2 = .01 px for d = .16 px.
+std::vector<int> NodesOf(int width_px, double change_px_per_px);
 
 }  // namespace thicklens::model
 

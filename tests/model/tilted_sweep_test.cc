@@ -77,7 +77,7 @@ TEST(TiltedTargetTest, IsWhereChiefRaysMeetThePlane) {
 
 TEST(TiltedTargetTest, StripsKeepWithinWhatIsAllowed) {
   for (const double steepness : {0.0, 1e-4, 0.003, 0.5}) {
-    const std::vector<ColumnStrip> strips = StripsOf(150, steepness, steepness / 2);
+    const std::vector<ColumnStrip> strips = StripsOf(150, steepness);
     int columns = 0;
     for (const ColumnStrip& strip : strips) {
       EXPECT_EQ(strip.first, columns);
@@ -166,6 +166,36 @@ TEST(TiltedSweepTest, TheLampIsNearerToTheNearSide) {
                 options.light_level * std::pow(kFocusMm / target.DepthMm(x - 79.5), 2),
                 2e-3 * options.light_level)
         << x;
+  }
+}
+
+// What is told of each effect's impact holds of every frame, whatever the tilt.
+TEST(TiltedSweepTest, EffectsKeepToTheirBounds) {
+  for (const double tilt_deg : {0.0, 5.0, -30.0}) {
+    for (const double first_mm : {290.0, 330.0}) {
+      SweepSimulationOptions options = Sweep(TargetKind::kDeadLeaves, tilt_deg);
+      options.first_depth_mm = first_mm;
+      options.camera.psf = Psf::kDisc;
+      const EffectSet all = {Effect::kDefocus,     Effect::kApertureShape, Effect::kFalloff,
+                             Effect::kPixelBox,    Effect::kLensFloor,     Effect::kMagnification,
+                             Effect::kLampFalloff, Effect::kTilt};
+      // Without blur the geometry is all that is left.
+      for (const EffectSet& given : {all, all.Without({Effect::kDefocus, Effect::kApertureShape}),
+                                     EffectSet{Effect::kMagnification, Effect::kTilt}}) {
+        options.effects.given = given;
+        const SweepSimulator with(options, {});
+        for (const EffectFinding& finding : with.effects().findings) {
+          if (!given.Has(finding.effect)) continue;
+          SCOPED_TRACE(::testing::Message() << EffectName(finding.effect) << ", tilt " << tilt_deg
+                                            << ", " << first_mm << " mm, " << JoinedNames(given));
+          SweepSimulationOptions fewer = options;
+          fewer.effects.given.Remove(finding.effect);
+          EXPECT_LE(
+              255 * Largest(SweepSimulator(fewer, {}).RenderNoiseless(0), with.RenderNoiseless(0)),
+              finding.impact.grey_levels + 0.01);
+        }
+      }
+    }
   }
 }
 

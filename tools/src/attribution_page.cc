@@ -13,7 +13,9 @@
 #include "page_pictures.h"
 #include "page_style.h"
 #include "printable_text.h"
+#include "simulated_sweep.h"
 #include "svg_plot.h"
+#include "thicklens/error.h"
 
 namespace thicklens::tools {
 namespace {
@@ -189,6 +191,19 @@ AttributionRun AttributionRunWith(const CommonOptions& common, ProgressLine* pro
             ThrowIfInterrupted();
             progress->Show(done, total);
           }};
+}
+
+SweepAttribution AttributeSweepOf(const std::string& path,
+                                  const model::SweepSimulationOptions& sweep, bool unknown_offset,
+                                  const AttributionRun& run) {
+  const model::LinearPicture target_picture = ReadTargetPicture(sweep.target);
+  try {
+    return AttributeSweep(sweep, target_picture, unknown_offset, run);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(PrintableUtf8(path) + ": " + error.what());
+  }
 }
 
 void WriteAttribution(const Attribution& attribution, const std::string& name,

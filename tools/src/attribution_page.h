@@ -17,6 +17,11 @@ std::string AttributionPage(const Attribution& attribution, const std::string& n
 // A run that shows its progress and ends when the person asks for it.
 AttributionRun AttributionRunWith(const CommonOptions& common, ProgressLine* progress);
 
+// AttributeSweep of a simulation that was read from a file, which messages name.
+SweepAttribution AttributeSweepOf(const std::string& path,
+                                  const model::SweepSimulationOptions& sweep, bool unknown_offset,
+                                  const AttributionRun& run);
+
 // The page and the table for programs in a folder; `name` is what was simulated.
 inline constexpr char kAttributionPage[] = "attribution.html";
 inline constexpr char kAttributionTable[] = "attribution.csv";

@@ -26,6 +26,7 @@ std::string Amount(double value) {
 }
 
 std::string Signed(double value, int decimals) {
+  if (!std::isfinite(value)) return kNone;
   const std::string text = fmt::format("{:+.{}f}", value, decimals);
   return text.find_first_of("123456789") == std::string::npos ? "0" : text;
 }

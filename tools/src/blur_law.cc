@@ -68,7 +68,7 @@ BlurLaw BlurLaw::OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth
     product += defocus_px2 * (frame.blur_sigma_px * frame.blur_sigma_px - law.floor_squared_px2_);
     square += defocus_px2 * defocus_px2;
   }
-  if (product > 0) law.seen_.squared = product / square;
+  if (square > 0) law.seen_.squared = std::max(0.0, product / square);
   return law;
 }
 

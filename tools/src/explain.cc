@@ -110,12 +110,21 @@ EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
   model::SceneSimulationOptions sensor;
   sensor.full_well_electrons = options.full_well_electrons;
   sensor.read_noise_electrons = options.read_noise_electrons;
-  sensor.bits = options.bits;
+  sensor.bits = options.bits <= 8 ? 8 : 16;  // what simulations store; the time is the same
   ProgressLine progress("measuring costs", options.common.quiet);
-  return MeasureEffectCosts(camera, range, sensor, decision, [&progress](int done, int total) {
-    ThrowIfInterrupted();
-    progress.Show(done, total);
-  });
+  try {
+    return MeasureEffectCosts(camera, range, sensor, decision, [&progress](int done, int total) {
+      ThrowIfInterrupted();
+      progress.Show(done, total);
+    });
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(
+        fmt::format("--costs: a picture of depths from {:g} to {:g} mm cannot be simulated: "
+                    "{}",
+                    range.near_mm, range.far_mm, error.what()));
+  }
 }
 
 void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {

@@ -5,6 +5,12 @@
 #include <limits>
 
 namespace thicklens::tools {
+namespace {
+
+// Rms of the slopes, of full scale per px, of what is the rounding of a flat picture.
+constexpr double kFlat = 1e-4;
+
+}  // namespace
 
 double PictureChangeMeter::Add(const estimator::StoredValues& reference,
                                const estimator::StoredValues& other) {
@@ -49,9 +55,9 @@ PictureChange PictureChangeMeter::Result() const {
   change.rms_grey_levels = 255 * std::sqrt(mean_square);
   change.largest_grey_levels = 255 * largest_;
   change.psnr_db = -10 * std::log10(mean_square);
-  change.as_shift_px = slope_squares_ > 0
-                           ? std::sqrt(mean_square * static_cast<double>(slopes_) / slope_squares_)
-                           : std::numeric_limits<double>::quiet_NaN();
+  const double slope = slopes_ > 0 ? std::sqrt(slope_squares_ / static_cast<double>(slopes_)) : 0;
+  change.as_shift_px =
+      slope > kFlat ? std::sqrt(mean_square) / slope : std::numeric_limits<double>::quiet_NaN();
   return change;
 }
 

@@ -105,8 +105,8 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   Attribution attribution;
   if (options.attribute) {
     ProgressLine progress("attributing", options.common.quiet);
-    attribution.sweep = AttributeSweep(simulation, target_picture, options.unknown_offset,
-                                       AttributionRunWith(options.common, &progress));
+    attribution.sweep = AttributeSweepOf(options.config_path, simulation, options.unknown_offset,
+                                         AttributionRunWith(options.common, &progress));
     WriteAttribution(attribution, options.config_path, &folder);
   }
   ThrowIfInterrupted();
@@ -153,7 +153,10 @@ void AddSimulateCommand(CLI::App* program, CommandAction* action) {
                     "each changes: a table, attribution.csv and the page attribution.html");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
-    *action = [options] { RunCommand(options->common, [&] { return SimulateSweep(*options); }); };
+    *action = [options] {
+      RequireDistinctFiles({options->common.json_path}, {options->config_path});
+      RunCommand(options->common, [&] { return SimulateSweep(*options); });
+    };
   });
   AddSimulateSceneCommands(simulate, action);
 }

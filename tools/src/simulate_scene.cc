@@ -129,15 +129,14 @@ Attribution Attribute(const SceneOptions& options, const model::SceneSimulationO
     sweep = model::ReadSweepSimulation(options.sweep_path);
     if (options.seed) sweep->seed = static_cast<std::uint64_t>(*options.seed);
   }
-  {
-    ProgressLine progress("attributing", options.common.quiet);
-    attribution.scene =
-        AttributeScene(scene, pixels, AttributionRunWith(options.common, &progress));
+  // The sweep first: it may have no calibration to compare with.
+  if (sweep) {
+    ProgressLine progress("attributing the sweep", options.common.quiet);
+    attribution.sweep = AttributeSweepOf(options.sweep_path, *sweep, false,
+                                         AttributionRunWith(options.common, &progress));
   }
-  if (!sweep) return attribution;
-  ProgressLine progress("attributing the sweep", options.common.quiet);
-  attribution.sweep = AttributeSweep(*sweep, ReadTargetPicture(sweep->target), false,
-                                     AttributionRunWith(options.common, &progress));
+  ProgressLine progress("attributing", options.common.quiet);
+  attribution.scene = AttributeScene(scene, pixels, AttributionRunWith(options.common, &progress));
   return attribution;
 }
 
@@ -264,6 +263,8 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
       if (!picture->sweep_path.empty() && !picture->attribute) {
         throw UsageError("--sweep belongs to --attribute");
       }
+      RequireDistinctFiles({picture->common.json_path},
+                           {picture->config_path, picture->sweep_path});
       RunCommand(picture->common, [&] { return SimulatePicture(*picture); });
     };
   });
@@ -279,7 +280,10 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
       ->capture_default_str()
       ->type_name("NAME");
   command->callback([views, action] {
-    *action = [views] { RunCommand(views->common, [&] { return SimulateLightField(*views); }); };
+    *action = [views] {
+      RequireDistinctFiles({views->common.json_path}, {views->config_path});
+      RunCommand(views->common, [&] { return SimulateLightField(*views); });
+    };
   });
 }
 

@@ -66,8 +66,8 @@ struct PlaneOptions {
 
 // A surface of any shape in place of a plane: 1/z = W(x') at the position x' of the picture at
 // which the chief ray shows it, W from a depth map of the scene's size, bilinear between pixel
-// centres and beyond the outermost as there. Its texture is painted on x': a picture, as wide as
-// the scene's if nothing else is said, has its pixels where the map has them. Across an edge of
+// centres and beyond the outermost as there. Its texture is painted on x': a picture of the
+// map's shape, if nothing else is said, has its pixels where the map has them. Across an edge of
 // depth the surface is stretched from one pixel to the next like a sheet of rubber, with what is
 // painted between them.
 struct DepthMapOptions {

@@ -78,8 +78,8 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path);
 // transfer functions of defocus, lens floor and pixel box, at the image scale of its chief rays;
 // each of its effects can be left out.
 // Textures are periodic and band-limited by definition (what a frame sees beyond their tile is
-// their repetition); edges are in closed form. A tilted target is shown in strips of columns, each
-// at its own depth, which are within .01 px of blur and place of what each column has.
+// their repetition); edges are in closed form. Every column of a
+// tilted target is at its own depth, within about .01 px of its blur and place.
 // `target_picture` is linear light, for kPicture
 // alone.
 class SweepSimulator {
