@@ -22,13 +22,20 @@ enum Parameter {
   kVariance,
   kDark,
   kRise = kDark + 3,
-  kParameters = kRise + 3
+  kDarkBowl = kRise + 3,
+  kRiseBowl,
+  kParameters
 };
 
 // The grey of the pixels of a strip (derived here):
-//   I = D + C E(d), d = x cos a + y sin a - shift - sag (t^2/T^2 - 1/3),
-// D (dark) and C (bright less dark) planes in x and y, t along the edge, T half its length, E the
-// profile for the direction a and the blur's variance.
+//   I = D + C E(d), d = x cos a + y sin a - shift - sag b, b = t^2/T^2 - 1/3,
+// t along the edge, T half its length, E the profile for the direction a and the blur's variance;
+// D (dark) and C (bright less dark) each a plane in x and y and, of an edge that is long in its
+// frame, a multiple of b + d^2/T^2: a lens that darkens towards its corners makes both fall off
+// with the square of the distance from the axis. Without that, the fit bends the edge to follow the
+// levels, and takes the bow for blur: a part of sigma^2 that grows with the fourth power of T. An
+// edge shorter than the strip is wide would not tell d^2 from blur, and its levels bend along it
+// alone.
 class EdgeModel : public StepModel<kParameters> {
  public:
   using StepModel::StepModel;
@@ -46,9 +53,9 @@ class EdgeModel : public StepModel<kParameters> {
       const double bow = Bow(along);
       const EdgeProfile::Value e = profile.At(x * c + y * s - p[kShift] - p[kSag] * bow);
       const double u = x * PlaneScale(), v = y * PlaneScale();
-      const double rise = p[kRise] + p[kRise + 1] * u + p[kRise + 2] * v;
-      residuals[i] = p[kDark] + p[kDark + 1] * u + p[kDark + 2] * v + rise * e.level -
-                     pixels_.grey[pixel] / unit_;
+      const double bowl = Bowl(bow, x * c + y * s);
+      const double rise = Rise(p, u, v, bowl);
+      residuals[i] = Dark(p, u, v, bowl) + rise * e.level - pixels_.grey[pixel] / unit_;
       if (jacobian == nullptr) continue;
       j(i, kShift) = -rise * e.slope;
       j(i, kTurn) = rise * e.slope * along;
@@ -60,26 +67,39 @@ class EdgeModel : public StepModel<kParameters> {
       j(i, kRise) = e.level;
       j(i, kRise + 1) = e.level * u;
       j(i, kRise + 2) = e.level * v;
+      j(i, kDarkBowl) = bowl;
+      j(i, kRiseBowl) = e.level * bowl;
     }
     return true;
   }
 
-  // Distance from the edge, px, and level between its planes, of one pixel.
+  // Distance from the edge, px, and level between dark and bright, of one pixel.
   Eigen::Vector2d Normalised(const double* p, std::size_t pixel) const {
     const double angle = strip_.normal_rad + p[kTurn];
     const double c = std::cos(angle), s = std::sin(angle);
     const double x = pixels_.x_px[pixel], y = pixels_.y_px[pixel];
     const double u = x * PlaneScale(), v = y * PlaneScale();
-    const double rise = p[kRise] + p[kRise + 1] * u + p[kRise + 2] * v;
-    const double dark = p[kDark] + p[kDark + 1] * u + p[kDark + 2] * v;
-    return {x * c + y * s - p[kShift] - p[kSag] * Bow(y * c - x * s),
-            (pixels_.grey[pixel] / unit_ - dark) / rise};
+    const double bow = Bow(y * c - x * s), bowl = Bowl(bow, x * c + y * s);
+    return {x * c + y * s - p[kShift] - p[kSag] * bow,
+            (pixels_.grey[pixel] / unit_ - Dark(p, u, v, bowl)) / Rise(p, u, v, bowl)};
   }
 
  private:
   double Bow(double along) const {
     const double t = along / strip_.half_length_px;
     return t * t - 1.0 / 3;
+  }
+  double Bowl(double bow, double across) const {
+    if (!strip_.is_long) return 0;
+    if (strip_.half_length_px < strip_.half_width_px) return bow;
+    const double d = across / strip_.half_length_px;
+    return bow + d * d;
+  }
+  static double Dark(const double* p, double u, double v, double bowl) {
+    return p[kDark] + p[kDark + 1] * u + p[kDark + 2] * v + p[kDarkBowl] * bowl;
+  }
+  static double Rise(const double* p, double u, double v, double bowl) {
+    return p[kRise] + p[kRise + 1] * u + p[kRise + 2] * v + p[kRiseBowl] * bowl;
   }
   double PlaneScale() const { return 1 / std::max(strip_.half_width_px, strip_.half_length_px); }
 };
@@ -119,13 +139,15 @@ class EdgeFit : StepSearch<EdgeModel> {
   }
 
   bool Gather(double half_width_px, int most) {
-    // The shift and the turn found so far become the new middle line; the planes are linear and
+    // The shift and the turn found so far become the new middle line; the levels are linear and
     // need no start.
     const double angle = feature_.angle_rad + parameters_[kTurn];
     feature_.centre_px += parameters_[kShift] * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     feature_.angle_rad = angle;
     parameters_[kShift] = parameters_[kTurn] = 0;
     strip_ = {feature_.centre_px, angle, half_width_px, feature_.half_length_px};
+    // Shorter, the bow is a sixteenth of what it can be, and what bends may be a texture's.
+    strip_.is_long = 4 * feature_.half_length_px >= std::min(grey_.cols, grey_.rows);
     pixels_ = GatherPixels(grey_, strip_, most);
     return pixels_.size() >= kFewestPixels && pixels_.coverage > 0.5 && StartLevels();
   }
@@ -141,7 +163,7 @@ class EdgeFit : StepSearch<EdgeModel> {
     const double dark = (*means)[0], rise = (*means)[1] - dark;
     if (!(rise > 0)) return false;
     unit_ = rise / 200;
-    parameters_.segment<6>(kDark).setZero();
+    parameters_.segment<kParameters - kDark>(kDark).setZero();
     parameters_[kDark] = dark / unit_;
     parameters_[kRise] = rise / unit_;
     return true;
@@ -165,7 +187,8 @@ class EdgeFit : StepSearch<EdgeModel> {
   }
 
   std::optional<EdgeSpreadFit> Result(bool want_profile) const {
-    const Ending end = AtTheEnd();
+    Ending end = AtTheEnd();
+    if (!strip_.is_long) end.jacobian.conservativeResize(Eigen::NoChange, kDarkBowl);
     const EdgeModel model = ModelOfPixels();
     const EdgeProfile profile(psf_, parameters_[kVariance], floor_px_,
                               strip_.normal_rad + parameters_[kTurn]);

@@ -17,6 +17,7 @@ struct Strip {
   // Pixels further than this from both middle lines are left out (the inside of a corner's
   // squares).
   double arm_px = std::numeric_limits<double>::infinity();
+  bool is_long = false;  // an edge of at least half the frame's shorter side
 };
 
 // The pixels of a frame in a strip, positions relative to its centre.

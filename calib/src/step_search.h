@@ -19,8 +19,8 @@ namespace thicklens::calib {
 
 // What the fits of an edge and of a corner have in common: the pixels they gather, the model they
 // make of them and how they search for its parameters. Both describe the grey between two levels
-// that are planes in x and y, in units of the contrast's 200th part, so that the solver's absolute
-// tolerances mean the same for every frame.
+// that change smoothly over the strip, in units of the contrast's 200th part, so that the solver's
+// absolute tolerances mean the same for every frame.
 
 // What a model of the pixels in a strip needs to know. Derived: the residuals and their Jacobian,
 // as ceres::TinySolver asks for them.
@@ -134,7 +134,8 @@ class StepSearch {
   };
   std::optional<Judgement> Judge(const Ending& end, const std::vector<double>& bright,
                                  double contrast) const {
-    const FitQuality quality = JudgeFit(pixels_, end.residual, bright, kCount);
+    const FitQuality quality =
+        JudgeFit(pixels_, end.residual, bright, static_cast<int>(end.jacobian.cols()));
     if (!IsStep(quality, contrast)) return std::nullopt;
     Eigen::MatrixXd covariance = FitCovariance(end.jacobian, end.residual, quality.clumping);
     if (covariance.size() == 0) return std::nullopt;

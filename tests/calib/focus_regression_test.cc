@@ -1,5 +1,4 @@
-// The calibration against simulated sweeps whose truth is known: configs/sweeps/case-*.yaml. The
-// bounds are about twice the worst error that four seeds showed on the same field.
+// The calibration against simulated sweeps whose truth is known: configs/sweeps/case-*.yaml.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -32,12 +31,16 @@ constexpr Bounds kLeaves[] = {{"i", 0.5, 0.007},
                               {"iii", 0.1, 0.002},
                               {"iv", 0.23, 0.004},
                               {"v", 0.035, 0.015}};
-// A knife edge, floor fitted.
-constexpr Bounds kEdge[] = {{"i", 0.4, 0.007},
-                            {"ii", 0.05, 0.006},
-                            {"iii", 0.12, 0.002},
-                            {"iv", 0.35, 0.005},
-                            {"v", 0.045, 0.02}};
+// A knife edge, floor fitted: what one sweep's standard deviations may be at most, a fifth more
+// than they are. Errors are held against the standard deviations that are stated.
+constexpr Bounds kEdge[] = {{"i", 0.21, 0.0026},
+                            {"ii", 0.017, 0.0019},
+                            {"iii", 0.038, 0.0009},
+                            {"iv", 0.1, 0.0014},
+                            {"v", 0.034, 0.0037}};
+// What is left without noise, in kappa (KnifeEdgesInDarkCornersAreMeasured).
+constexpr double kModelRatio = 5e-5;
+constexpr double kReach = 4;  // standard deviations
 
 SimulatedSweep Sweep(const std::string& name, model::TargetKind kind, std::uint64_t seed) {
   model::SweepSimulationOptions options = SweepCase(name, kSizePx, seed);
@@ -50,11 +53,11 @@ Calibration Measured(const SimulatedSweep& s) {
   return c;
 }
 
-// The truth lies in the systematic interval widened by so many sigma.
-void ExpectCovered(const Result& result, double truth, double sigmas = 3) {
+// The truth lies in the systematic interval widened by three sigma.
+void ExpectCovered(const Result& result, double truth) {
   ASSERT_TRUE(result.systematic);
-  EXPECT_GT(truth, result.systematic->x() - sigmas * result.sigma);
-  EXPECT_LT(truth, result.systematic->y() + sigmas * result.sigma);
+  EXPECT_GT(truth, result.systematic->x() - 3 * result.sigma);
+  EXPECT_LT(truth, result.systematic->y() + 3 * result.sigma);
 }
 
 void CheckLeaves(const Bounds& bounds, std::uint64_t seed) {
@@ -70,29 +73,88 @@ void CheckLeaves(const Bounds& bounds, std::uint64_t seed) {
   ExpectCovered(*c.image_distance_mm, s.truth.image_distance_mm);
 }
 
-void CheckEdge(const Bounds& bounds, std::uint64_t seed) {
-  SCOPED_TRACE(std::string("knife edge, case ") + bounds.name + ", seed " + std::to_string(seed));
+Calibration MeasuredEdge(const Bounds& bounds, std::uint64_t seed, model::SweepTruth* truth) {
   SimulatedSweep s = Sweep(bounds.name, model::TargetKind::kKnifeEdge, seed);
   s.sweep.target = model::SweepTarget::kKnifeEdge;
-  const Calibration c = Measured(s);
+  *truth = s.truth;
+  return Measured(s);
+}
+
+void CheckEdge(const Bounds& bounds, std::uint64_t seed) {
+  SCOPED_TRACE(std::string("knife edge, case ") + bounds.name + ", seed " + std::to_string(seed));
+  model::SweepTruth truth;
+  const Calibration c = MeasuredEdge(bounds, seed, &truth);
   ASSERT_NE(c.outcome, Outcome::kRefused) << c.reason;
-  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, bounds.focus_mm);
-  EXPECT_NEAR(c.blur_ratio->value / s.truth.blur_ratio, 1, bounds.ratio);
-  ExpectCovered(*c.focus_depth_mm, s.truth.focus_depth_mm);
-  // The scatter of seven frames does not tell their errors well: seed 3 is four sigma off.
-  ExpectCovered(*c.blur_ratio, s.truth.blur_ratio, std::string(bounds.name) == "v" ? 4.5 : 3);
+  EXPECT_LT(c.focus_depth_mm->sigma, bounds.focus_mm);
+  EXPECT_LT(c.blur_ratio->sigma / truth.blur_ratio, bounds.ratio);
+  EXPECT_NEAR(c.focus_depth_mm->value, truth.focus_depth_mm, kReach * c.focus_depth_mm->sigma);
+  EXPECT_NEAR(c.blur_ratio->value, truth.blur_ratio,
+              kReach * c.blur_ratio->sigma + kModelRatio * truth.blur_ratio);
+  ExpectCovered(*c.focus_depth_mm, truth.focus_depth_mm);
+  ExpectCovered(*c.blur_ratio, truth.blur_ratio);
   // A coarse sweep may not fix the floor.
   if (c.blur_floor_px) {
-    EXPECT_NEAR(c.blur_floor_px->value, s.truth.blur_floor_px, 0.003 + 3 * c.blur_floor_px->sigma);
+    EXPECT_NEAR(c.blur_floor_px->value, truth.blur_floor_px, kReach * c.blur_floor_px->sigma);
   }
+}
+
+// Errors over their stated standard deviations, of many sweeps: no bias beyond three standard
+// errors of their mean, and a spread that is 1 within three standard errors of its own, 1/sqrt(2
+// n).
+struct Pulls {
+  double count = 0, sum = 0, squares = 0;
+  void Add(const Result& result, double truth) {
+    const double pull = (result.value - truth) / result.sigma;
+    ++count;
+    sum += pull;
+    squares += pull * pull;
+  }
+  void ExpectNormal(const char* what) const {
+    EXPECT_NEAR(sum / count, 0, 3 / std::sqrt(count)) << what;
+    EXPECT_NEAR(std::sqrt(squares / count), 1, 3 / std::sqrt(2 * count)) << what;
+  }
+};
+
+void CheckEdges(const Bounds& bounds, std::uint64_t count) {
+  SCOPED_TRACE(std::string("knife edges, case ") + bounds.name);
+  Pulls focus, ratio;
+  for (std::uint64_t seed = 1; seed <= count; ++seed) {
+    model::SweepTruth truth;
+    const Calibration c = MeasuredEdge(bounds, seed, &truth);
+    ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio) << seed << ": " << c.reason;
+    focus.Add(*c.focus_depth_mm, truth.focus_depth_mm);
+    ratio.Add(*c.blur_ratio, truth.blur_ratio);
+  }
+  focus.ExpectNormal("zf");
+  ratio.ExpectNormal("kappa");
 }
 
 TEST(FocusRegression, LeavesInCaseTwo) { CheckLeaves(kLeaves[1], 1); }
 TEST(FocusRegression, LeavesInCaseThree) { CheckLeaves(kLeaves[2], 1); }
 TEST(FocusRegression, LeavesInCaseFive) { CheckLeaves(kLeaves[4], 1); }
 TEST(FocusRegression, KnifeEdgeInCaseTwo) { CheckEdge(kEdge[1], 1); }
-TEST(FocusRegression, KnifeEdgeInCaseFive) {
-  for (const std::uint64_t seed : {1U, 2U, 3U}) CheckEdge(kEdge[4], seed);
+TEST(FocusRegression, KnifeEdgeInCaseFive) { CheckEdge(kEdge[4], 1); }
+// Of seed 3, two readings lie 3.3 and 2 sigma off, and so does kappa.
+TEST(FocusRegression, SlowKnifeEdgesInCaseFiveScatterAsStated) { CheckEdges(kEdge[4], 20); }
+
+// An edge across a sensor wide enough for fall-off to darken its ends by 14 %, without noise. With
+// levels that do not bend along the edge, kappa was .36 % too large and the floor .002 px.
+TEST(FocusRegression, KnifeEdgesInDarkCornersAreMeasured) {
+  model::SweepSimulationOptions options = SweepCase("i", 800, 1);
+  options.target.kind = model::TargetKind::kKnifeEdge;
+  options.bits = 16;
+  options.full_well_electrons = options.reading_sigma_mm = 0;
+  options.step_mm = 30;
+  options.frame_count = 11;
+  SimulatedSweep s = Simulate(options);
+  s.sweep.target = model::SweepTarget::kKnifeEdge;
+  CalibrationOptions how;
+  how.map_field = false;
+  const Calibration c = Calibrate(s.sweep, how);
+  ASSERT_TRUE(c.blur_ratio && c.blur_floor_px) << c.reason;
+  EXPECT_NEAR(c.blur_ratio->value / s.truth.blur_ratio, 1, kModelRatio);
+  EXPECT_NEAR(c.image_distance_mm->value, s.truth.image_distance_mm, 1e-5);
+  EXPECT_NEAR(c.blur_floor_px->value, s.truth.blur_floor_px, 5e-5);
 }
 
 TEST(FocusRegression, SlowLeavesInEveryCase) {
@@ -101,6 +163,7 @@ TEST(FocusRegression, SlowLeavesInEveryCase) {
 TEST(FocusRegression, SlowKnifeEdgeInEveryCase) {
   for (const Bounds& bounds : kEdge) CheckEdge(bounds, 2);
 }
+TEST(FocusRegression, SlowKnifeEdgesInCaseOneScatterAsStated) { CheckEdges(kEdge[0], 12); }
 
 // Of a printed edge nobody knows how much of its softness is the lens.
 void CheckPrinted(const char* name) {

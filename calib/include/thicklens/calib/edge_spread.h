@@ -33,9 +33,11 @@ struct EdgeFeature {
 std::vector<EdgeFeature> FindEdges(const cv::Mat& grey, int most);
 
 // Blur of one feature. The pixels themselves are fitted, unbinned: the step's two levels (each a
-// plane, so that a lamp's slope does no harm), place, direction and blur, with the profile
-// integrated over the pixel's box for the edge's direction. kGaussian: the profile is an erf.
-// kDisc: a disc blurred by a Gaussian of `floor_px`, so that sigma^2 = floor^2 + (radius/2)^2.
+// plane, so that a lamp's slope does no harm, and of an edge at least half as long as the frame's
+// shorter side with a bend, so that a lens's darkening does none), place, direction and blur, with
+// the profile integrated over the pixel's box for the edge's direction. kGaussian: the profile is
+// an erf. kDisc: a disc blurred by a Gaussian of `floor_px`, so that sigma^2 = floor^2 +
+// (radius/2)^2.
 struct EdgeSpreadFit {
   // Along the normal of an edge. Of a corner: of each of its two edges, the more vertical one
   // first; an edge that is more vertical gives `across_x`, the other `across_y`.
