@@ -17,7 +17,9 @@ namespace thicklens::model {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::Gt;
 using ::testing::HasSubstr;
+using ::testing::Pair;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocusMm = 300;
@@ -247,8 +249,9 @@ TEST(SweepEffectsTest, AutoHasAll) {
   options.effects.without = {Effect::kDrift};
   const SweepSimulator simulator(options, {});
   EXPECT_EQ(simulator.effects().on, SweepEffects().Without({Effect::kDrift}));
-  EXPECT_TRUE(simulator.truth().effects.left_out_grey_levels.empty() ||
-              simulator.truth().effects.left_out_grey_levels.size() == 1U);
+  // The record names what was left out, and how much it would have changed at most.
+  EXPECT_THAT(simulator.truth().effects.left_out_grey_levels,
+              ElementsAre(Pair(EffectName(Effect::kDrift), Gt(1))));
 }
 
 // A point's rays, drawn and weighed one by one by (12), against an edge at f/1.4: how wide the blur
