@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -80,55 +79,74 @@ void ForEachView(const model::LightField& light_field, int threads, const Work& 
   });
 }
 
-// Irradiance of every ray, by view; empty unless it counts.
+// Irradiance of every ray, by view, relative to that of `weights` at the principal point; empty
+// where `seen` is 0.
 std::vector<std::vector<float>> FalloffOfViews(const model::LightField& light_field,
                                                const model::Camera& camera,
-                                               const Eigen::ArrayXXd& weights, int threads) {
+                                               const Eigen::ArrayXXd& weights,
+                                               const Eigen::ArrayXXd& seen, int threads) {
   std::vector<std::vector<float>> falloff(Index(light_field.u_count * light_field.v_count));
   ForEachView(light_field, threads, [&](int view, int k, int l) {
-    if (weights(l, k) == 0) return;
+    if (seen(l, k) == 0) return;
     falloff[Index(view)] = RelativeFalloff(*light_field.grid, camera, weights, k, l);
   });
   return falloff;
 }
 
-// Where a view crosses the aperture: mm with a camera, else view steps, from the centre.
-Eigen::Vector2d AperturePosition(const model::LightField& light_field, int k, int l) {
-  const double a = light_field.u_offset(k);
-  const double b = light_field.v_offset(l);
-  if (!light_field.camera) return {a, b};
-  const model::LightFieldGrid& grid = *light_field.grid;
-  return model::ApertureCrossingMm(grid.planes, {0, 0, a * grid.u_step_mm, b * grid.v_step_mm});
+// What the aperture passes of every ray, by view; empty where `seen` is 0.
+std::vector<std::vector<float>> PassedByViews(const model::LightField& light_field,
+                                              const Vignetting& vignetting,
+                                              const Eigen::ArrayXXd& seen, int threads) {
+  std::vector<std::vector<float>> passed(Index(light_field.u_count * light_field.v_count));
+  ForEachView(light_field, threads, [&](int view, int k, int l) {
+    if (seen(l, k) > 0) passed[Index(view)] = PassedRays(light_field, vignetting, k, l);
+  });
+  return passed;
 }
 
-// The share that an aperture of that radius leaves of a view's weight, which belongs to the
-// aperture of the capture: T_R/T_r, T the transmission at the view's place. So the captured
-// aperture gives the light field's own weights back, whatever steps they stand on.
-double ShareLeft(const model::LightField& light_field, double radius,
-                 const Eigen::Vector2d& position) {
-  // A view on the rim of a disc is inside.
-  const Eigen::Vector2d inward = position * (1 - kRounding);
-  if (!light_field.camera) return inward.norm() <= radius ? 1 : 0;
-  const model::Camera& camera = *light_field.camera;
-  if (camera.psf == model::Psf::kDisc) {
-    return model::ApertureTransmission(camera.psf, camera.blur_ratio(), radius, inward);
+// The mean of what is passed over the rays of each pixel. Throws Error where there are rays and
+// none is passed.
+std::vector<float> BundleOf(const model::LightField& light_field,
+                            const kernels::BlockGeometry& whole, kernels::Splat splat,
+                            const std::vector<std::vector<float>>& passed,
+                            kernels::Kernels<float>* kernels) {
+  std::vector<float> rays;
+  rays.reserve(passed.size() * light_field.view_size());
+  for (const std::vector<float>& view : passed) {
+    rays.insert(rays.end(), view.begin(), view.end());
+    if (view.empty()) rays.resize(rays.size() + light_field.view_size());
   }
-  // exp(-|a|^2/2 (1/(kappa R)^2 - 1/(kappa r)^2)); written so that R = r gives 1 exactly.
-  const double ratio = radius / camera.lens.aperture_radius_mm;
-  const double deviations = position.norm() / (camera.blur_ratio() * radius);
-  return radius > 0 ? std::exp(-deviations * deviations / 2 * (1 - ratio * ratio)) : 0.0;
-}
-
-// The same weight for the present views that are nearest to the centre, none for the others.
-Eigen::ArrayXXd NearestViews(const model::LightField& light_field) {
-  Eigen::ArrayXXd distance = Eigen::ArrayXXd::Constant(light_field.v_count, light_field.u_count,
-                                                       std::numeric_limits<double>::infinity());
-  for (int l = 0; l < light_field.v_count; ++l) {
-    for (int k = 0; k < light_field.u_count; ++k) {
-      if (light_field.IsPresent(k, l)) distance(l, k) = AperturePosition(light_field, k, l).norm();
+  std::vector<float> bundle = kernels->FormPicture(whole, splat, rays);
+  if (std::all_of(bundle.begin(), bundle.end(), [](float sum) { return sum > 0; })) return bundle;
+  std::fill(rays.begin(), rays.end(), 1.0F);
+  const std::vector<float> landed = kernels->FormPicture(whole, splat, rays);
+  for (std::size_t i = 0; i < bundle.size(); ++i) {
+    if (bundle[i] > 0) continue;
+    if (landed[i] == 0) {  // black, with vignetting or without
+      bundle[i] = 1;
+      continue;
     }
+    const auto pixel = static_cast<int>(i);
+    throw Error(fmt::format(
+        "vignetting: the aperture passes no ray of the light field that lands at the pixel ({}, "
+        "{}), with the UV plane at a depth of {:g} mm: a larger aperture, more views, or no "
+        "vignetting is needed",
+        pixel % light_field.s_count, pixel / light_field.s_count,
+        light_field.grid->planes.uv_depth_mm));
   }
-  return (distance <= distance.minCoeff() * (1 + kRounding)).cast<double>();
+  return bundle;
+}
+
+// Share by share; `product` may be empty, as if it were 1.
+void MultiplyInto(const std::vector<std::vector<float>>& shares,
+                  std::vector<std::vector<float>>* product) {
+  if (product->empty()) {
+    *product = shares;
+    return;
+  }
+  for (std::size_t view = 0; view < shares.size(); ++view) {
+    for (std::size_t i = 0; i < shares[view].size(); ++i) (*product)[view][i] *= shares[view][i];
+  }
 }
 
 // The samples x of [0, count) for which x - shift_px lies inside the view, and how to read there.
@@ -224,62 +242,51 @@ void CheckRepeat(int repeat_px) {
 
 model::LinearPicture Photograph(const model::LightField& light_field,
                                 const Eigen::ArrayXXd& weights, const model::Camera* falloff,
-                                kernels::Kernels<float>* kernels, int threads) {
+                                const Vignetting* vignetting, kernels::Kernels<float>* kernels,
+                                int threads) {
   CheckLightField(light_field);
   const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
-  const kernels::BlockGeometry whole =
-      BlockOf(light_field, {0, 0, light_field.s_count, light_field.t_count}, present);
-  std::vector<std::vector<float>> irradiance;
+  const bool is_vignetted = vignetting != nullptr && IsOffAperture(light_field);
+  // A view that the principal point sees nothing of may pass rays of other pixels.
+  const Eigen::ArrayXXd seen =
+      is_vignetted
+          ? PresentWeights(light_field, Eigen::ArrayXXd::Ones(weights.rows(), weights.cols()))
+          : present;
+  std::vector<std::vector<float>> share_of_rays;
   if (falloff != nullptr && light_field.grid) {
-    irradiance = FalloffOfViews(light_field, *falloff, present, threads);
+    share_of_rays = FalloffOfViews(light_field, *falloff, present, seen, threads);
   }
-
   // As the rays were taken apart, so they are put together.
   const kernels::Splat splat =
       light_field.origin.splat == "nearest" ? kernels::Splat::kNearest : kernels::Splat::kBilinear;
+  const kernels::BlockGeometry whole =
+      BlockOf(light_field, {0, 0, light_field.s_count, light_field.t_count}, seen);
+  std::vector<float> bundle;  // of each pixel, where its rays have weights of their own
+  if (is_vignetted) {
+    const std::vector<std::vector<float>> passed =
+        PassedByViews(light_field, *vignetting, seen, threads);
+    bundle = BundleOf(light_field, whole, splat, passed, kernels);
+    MultiplyInto(passed, &share_of_rays);
+  }
+
   model::LinearPicture photograph =
       BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
   for (int channel = 0; channel < light_field.channels; ++channel) {
     std::vector<float> rays = ChannelOf(light_field, channel);
-    if (!irradiance.empty()) {
+    if (!share_of_rays.empty()) {
       ForEachView(light_field, threads, [&](int view, int, int) {
-        const std::vector<float>& share = irradiance[Index(view)];
+        const std::vector<float>& share = share_of_rays[Index(view)];
         float* values = rays.data() + Index(view) * light_field.view_size();
         for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
       });
     }
-    const std::vector<float> pixels = kernels->FormPicture(whole, splat, rays);
+    std::vector<float> pixels = kernels->FormPicture(whole, splat, rays);
+    for (std::size_t i = 0; i < bundle.size(); ++i) pixels[i] /= bundle[i];
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       photograph.values[i * Index(light_field.channels) + Index(channel)] = pixels[i];
     }
   }
   return photograph;
-}
-
-Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius) {
-  CheckLightField(light_field);
-  if (!(radius >= 0) || !std::isfinite(radius)) {
-    throw Error(fmt::format("aperture radius is {} {}: it must be finite and >= 0", radius,
-                            light_field.camera ? "mm" : "view steps"));
-  }
-  if (light_field.camera &&
-      radius > light_field.camera->lens.aperture_radius_mm * (1 + kRounding)) {
-    throw Error(fmt::format(
-        "aperture radius is {} mm: it must be at most that of the camera, {} mm; light from beyond "
-        "it was never captured",
-        radius, light_field.camera->lens.aperture_radius_mm));
-  }
-  Eigen::ArrayXXd weights = Eigen::ArrayXXd::Zero(light_field.v_count, light_field.u_count);
-  for (int l = 0; l < light_field.v_count; ++l) {
-    for (int k = 0; k < light_field.u_count; ++k) {
-      if (!light_field.IsPresent(k, l)) continue;
-      weights(l, k) = light_field.weights(l, k) *
-                      ShareLeft(light_field, radius, AperturePosition(light_field, k, l));
-    }
-  }
-  // So narrow a Gaussian that its tail underflows leaves no view either.
-  if (!(weights.sum() > std::numeric_limits<double>::min())) weights = NearestViews(light_field);
-  return weights / weights.sum();
 }
 
 model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,

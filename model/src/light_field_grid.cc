@@ -182,6 +182,20 @@ ApertureShape ApertureShapeOf(Psf psf) {
   return psf == Psf::kDisc ? ApertureShape::kDisc : ApertureShape::kGaussian;
 }
 
+double ApertureWeightAt(ApertureShape shape, int u_count, int v_count,
+                        const Eigen::Vector2d& offset_steps) {
+  const double a = offset_steps.x(), b = offset_steps.y();
+  switch (shape) {
+    case ApertureShape::kUniform:
+      return std::abs(a) <= u_count / 2.0 && std::abs(b) <= v_count / 2.0 ? 1.0 : 0.0;
+    case ApertureShape::kGaussian:
+      return GaussianWeight(a, u_count) * GaussianWeight(b, v_count);
+    case ApertureShape::kDisc:
+      break;
+  }
+  return IsInsideDisc(a, u_count, b, v_count) ? 1.0 : 0.0;
+}
+
 Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count) {
   if (u_count < 1 || v_count < 1) {
     throw Error(fmt::format("views are {}x{}: both counts must be >= 1", u_count, v_count));
@@ -191,10 +205,7 @@ Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count) {
     for (int i = 0; i < u_count; ++i) {
       const double a = i - (u_count - 1) / 2.0;
       const double b = j - (v_count - 1) / 2.0;
-      weights(j, i) = shape == ApertureShape::kUniform ? 1.0
-                      : shape == ApertureShape::kDisc
-                          ? (IsInsideDisc(a, u_count, b, v_count) ? 1.0 : 0.0)
-                          : GaussianWeight(a, u_count) * GaussianWeight(b, v_count);
+      weights(j, i) = ApertureWeightAt(shape, u_count, v_count, {a, b});
     }
   }
   return weights / weights.sum();

@@ -184,6 +184,9 @@ bool SceneSimulationOptions::IsValid(std::string* why) const {
     return Fail(why, fmt::format("views is {}x{}: both counts must be from 1 to {}", u_count,
                                  v_count, kMaxViews));
   }
+  if (!std::isfinite(uv_depth_mm)) {
+    return Fail(why, fmt::format("uv_depth_mm is {}: it must be finite", uv_depth_mm));
+  }
   return true;
 }
 

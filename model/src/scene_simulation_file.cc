@@ -217,7 +217,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   root.RequireKeys({"schema", "camera", "truth", "size_px", "layers", "effects", "without",
                     "tolerance", "sampling_error_grey_levels", "rays_per_pixel", "wavelength_nm",
                     "full_well_electrons", "read_noise_electrons", "noise_sigma_grey_levels",
-                    "bits", "views", "seed"});
+                    "bits", "views", "uv_depth_mm", "seed"});
   constexpr int kAny = std::numeric_limits<int>::max();  // the options' own check is the bound
   SceneSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
@@ -242,6 +242,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
     options.u_count = counts[0].Integer(1, kAny);
     options.v_count = counts[1].Integer(1, kAny);
   }
+  ReadNumber(root, "uv_depth_mm", &options.uv_depth_mm);
   if (const auto seed = root.Find("seed")) {
     options.seed = static_cast<std::uint64_t>(seed->Integer(0, kAny));
   }

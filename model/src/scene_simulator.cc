@@ -27,6 +27,8 @@ namespace {
 // No view is taken farther from the middle of the aperture, in its standard deviations: what the
 // planes must stand.
 constexpr double kFarthestDeviations = 6;
+// Textures are drawn for so many: beyond them they repeat themselves.
+constexpr double kDrawnDeviations = 4;
 constexpr int kAiryViewRays = 256;
 
 const EffectSet kOfViews = {Effect::kPixelBox, Effect::kLensFloor, Effect::kDiffraction};
@@ -41,6 +43,13 @@ EffectConditions ConditionsOf(const SceneSimulationOptions& options) {
   conditions.read_noise_electrons = options.read_noise_electrons;
   return conditions;
 }
+
+// Where the rays of a view cross the aperture: those of the principal point, and how much farther
+// with each px beside it.
+struct Viewpoint {
+  Eigen::Vector2d aperture_mm;
+  double wander_mm_per_px = 0;
+};
 
 }  // namespace
 
@@ -104,15 +113,47 @@ struct SceneSimulator::Impl {
 
   bool On(Effect effect) const { return decision.on.Has(effect); }
 
-  Eigen::Array3d ViewAt(int x, int y, const Eigen::Vector2d& aperture_mm) const {
+  Eigen::Array3d ViewAt(int x, int y, const Viewpoint& from) const {
     Eigen::Array4d sum(0, 0, 0, 0);
     for (const PixelRay& sample : view_rays) {
-      const SceneRay ray = geometry.RayAt(Eigen::Vector2d(x, y) + sample.offset_px, aperture_mm);
+      const Eigen::Vector2d position_px = Eigen::Vector2d(x, y) + sample.offset_px;
+      const Eigen::Vector2d wander_mm =
+          from.wander_mm_per_px * (position_px - geometry.sensor().principal_point_px);
+      const SceneRay ray = geometry.RayAt(position_px, from.aperture_mm + wander_mm);
       const SceneHit hit = geometry.Trace(ray);
       sum +=
           LayerLight(geometry, textures[hit.layer], hit.layer, ray, hit.on_texture).cast<double>();
     }
     return sum.head<3>() / static_cast<double>(view_rays.size());
+  }
+
+  // With ST in the plane of focus, s = (x - cx) ds whatever the view, and (10) is
+  // a = ((zl + d0) u - zl s)/d0.
+  Viewpoint ViewpointOf(const LightFieldGrid& grid, int k, int l) const {
+    Ray ray = grid.RayAt(0, 0, k, l);
+    ray.s_mm = ray.t_mm = 0;
+    return {ApertureCrossingMm(grid.planes, ray),
+            -grid.planes.uv_depth_mm / grid.planes.plane_spacing_mm * grid.s_step_mm};
+  }
+
+  // Throws Error if a view looks past what is drawn.
+  void CheckReach(const LightFieldGrid& grid) const {
+    const double reach_mm = kDrawnDeviations * geometry.aperture_sigma_mm();
+    const Viewpoint corner = ViewpointOf(grid, 0, 0);
+    const Sensor& sensor = geometry.sensor();
+    const Eigen::Vector2d last_px(sensor.width_px - 1, sensor.height_px - 1);
+    const Eigen::Vector2d beside_px = sensor.principal_point_px.cwiseAbs().cwiseMax(
+        (last_px - sensor.principal_point_px).cwiseAbs());
+    const double around_px = 0.5 + kFarthestDeviations * geometry.floor_px();
+    const double farthest_mm = (corner.aperture_mm.cwiseAbs().array() +
+                                std::abs(corner.wander_mm_per_px) * (beside_px.array() + around_px))
+                                   .maxCoeff();
+    if (corner.wander_mm_per_px == 0 || farthest_mm <= reach_mm) return;
+    throw Error(fmt::format(
+        "uv_depth_mm is {}: rays of the outermost views would cross the aperture {:.4g} mm from "
+        "its middle, more than {:g} standard deviations (kappa r) of {:.4g} mm, as far as textures "
+        "are drawn: UV nearer to the aperture (0) or fewer views are needed",
+        grid.planes.uv_depth_mm, farthest_mm, kDrawnDeviations, geometry.aperture_sigma_mm()));
   }
 
   // Calls work(row) for every row, on the run's threads.
@@ -256,12 +297,19 @@ LinearPicture SceneSimulator::RenderView(const Eigen::Vector2d& aperture_mm,
     throw Error(fmt::format("aperture position [{}, {}] mm: both must be from {} to {}",
                             aperture_mm.x(), aperture_mm.y(), -reach_mm, reach_mm));
   }
-  return impl_->Render(run, [&](int x, int y) { return impl_->ViewAt(x, y, aperture_mm); });
+  return impl_->Render(run, [&](int x, int y) { return impl_->ViewAt(x, y, {aperture_mm, 0}); });
 }
 
 LightField SceneSimulator::RenderLightField(int u_count, int v_count, const SceneRun& run) const {
   const Camera& camera = impl_->options.camera;
-  const LightFieldGrid grid = DefaultGrid(camera, u_count, v_count);
+  const double uv_depth_mm = impl_->options.uv_depth_mm;
+  // Refuses a focus at infinity, where ST would lie.
+  LightFieldGrid grid = DefaultGrid(camera, u_count, v_count);
+  if (uv_depth_mm != 0) {
+    grid = GridOnPlanes(camera, {uv_depth_mm, camera.focus_depth_mm() - uv_depth_mm}, u_count,
+                        v_count);
+  }
+  impl_->CheckReach(grid);
   LightField light_field = MakeLightField(grid.s_count, grid.t_count, u_count, v_count, 3);
   light_field.weights = ApertureWeights(ApertureShapeOf(camera.psf), u_count, v_count);
   light_field.transfer = impl_->camera.sensor.transfer;
@@ -273,9 +321,9 @@ LightField SceneSimulator::RenderLightField(int u_count, int v_count, const Scen
   Impl::ForRows(u_count * v_count * grid.t_count, run, [&](int row) {
     const int y = row % grid.t_count;
     const int view = row / grid.t_count;
-    const Ray ray = grid.RayAt(0, y, view % u_count, view / u_count);
+    const Viewpoint from = impl_->ViewpointOf(grid, view % u_count, view / u_count);
     for (int x = 0; x < grid.s_count; ++x) {
-      const Eigen::Array3d rgb = impl_->ViewAt(x, y, {ray.u_mm, ray.v_mm});
+      const Eigen::Array3d rgb = impl_->ViewAt(x, y, from);
       for (int c = 0; c < 3; ++c) {
         light_field.values[light_field.ViewStart(c, view % u_count, view / u_count) +
                            static_cast<std::size_t>(y * grid.s_count + x)] =

@@ -392,7 +392,8 @@ TEST(BlockSolver, WithoutARidgeTheResidualIsPerfectAndTheLightFieldIsNot) {
   EXPECT_LT(summary.rcond_min, 1e-12);
   EXPECT_LT(summary.relative_residual, 1e-8);
   const auto kernels = Twin()->NewFloat();
-  const model::LinearPicture again = Photograph(garbage, input.weights, nullptr, kernels.get(), 1);
+  const model::LinearPicture again =
+      Photograph(garbage, input.weights, nullptr, nullptr, kernels.get(), 1);
   const double reprojection =
       (AllOfIt(again.values) - AllOfIt(input.picture.values)).lpNorm<Eigen::Infinity>();
   const double range = AllOfIt(garbage.values).lpNorm<Eigen::Infinity>();

@@ -98,7 +98,7 @@ double IrradianceAt(const model::LightField& field, const model::Ray& ray) {
 
 model::LinearPicture TakePhotograph(const model::LightField& field, const Eigen::ArrayXXd& weights,
                                     bool falloff, int threads = 1) {
-  return Photograph(field, weights, falloff && field.camera ? &*field.camera : nullptr,
+  return Photograph(field, weights, falloff && field.camera ? &*field.camera : nullptr, nullptr,
                     kernels::NewReference<float>().get(), threads);
 }
 

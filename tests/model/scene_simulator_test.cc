@@ -9,6 +9,7 @@
 #include <cmath>
 #include <complex>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@
 namespace thicklens::model {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using thicklens::testing::ErrorOf;
 
@@ -604,14 +606,21 @@ TEST(SceneSimulatorTest, GlossShowsItsLampAtTheDepthOfTheMirrorImage) {
 }
 
 // The whole chain once more, by the light-field grid's own rays and a search along each of them.
-TEST(SceneSimulatorTest, SlantedPlaneIsMetWhereTheGridsRaysMeetIt) {
+class LightFieldPlanesTest : public ::testing::TestWithParam<double> {};
+
+INSTANTIATE_TEST_SUITE_P(UvDepths, LightFieldPlanesTest, ::testing::Values(0, 150, -200));
+
+TEST_P(LightFieldPlanesTest, SlantedPlaneIsMetWhereTheGridsRaysMeetIt) {
   SceneSimulationOptions options =
       SceneOf(MacroCamera(44, 30, Psf::kGaussian, 0), {Sine(297, 40, 25)});
+  options.uv_depth_mm = GetParam();
   const Eigen::Vector2d slope(3, -2);
   options.layers[0].plane.slope = slope;
   const SceneSimulator simulator(options, {});
   const LightField light_field = simulator.RenderLightField(5, 5, {1, {}});
-  const LightFieldGrid grid = DefaultGrid(options.camera, 5, 5);
+  const LightFieldGrid grid =
+      GridOnPlanes(options.camera, {GetParam(), kFocusMm - GetParam()}, 5, 5);
+  EXPECT_EQ(light_field.grid->planes.uv_depth_mm, GetParam());
   const RawDepthMap depth = simulator.RenderDepth();
   const double period_mm = 40 * 297 / kScalePx;
   for (const auto& [k, l] : {std::pair{2, 2}, {0, 2}, {4, 1}, {3, 4}}) {
@@ -632,12 +641,27 @@ TEST(SceneSimulatorTest, SlantedPlaneIsMetWhereTheGridsRaysMeetIt) {
                                           BoxTransfer(std::cos(25 * kPi / 180) / 40) *
                                           BoxTransfer(std::sin(25 * kPi / 180) / 40);
         EXPECT_NEAR(view.at(x, y, 0), expected, 1e-3);
-        if (k == 2 && l == 2) {
+        if (k == 2 && l == 2 && GetParam() == 0) {  // chief rays
           EXPECT_NEAR(depth.values[static_cast<std::size_t>(y * 44 + x)], near_mm, 1e-4);
         }
       }
     }
   }
+}
+
+TEST(SceneSimulatorTest, ViewsBeyondTheApertureAreRefused) {
+  SceneSimulationOptions options =
+      SceneOf(MacroCamera(44, 30, Psf::kGaussian, 0), {Sine(297, 40, 25)});
+  options.uv_depth_mm = 299.9;
+  const SceneSimulator simulator(options, {});
+  EXPECT_THAT(ErrorOf([&] {
+                simulator.RenderLightField(3, 3, {1, {}});
+              }),
+              AllOf(HasSubstr("uv_depth_mm is 299.9"), HasSubstr("nearer to the aperture")));
+  options.uv_depth_mm = std::numeric_limits<double>::infinity();
+  std::string why;
+  EXPECT_FALSE(options.IsValid(&why));
+  EXPECT_THAT(why, HasSubstr("uv_depth_mm is inf"));
 }
 
 TEST(SceneSimulatorTest, EdgesStandWhereTheNearerLayersDisparityPutsThem) {

@@ -138,7 +138,7 @@ TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
   std::vector<double> corner;
   for (const model::Camera* camera : {&thick, &thin}) {
     const model::LinearPicture picture =
-        estimator::Photograph(field, field.weights, camera, kernels.get(), 1);
+        estimator::Photograph(field, field.weights, camera, nullptr, kernels.get(), 1);
     const double distance_mm = camera->image_distance_mm();
     const double scale_mm = thick.focal_scale_px() * 0.2;
     const auto light = [&](double x_mm, double y_mm) {
@@ -172,6 +172,16 @@ TEST(LightFieldEffectsTest, APhotographTakesWhatMatters) {
             kept.With({Effect::kThickness, Effect::kFalloff}));
   field.camera = ThickCamera(0.001, 0.05);
   EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on, kept);
+  EffectOptions vignetting;
+  vignetting.effects = "vignetting";
+  field.grid = model::DefaultGrid(*field.camera, 3, 3);
+  EXPECT_THAT(ErrorOf([&] { DecidePhotographEffects(vignetting, field); }),
+              HasSubstr("vignetting"));
+  field.camera = ThickCamera(0.01);
+  field.grid = model::GridOnPlanes(*field.camera, {20, 780}, 3, 3);
+  EXPECT_TRUE(DecidePhotographEffects(EffectOptions(), field).on.Has(Effect::kVignetting));
+  field.grid = model::GridOnPlanes(*field.camera, {1e-4, 800 - 1e-4}, 3, 3);
+  EXPECT_FALSE(DecidePhotographEffects(EffectOptions(), field).on.Has(Effect::kVignetting));
   EffectOptions none;
   none.effects = "none";
   EXPECT_TRUE(DecidePhotographEffects(none, field).on.empty());

@@ -346,6 +346,28 @@ TEST_F(RenderTest, FallOffIsOnWithACameraAndCanBeLeftOut) {
   EXPECT_LT(with[0], 0.9 * with[centre]);
 }
 
+TEST_F(RenderTest, VignettingIsOnWithUvOffTheAperture) {
+  model::LightField light_field = AtRandom(3, 3, 7);
+  light_field.camera = WideCamera();
+  light_field.grid =
+      model::GridOnPlanes(*light_field.camera, {1, light_field.camera->focus_depth_mm() - 1}, 3, 3);
+  light_field.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
+  const std::string folder = Write("lf", light_field);
+  const auto usual = Rendered({folder, "--as-captured"}).values;
+  EXPECT_NE(usual, Rendered({folder, "--as-captured", "--without", "vignetting"}).values);
+  // Its own weights are a Gaussian's.
+  EXPECT_EQ(usual, Rendered({folder, "--as-captured", "--aperture-shape", "gaussian"}).values);
+
+  light_field.weights(0, 0) *= 1.1;
+  light_field.weights /= light_field.weights.sum();
+  const std::string odd = Write("odd", light_field);
+  const ProgramResult result = Run({odd, "--as-captured", "-o", folder_ / "p.png"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("lies off the aperture"), HasSubstr("--aperture-shape")));
+  EXPECT_EQ(
+      Run({odd, "--as-captured", "-o", folder_ / "p.png", "--without", "vignetting"}).exit_code, 0);
+}
+
 TEST_F(RenderTest, TheMosaicAndTheEpipolarPicturesHaveTheirSizes) {
   const std::string folder = Write("lf", AtRandom(3, 5, 6));
   const model::StoredPicture mosaic = Rendered({folder, "--mosaic"});

@@ -170,6 +170,19 @@ TEST_F(SimulateSceneTest, LightFieldFolderHoldsTheTrueViews) {
   EXPECT_EQ(json["clipped_values"], 0);
 }
 
+TEST_F(SimulateSceneTest, TheUvPlaneMayLieOffTheAperture) {
+  const std::string config = folder_.Put("scene.yaml", SceneConfig("uv_depth_mm: 3\n"));
+  Succeed({"light-field", config, "-o", folder_ / "a", "--views", "3x3", "--quiet"});
+  EXPECT_EQ(ReadLightField(folder_ / "a", {}).grid->planes.uv_depth_mm, 3);
+  Succeed({"light-field", config, "-o", folder_ / "b", "--views", "3x3", "--uv-depth", "-2",
+           "--quiet"});
+  EXPECT_EQ(ReadLightField(folder_ / "b", {}).grid->planes.uv_depth_mm, -2);
+  const ProgramResult far =
+      Run({"light-field", config, "-o", folder_ / "c", "--uv-depth", "299.99"});
+  EXPECT_EQ(far.exit_code, 1);
+  EXPECT_THAT(far.err, HasSubstr("uv_depth_mm is 299.99"));
+}
+
 TEST_F(SimulateSceneTest, SeedDecidesAndThreadsDoNot) {
   const std::string config = folder_.Put(
       "scene.yaml", SceneConfig("noise_sigma_grey_levels: 1\nrays_per_pixel: 50\nseed: 2\n"));

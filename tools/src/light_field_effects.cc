@@ -5,6 +5,7 @@
 #include <string>
 
 #include "option_values.h"
+#include "thicklens/estimator/aperture_weights.h"
 #include "thicklens/model/effect_impact.h"
 
 namespace thicklens::tools {
@@ -78,14 +79,16 @@ model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
 model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
                                               const model::LightField& light_field) {
   const EffectSet of_views = {Effect::kDefocus, Effect::kApertureShape};
-  const EffectSet of_model =
+  EffectSet of_model =
       light_field.camera ? of_views.With({Effect::kThickness, Effect::kFalloff}) : of_views;
+  if (estimator::IsOffAperture(light_field)) of_model.Add(Effect::kVignetting);
   CheckEffectNames(options, of_model);
   if (!light_field.camera) return DecisionWithoutCamera(options, of_model);
   model::EffectChoice choice = ChoiceOf(options);
   choice.kept = of_views;
   model::EffectConditions conditions;
   conditions.camera = *light_field.camera;
+  if (light_field.grid) conditions.planes = light_field.grid->planes;
   // Views do not tell their depths: any, from half of that of the plane of focus on. What defocus
   // and aperture shape do there is therefore not told.
   constexpr double kFarMm = 1e6;
@@ -95,6 +98,8 @@ model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
                            model::PlacesBetween(*light_field.camera, near_mm,
                                                 std::numeric_limits<double>::infinity(), false),
                            of_model);
+  // Without defocus a pixel has one ray.
+  if (!decision.on.Has(Effect::kDefocus)) decision.on.Remove(Effect::kVignetting);
   decision.findings.erase(std::remove_if(decision.findings.begin(), decision.findings.end(),
                                          [&](const model::EffectFinding& finding) {
                                            return of_views.Has(finding.effect);

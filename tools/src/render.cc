@@ -215,6 +215,35 @@ Eigen::ArrayXXd PhotographWeights(const RenderOptions& options,
   return WeightsOf(options, light_field, details);
 }
 
+// The aperture of PhotographWeights where a ray crosses it between the views.
+estimator::Vignetting VignettingOf(const RenderOptions& options,
+                                   const model::LightField& light_field,
+                                   const model::EffectDecision& effects) {
+  using model::ApertureShape;
+  if (!effects.on.Has(Effect::kApertureShape)) return {ApertureShape::kGaussian, {}};
+  if (!options.aperture_shape.empty()) {
+    return {model::ApertureShapeFromName(options.aperture_shape), {}};
+  }
+  const std::optional<ApertureShape> own = estimator::ShapeOfWeights(light_field);
+  if (own) return {*own, options.aperture_radius};
+  throw Error(fmt::format(
+      "{}: its UV plane lies off the aperture, and its weights are those of no shape, so that "
+      "nothing is known of the aperture between the views: {}--without vignetting",
+      options.light_field, options.aperture_radius ? "" : "--aperture-shape NAME or "));
+}
+
+// What the views do not hold, no weights bring back.
+void WarnOfWander(const model::LightField& light_field) {
+  constexpr double kMuch = 0.4;
+  const double wander = estimator::LargestWander(light_field);
+  if (!(wander > kMuch)) return;
+  spdlog::warn(
+      "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture beside its "
+      "middle, by {:.2g} of the half-width that the views cover: part of their light is missing, "
+      "and what is out of focus there is displaced and not blurred enough",
+      light_field.grid->planes.uv_depth_mm, wander);
+}
+
 Rendering RenderPhotograph(const RenderOptions& options, const model::LightField& light_field) {
   std::string notice;
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
@@ -232,9 +261,16 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
     falloff = effects.on.Has(Effect::kThickness) ? *light_field.camera
                                                  : model::ThinTwin(*light_field.camera);
   }
+  std::optional<estimator::Vignetting> vignetting;
+  // An aperture of no size is one view.
+  if (effects.on.Has(Effect::kVignetting) && options.aperture_radius.value_or(1) > 0) {
+    vignetting = VignettingOf(options, light_field, effects);
+    WarnOfWander(light_field);
+  }
   rendering.picture = estimator::Photograph(
       light_field, PhotographWeights(options, light_field, effects.on, &rendering.details),
-      falloff ? &*falloff : nullptr, kernels.get(), options.common.threads);
+      falloff ? &*falloff : nullptr, vignetting ? &*vignetting : nullptr, kernels.get(),
+      options.common.threads);
   const bool is_pinhole = !effects.on.Has(Effect::kDefocus);
   const bool is_gaussian = !effects.on.Has(Effect::kApertureShape);
   rendering.what =

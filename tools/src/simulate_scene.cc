@@ -42,10 +42,11 @@ struct SceneOptions {
   std::string output_folder;
   std::optional<std::int64_t> seed;
   EffectOptions effects;
-  bool attribute = false;      // picture
-  std::string sweep_path;      // picture; of the attribution
-  ViewsOption views;           // light-field
-  std::string format = "png";  // light-field
+  bool attribute = false;             // picture
+  std::string sweep_path;             // picture; of the attribution
+  ViewsOption views;                  // light-field
+  std::optional<double> uv_depth_mm;  // light-field
+  std::string format = "png";         // light-field
 };
 
 model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
@@ -58,6 +59,7 @@ model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
     scene.u_count = u_count;
     scene.v_count = v_count;
   }
+  if (options.uv_depth_mm) scene.uv_depth_mm = *options.uv_depth_mm;
   return scene;
 }
 
@@ -273,6 +275,11 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
   command = AddSceneCommand(simulate, "light-field",
                             "The true light field of a scene, as its views", views.get());
   AddViewsOption(command, &views->views, "Replaces the config's views");
+  command
+      ->add_option("--uv-depth", views->uv_depth_mm,
+                   "Depth of the UV plane, 0: the aperture; replaces the config's uv_depth_mm")
+      ->check(Finite())
+      ->type_name("MM");
   command
       ->add_option("--format", views->format,
                    "Of the views: png (16 bit, stored values) or tiff (float, linear light)")

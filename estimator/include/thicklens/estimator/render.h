@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "thicklens/estimator/aperture_weights.h"
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field.h"
 
@@ -11,19 +12,15 @@ namespace thicklens::estimator {
 // The photograph that the whole aperture would take of the light field, in linear light: the mean
 // of the views with `weights` (V x U, >= 0; the sum need not be 1), each ray where it lands.
 // Views that are not present have no share. Rays carry the irradiance of (12) in `falloff`,
-// relative to that of a uniform radiance at the principal point; null: none.
+// relative to that of a uniform radiance at the principal point; null: none. With UV off the
+// aperture the rays of a view cross it in different places: those that land at a pixel have the
+// weights of `vignetting`, with sum 1 over the views that are present, `weights` being those of the
+// principal point (with ST in the plane of focus); null: `weights` everywhere. Throws Error, too,
+// if a pixel's rays are all outside of the aperture.
 model::LinearPicture Photograph(const model::LightField& light_field,
                                 const Eigen::ArrayXXd& weights, const model::Camera* falloff,
-                                kernels::Kernels<float>* kernels, int threads);
-
-// The weights of a smaller aperture over the same views, V x U, sum 1: the light field's own ones,
-// those of the captured aperture of radius r, times what radius R leaves of each:
-// exp(-|a|^2/2 (1/(kappa R)^2 - 1/(kappa r)^2)) for a Gaussian, 1 within 2 kappa R for a disc, a
-// the view's place on the aperture; derived here. R = r gives the captured aperture. R is in mm
-// with a camera, and must be at most r; without one the aperture is a disc of R view steps. R = 0,
-// and an aperture that meets no view, is the view (or views) nearest to the centre. Absent views
-// have 0.
-Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius);
+                                const Vignetting* vignetting, kernels::Kernels<float>* kernels,
+                                int threads);
 
 // The photograph refocused: views shifted so that points of that disparity (px per view step)
 // coincide, then averaged with `weights`; bicubic between samples. Where shifts leave a view, the

@@ -79,6 +79,11 @@ ApertureShape ApertureShapeFromName(const std::string& name);  // "uniform", "ga
 std::string ApertureShapeName(ApertureShape shape);
 ApertureShape ApertureShapeOf(Psf psf);
 
+// The same, 1 in the middle, at a place of the aperture that need not be a view's: steps from the
+// middle. The uniform one is 1 as far as half a step beyond the outermost views, else 0.
+double ApertureWeightAt(ApertureShape shape, int u_count, int v_count,
+                        const Eigen::Vector2d& offset_steps);
+
 // V x U weights, sum 1. Throws Error unless both counts are >= 1.
 Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count);
 

@@ -136,6 +136,7 @@ struct SceneSimulationOptions {
   double noise_sigma_grey_levels = 0;
   int bits = 8;                  // 8 or 16
   int u_count = 5, v_count = 5;  // views of the true light field
+  double uv_depth_mm = 0;        // where its UV plane lies; ST lies in the plane of focus
   std::uint64_t seed = 1;
 
   bool IsValid(std::string* why) const;
@@ -216,7 +217,9 @@ class SceneSimulator {
   // Radiance as seen from one aperture position, mm: with effects_of_views(), neither defocus nor
   // fall-off.
   LinearPicture RenderView(const Eigen::Vector2d& aperture_mm, const SceneRun& run) const;
-  // Such views at the samples of DefaultGrid(camera, u_count, v_count).
+  // Such views on GridOnPlanes, UV as the options say. Off the aperture a view is seen from a point
+  // of UV, and its rays cross the aperture in different places. Throws Error if one of them crosses
+  // farther than 4 standard deviations (kappa r per axis) from the middle: textures end there.
   LightField RenderLightField(int u_count, int v_count, const SceneRun& run) const;
 
  private:
