@@ -21,6 +21,7 @@
 #include "child_process.h"
 #include "image_io.h"
 #include "light_field_io.h"
+#include "picture_description.h"
 #include "support/temporary_folder.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/output_file.h"
@@ -355,6 +356,12 @@ TEST_F(RenderTest, VignettingIsOnWithUvOffTheAperture) {
   const std::string folder = Write("lf", light_field);
   const auto usual = Rendered({folder, "--as-captured"}).values;
   EXPECT_NE(usual, Rendered({folder, "--as-captured", "--without", "vignetting"}).values);
+  const auto description = [&] {
+    return DescriptionOf(ContentOf(folder_ / "rendered.png"), "rendered.png");
+  };
+  EXPECT_EQ(description(),
+            "photograph through the light field's own aperture; effects: thickness, defocus, "
+            "aperture-shape, falloff");
   // Its own weights are a Gaussian's.
   EXPECT_EQ(usual, Rendered({folder, "--as-captured", "--aperture-shape", "gaussian"}).values);
 
@@ -366,6 +373,8 @@ TEST_F(RenderTest, VignettingIsOnWithUvOffTheAperture) {
   EXPECT_THAT(result.err, AllOf(HasSubstr("lies off the aperture"), HasSubstr("--aperture-shape")));
   EXPECT_EQ(
       Run({odd, "--as-captured", "-o", folder_ / "p.png", "--without", "vignetting"}).exit_code, 0);
+  Rendered({odd, "--view", "1,1"});
+  EXPECT_EQ(description(), "view (1, 1)");
 }
 
 TEST_F(RenderTest, TheMosaicAndTheEpipolarPicturesHaveTheirSizes) {

@@ -22,6 +22,7 @@
 #include "light_field_io.h"
 #include "light_field_options.h"
 #include "option_values.h"
+#include "picture_description.h"
 #include "thicklens/error.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/output_file.h"
@@ -395,6 +396,15 @@ std::string ClippedText(double fraction) {
                       : "clipped: nothing\n";
 }
 
+// For the file: "photograph through ...; effects: defocus, falloff".
+std::string Description(const Rendering& rendering) {
+  const auto effects = rendering.details.find("effects");
+  if (effects == rendering.details.end()) return rendering.what;
+  const auto names = effects->get<std::vector<std::string>>();
+  return fmt::format("{}; effects: {}", rendering.what,
+                     names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")));
+}
+
 CommandResult RenderPicture(const RenderOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   model::OutputFile output(options.output);
@@ -409,8 +419,10 @@ CommandResult RenderPicture(const RenderOptions& options) {
   const auto seed = static_cast<std::uint64_t>(options.seed.value_or(0));
   const model::LinearPicture& picture = rendering.picture;
   const std::size_t clipped = CountClipped(picture, light_field.transfer, bits);
-  output.Commit(EncodePng(model::ToStoredWithNoise(picture, light_field.transfer, bits,
-                                                   noise_levels / kStoredLevels, seed)));
+  output.Commit(
+      WithDescription(EncodePng(model::ToStoredWithNoise(picture, light_field.transfer, bits,
+                                                         noise_levels / kStoredLevels, seed)),
+                      Description(rendering)));
 
   const double fraction = static_cast<double>(clipped) / static_cast<double>(picture.values.size());
   CommandResult result;

@@ -22,6 +22,7 @@
 #include "light_field_io.h"
 #include "light_field_options.h"
 #include "option_values.h"
+#include "picture_description.h"
 #include "progress_line.h"
 #include "simulated_sweep.h"
 #include "thicklens/model/camera_file.h"
@@ -160,7 +161,10 @@ CommandResult SimulatePicture(const SceneOptions& options) {
         simulator.RenderNoiseless(RunWith(options.common, &progress));
     const model::StoredPicture stored = simulator.Store(picture);
     bits = stored.bits;
-    folder.Write("picture.png", EncodePng(stored));
+    folder.Write("picture.png",
+                 WithDescription(EncodePng(stored),
+                                 fmt::format("simulated; effects: {}",
+                                             model::JoinedNames(simulator.effects().on))));
   }
   folder.Write("depth.pfm", EncodePfm(depth));
   folder.Write("camera.yaml", model::CameraToYaml(simulator.camera()));
