@@ -272,19 +272,21 @@ std::vector<std::vector<double>> SolveBlock(const BlockSystem& system, const Blo
              system.matrix.rows,
              system.matrix.entries(),
              worker->solver->rcond(),
+             0,
              0};
   // Written so that NaN is refused, too.
-  if (!(report->rcond >= options.rcond_min) || !(report->rcond > 0)) {
+  if (report->rcond && (!(*report->rcond >= options.rcond_min) || !(*report->rcond > 0))) {
     throw Error(fmt::format(
         "{}: its system is singular, or so nearly that the light field would be noise however "
         "small "
         "the residual: rcond is {:.2g}, and must be at least {:.2g}; a larger ridge (now {:.3g}) "
         "helps",
-        NameOf(rect), report->rcond, options.rcond_min, options.ridge.value_or(0)));
+        NameOf(rect), *report->rcond, options.rcond_min, options.ridge.value_or(0)));
   }
   std::vector<std::vector<double>> channels;
   for (const std::vector<double>& right : system.right_sides) {
     channels.push_back(worker->solver->Solve(right));
+    report->iterations = std::max(report->iterations, worker->solver->iterations());
     const double residual = RelativeResidual(system.matrix, channels.back(), right);
     if (!std::isfinite(residual)) {
       throw Error(fmt::format("{}: the solution is not finite", NameOf(rect)));
@@ -367,8 +369,9 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   merging->StartWhole(input.picture.width_px, input.picture.height_px, rays.u_count(),
                       rays.v_count(), input.picture.channels);
   const std::unique_ptr<Kernels<double>> pattern_of_workers = merging->Clone();
+  const IterationLimits limits{options.tolerance, options.max_iterations};
   Workers workers([&] {
-    return Worker{pattern_of_workers->Clone(), NewLinearSolver(options.solver, symmetric)};
+    return Worker{pattern_of_workers->Clone(), NewLinearSolver(options.solver, symmetric, limits)};
   });
   std::mutex merge_mutex;
   int done = 0;
@@ -393,11 +396,14 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   KeepPriorBesideThePicture(whole, light_field, &values);
   light_field.values = std::move(values);
 
-  summary->rcond_min = 1;
+  const bool iterative = IsIterative(options.solver);
+  if (!iterative) summary->rcond_min = 1;
   for (const BlockReport& block : summary->blocks) {
-    summary->rcond_min = std::min(summary->rcond_min, block.rcond);
+    if (block.rcond) summary->rcond_min = std::min(*summary->rcond_min, *block.rcond);
     summary->relative_residual = std::max(summary->relative_residual, block.relative_residual);
+    summary->iterations = std::max(summary->iterations, block.iterations);
   }
+  summary->converged = !iterative || summary->relative_residual <= options.tolerance;
   summary->solve_seconds = SecondsSince(solve_start);
   summary->message = fmt::format("{} blocks of {} px solved by {}", count, summary->block_px,
                                  BlockSolverName(options.solver));

@@ -91,6 +91,12 @@ bool BlockOptions::IsValid(std::string* why) const {
   if (!(rcond_min >= 0) || !(rcond_min < 1)) {
     return fail(fmt::format("rcond_min is {}: it must be >= 0 and < 1", rcond_min));
   }
+  if (!(tolerance > 0) || !(tolerance < 1)) {
+    return fail(fmt::format("tolerance is {}: it must be > 0 and < 1", tolerance));
+  }
+  if (max_iterations < 1) {
+    return fail(fmt::format("max_iterations is {}: it must be >= 1", max_iterations));
+  }
   if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
   return true;
 }

@@ -366,7 +366,7 @@ TEST_F(EstimateTest, TheMemoryLimitHolds) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return nlohmann::json::parse(ContentOf(json));
   };
-  for (const std::string solver : {"umfpack", "cholmod", "eigen"}) {
+  for (const std::string solver : {"umfpack", "cholmod", "eigen", "bicgstab"}) {
     if (!estimator::IsBuiltIn(estimator::BlockSolverFromName(solver))) continue;
     SCOPED_TRACE(solver);
     // As much as 16 px need binds, and is enough for them, whatever the program holds here.
@@ -383,6 +383,32 @@ TEST_F(EstimateTest, TheMemoryLimitHolds) {
   // Refused before a system is made that would not fit.
   EXPECT_THAT(Refusal(With(good, {"--block-px", "144", "--memory-limit", "150"})),
               AllOf(HasSubstr("memory limit 150 MiB"), HasSubstr("blocks of 144 px")));
+}
+
+TEST_F(EstimateTest, IterationsByBlocksAreTold) {
+  const Arguments good = With(AsDisparity(Picture(), Disparity()), {"--block-solver", "cg"});
+  const std::string json = folder_ / "estimate.json";
+  const ProgramResult done = Run(With(good, {"--json", json}));
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  nlohmann::json summary = nlohmann::json::parse(ContentOf(json));
+  EXPECT_EQ(summary["block_solver"], "cg");
+  EXPECT_GT(summary["iterations"].get<int>(), 3);
+  EXPECT_EQ(summary["converged"], true);
+  EXPECT_LE(summary["relative_residual"].get<double>(), 1e-6);
+  EXPECT_TRUE(summary["rcond_min"].is_null());
+  EXPECT_THAT(done.err, ::testing::Not(HasSubstr("not converged")));
+
+  const ProgramResult cut = Run(With(good, {"--max-iterations", "2", "--json", json}));
+  ASSERT_EQ(cut.exit_code, 0) << cut.err;
+  summary = nlohmann::json::parse(ContentOf(json));
+  EXPECT_EQ(summary["converged"], false);
+  EXPECT_THAT(cut.err, AllOf(HasSubstr("not converged"), HasSubstr("--max-iterations")));
+  fs::remove_all(Output());
+  // A direct solver has no iterations to limit.
+  EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()),
+                           {"--block-solver", "eigen", "--tolerance", "1e-3"}),
+                      2),
+              HasSubstr("--tolerance is of --solver"));
 }
 
 TEST_F(EstimateTest, AnInterruptLeavesNothing) {

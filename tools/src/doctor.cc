@@ -45,10 +45,9 @@ struct Findings {
 };
 
 std::vector<std::string> BuiltInSolvers() {
-  using estimator::BlockSolver;
   std::vector<std::string> names;
-  for (const auto solver : {BlockSolver::kUmfpack, BlockSolver::kCholmod, BlockSolver::kEigen}) {
-    if (estimator::IsBuiltIn(solver)) names.push_back(estimator::BlockSolverName(solver));
+  for (const auto solver : estimator::BuiltInBlockSolvers()) {
+    names.push_back(estimator::BlockSolverName(solver));
   }
   return names;
 }

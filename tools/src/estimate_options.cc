@@ -160,16 +160,18 @@ void AddIterationOptions(CLI::App* command, EstimateOptions* options) {
   const estimator::FunctionalOptions functional;
   command
       ->add_option("--tolerance", options->tolerance,
-                   fmt::format("Of all but blocks: relative residual at which it stops; default "
-                               "{:g} (scene with tv) or {:g}",
-                               scene.tolerance_or_usual(), functional.tolerance))
+                   fmt::format("Of iterative solvers: relative residual at which they stop; "
+                               "default {:g} (scene with tv), {:g} (blocks) or {:g}",
+                               scene.tolerance_or_usual(), estimator::BlockOptions().tolerance,
+                               functional.tolerance))
       ->check(Between(0, 1, "a relative residual"))
       ->type_name("X");
   command
       ->add_option("--max-iterations", options->max_iterations,
-                   fmt::format("Of all but blocks: in all (scene; default {}), or for each channel "
-                               "(default {})",
-                               scene.max_iterations, functional.max_iterations))
+                   fmt::format("Of iterative solvers: in all (scene; default {}), for each channel "
+                               "(default {}), or for each block's (default {})",
+                               scene.max_iterations, functional.max_iterations,
+                               estimator::BlockOptions().max_iterations))
       ->check(CLI::Range(1, kMaxIterations))
       ->type_name("N");
   command->add_flag("--double", options->double_precision,
@@ -180,8 +182,10 @@ void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
   const std::string usual = estimator::BlockSolverName(estimator::DefaultBlockSolver());
   command
       ->add_option("--block-solver", options->block_solver,
-                   fmt::format("Of blocks: umfpack, cholmod or eigen; default {}", usual))
-      ->check(CLI::IsMember({"umfpack", "cholmod", "eigen"}))
+                   fmt::format("Of blocks: umfpack, cholmod or eigen; iterative, for comparison: "
+                               "cg, bicgstab or viennacl; default {}",
+                               usual))
+      ->check(CLI::IsMember({"umfpack", "cholmod", "eigen", "cg", "bicgstab", "viennacl"}))
       ->type_name("NAME");
   command
       ->add_option("--block-px", options->block_px,
@@ -211,13 +215,18 @@ struct OptionOfSolvers {
 std::vector<OptionOfSolvers> OptionsOfSolvers(const EstimateOptions& options) {
   const std::vector<std::string> scene = {"scene"}, blocks = {"blocks"};
   const std::vector<std::string> smooth = {"blocks", "functional", "grid"};
-  const std::vector<std::string> iterative = {"scene", "functional", "grid"};
+  const std::vector<std::string> whole_picture = {"scene", "functional", "grid"};
+  std::vector<std::string> iterative = whole_picture;
+  if (options.block_solver &&
+      estimator::IsIterative(estimator::BlockSolverFromName(*options.block_solver))) {
+    iterative.emplace_back("blocks");
+  }
   return {{"--prior", options.prior.has_value(), scene},
           {"--strength", options.strength.has_value(), scene},
           {"--check-blur", options.check_blur, scene},
           {"--tolerance", options.tolerance.has_value(), iterative},
           {"--max-iterations", options.max_iterations.has_value(), iterative},
-          {"--double", options.double_precision, iterative},
+          {"--double", options.double_precision, whole_picture},
           {"--gamma", options.gamma.has_value(), smooth},
           {"--ridge", options.ridge.has_value(), smooth},
           {"--block-solver", options.block_solver.has_value(), blocks},
@@ -348,6 +357,8 @@ estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, const mod
   if (options.splat == "nearest") solver.splat = kernels::Splat::kNearest;
   if (options.gamma) solver.gamma = *options.gamma;
   solver.ridge = options.ridge;
+  if (options.tolerance) solver.tolerance = *options.tolerance;
+  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
   solver.block_px = options.block_px;
   solver.memory_limit_mib = options.memory_limit_mib;
   solver.falloff = on.Has(model::Effect::kFalloff);

@@ -86,6 +86,14 @@ void AddScene(const EstimateOptions& options, const EstimateOutcome& outcome, js
 void AddBlocks(const EstimateOutcome& outcome, json* out) {
   const estimator::EstimateSummary& blocks = *outcome.blocks;
   const model::LightFieldOrigin& origin = outcome.light_field.origin;
+  // A direct solver has no iterations, and an iterative one no factor.
+  json iterations, converged, rcond_min;
+  if (blocks.rcond_min) {
+    rcond_min = *blocks.rcond_min;
+  } else {
+    iterations = blocks.iterations;
+    converged = blocks.converged;
+  }
   out->update({{"block_solver", origin.block_solver},
                {"stencil", origin.stencil},
                {"splat", origin.splat},
@@ -99,10 +107,10 @@ void AddBlocks(const EstimateOutcome& outcome, json* out) {
                {"block_px", blocks.block_px},
                {"blocks", blocks.blocks.size()},
                {"predicted_memory_mib", blocks.predicted_memory_mib},
-               {"iterations", nullptr},  // a direct solver has none
-               {"converged", nullptr},
+               {"iterations", iterations},
+               {"converged", converged},
                {"relative_residual", blocks.relative_residual},
-               {"rcond_min", blocks.rcond_min},
+               {"rcond_min", rcond_min},
                {"row_share", nullptr},
                {"hidden_share", nullptr},
                {"residual_rms", nullptr}});
@@ -139,6 +147,7 @@ std::optional<Iterations> IterationsOf(const EstimateOutcome& outcome) {
   };
   if (outcome.scene) return of(*outcome.scene);
   if (outcome.functional) return of(*outcome.functional);
+  if (outcome.blocks && !outcome.blocks->rcond_min) return of(*outcome.blocks);
   return std::nullopt;
 }
 
@@ -166,9 +175,9 @@ std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
 }
 
 std::string AccuracyText(const EstimateOutcome& outcome) {
-  if (outcome.blocks) {
+  if (outcome.blocks && outcome.blocks->rcond_min) {
     return fmt::format("accuracy     relative residual {:.1e}, smallest rcond {:.1e}\n",
-                       outcome.blocks->relative_residual, outcome.blocks->rcond_min);
+                       outcome.blocks->relative_residual, *outcome.blocks->rcond_min);
   }
   const Iterations iterations = IterationsOf(outcome).value_or(Iterations());
   return fmt::format("accuracy     relative residual {:.1e} after {} iterations{}\n",

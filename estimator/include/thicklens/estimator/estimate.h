@@ -22,10 +22,17 @@ enum class BlockSolver {
   kUmfpack,  // unsymmetric multifrontal LU (the source's choice); GPL
   kCholmod,  // supernodal Cholesky; GPL
   kEigen,    // simplicial Cholesky, or LU for the six-term stencil; always there
+  // Iterative, for comparison: none has a factor, so that the residual alone judges the answer.
+  kCg,        // conjugate gradients of Eigen, preconditioned by the diagonal; not for kSource
+  kBicgstab,  // BiCGSTAB of Eigen, the same (what the source calls biconjugate gradients)
+  kViennaCl,  // BiCGStab of ViennaCL on an OpenCL device; builds with THICKLENS_WITH_VIENNACL
 };
-BlockSolver BlockSolverFromName(const std::string& name);  // "umfpack", "cholmod", "eigen"; throws
+// "umfpack", "cholmod", "eigen", "cg", "bicgstab", "viennacl"; throws
+BlockSolver BlockSolverFromName(const std::string& name);
 std::string BlockSolverName(BlockSolver solver);
 bool IsBuiltIn(BlockSolver solver);  // whether this build has it
+std::vector<BlockSolver> BuiltInBlockSolvers();
+bool IsIterative(BlockSolver solver);
 BlockSolver DefaultBlockSolver();
 
 // How the smoothness over the rays of one scene point is discretised.
@@ -45,7 +52,11 @@ struct BlockOptions {
   // Edge of the square blocks, px. Default: 16, or the largest that `memory_limit_mib` allows.
   std::optional<int> block_px;
   std::optional<double> memory_limit_mib;  // for the whole process
-  double rcond_min = 1e-12;
+  double rcond_min = 1e-12;                // of direct solvers
+  // Of iterative ones: the relative residual of a block at which they stop, > 0, < 1, and the most
+  // iterations for a block's channel, >= 1.
+  double tolerance = 1e-6;
+  int max_iterations = 1000;
   bool falloff = true;  // the irradiance of (12), where there is a camera
   int threads = 0;      // 0: one per core
   // Called from any thread, one at a time, as blocks are finished. May throw to stop.
@@ -74,8 +85,10 @@ struct EstimateInput {
 struct BlockReport {
   int x = 0, y = 0, width_px = 0, height_px = 0;
   int unknowns = 0;
-  std::int64_t entries = 0;      // of the system
-  double rcond = 0;              // the solver's own estimate from its factor's diagonal
+  std::int64_t entries = 0;  // of the system
+  // The solver's own estimate from its factor's diagonal; absent: it is iterative.
+  std::optional<double> rcond;
+  int iterations = 0;            // the most of the channels
   double relative_residual = 0;  // |N x - b|/|b| recomputed; the largest of the channels
 };
 
@@ -84,9 +97,11 @@ struct EstimateSummary {
   int block_px = 0;
   std::vector<BlockReport> blocks;
   double gamma = 0, ridge = 0;
-  double rcond_min = 0;          // over the blocks
-  double relative_residual = 0;  // the largest
-  double setup_seconds = 0;      // geometry of the views, the prior, choice of the block size
+  std::optional<double> rcond_min;  // over the blocks; absent: the solver is iterative
+  double relative_residual = 0;     // the largest
+  int iterations = 0;               // of iterative solvers, the most of a block
+  bool converged = false;    // the largest residual is within the tolerance; direct solvers: always
+  double setup_seconds = 0;  // geometry of the views, the prior, choice of the block size
   double solve_seconds = 0;
   // Most that the whole process is expected to hold, with a margin: what it held before, the light
   // field, and on each thread a block as large as the most demanding of a few that were analysed.
@@ -102,6 +117,7 @@ struct EstimateSummary {
 // solution is noise, while its residual is perfect: see BlockOptions::rcond_min.
 // Channels share each block's factor. Blocks share no ray; smoothness links that leave a block
 // are lost. The result does not depend on the number of threads.
+// An iterative solver that does not converge leaves what it has reached: see `converged`.
 // Throws Error for options and inputs that do not fit, a block whose factor is singular or has an
 // rcond below the limit (naming the block), and a memory limit that no block fits.
 model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& options,
