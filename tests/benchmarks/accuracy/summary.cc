@@ -31,6 +31,11 @@ Coverage Cover(const std::vector<Measured>& results) {
   coverage.sigma_ratio = Median(sigmas) / RobustSigmaAboutZero(errors);
   coverage.sigma_ratio_z = 1 / RobustSigmaAboutZero(z);
   coverage.rms_z = RootMeanSquare(z);
+  const auto count = static_cast<double>(z.size());
+  for (const double value : z) coverage.mean_z += value / count;
+  double variance = 0;
+  for (const double value : z) variance += std::pow(value - coverage.mean_z, 2) / (count - 1);
+  coverage.mean_over_error = coverage.mean_z / std::sqrt(variance / count);
   return coverage;
 }
 

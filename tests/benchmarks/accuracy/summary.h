@@ -18,6 +18,9 @@ struct Coverage {
   double sigma_ratio = 0;    // median sigma over the scatter, 1.4826 median |error|
   double sigma_ratio_z = 0;  // 1 over 1.4826 median |error/sigma|
   double rms_z = 0;
+  // Whether errors lean to one side: their mean, in sigmas, and how many of its own standard errors
+  // that is (about a standard normal number where there is no bias).
+  double mean_z = 0, mean_over_error = 0;
   double fraction() const { return trials > 0 ? static_cast<double>(inside) / trials : 0; }
 };
 

@@ -41,7 +41,9 @@ Json CoverageJson(const Coverage& c) {
           {"binomial_p", c.binomial_p},
           {"sigma_over_scatter", Number(c.sigma_ratio)},
           {"inverse_robust_z", Number(c.sigma_ratio_z)},
-          {"rms_z", Number(c.rms_z)}};
+          {"rms_z", Number(c.rms_z)},
+          {"mean_z", Number(c.mean_z)},
+          {"mean_z_over_its_error", Number(c.mean_over_error)}};
 }
 
 Json SummaryJson(const Summary& s) {
@@ -192,10 +194,11 @@ std::vector<std::pair<std::string, Coverage>> Coverages(const Summary& s) {
 Json PrintCoverage(const Run& run, bool aperiodic_alone) {
   Print(
       fmt::format("\nCoverage of value +- 1.96 sigma, floors drawn, {}: sigma over scatter "
-                  "robust, of medians\nand by z",
+                  "robust, of medians\nand by z; mean z, and that over its own standard error",
                   aperiodic_alone ? "aperiodic textures" : "all textures"));
-  Print(fmt::format("{:<6}{:<7}{:>8}{:>8}{:>10}{:>10}{:>9}{:>8}{:>8}  {}", "case", "result",
-                    "inside", "of", "coverage", "p", "sigma/sc", "1/z", "rms z", "at 0.1 %"));
+  Print(fmt::format("{:<6}{:<7}{:>8}{:>8}{:>10}{:>10}{:>9}{:>8}{:>8}{:>8}{:>7}  {}", "case",
+                    "result", "inside", "of", "coverage", "p", "sigma/sc", "1/z", "rms z", "mean z",
+                    "errors", "at 0.1 %"));
   Json rows = Json::array();
   std::map<std::string, std::vector<Coverage>> by_result;
   std::vector<double> ratios;
@@ -208,10 +211,12 @@ Json PrintCoverage(const Run& run, bool aperiodic_alone) {
     for (const auto& [result, c] : Coverages(s)) {
       by_result[result].push_back(c);
       ratios.push_back(c.sigma_ratio);
-      Print(fmt::format("{:<6}{:<7}{:>8}{:>8}{:>10.3f}{:>10.4f}{:>9.2f}{:>8.2f}{:>8.2f}  {}", name,
-                        result, c.inside, c.trials, c.fraction(), c.binomial_p, c.sigma_ratio,
-                        c.sigma_ratio_z, c.rms_z,
-                        c.binomial_p < kRejectionP ? "REJECTED" : "not rejected"));
+      Print(
+          fmt::format("{:<6}{:<7}{:>8}{:>8}{:>10.3f}{:>10.4f}{:>9.2f}{:>8.2f}{:>8.2f}{:>8.2f}"
+                      "{:>7.1f}  {}",
+                      name, result, c.inside, c.trials, c.fraction(), c.binomial_p, c.sigma_ratio,
+                      c.sigma_ratio_z, c.rms_z, c.mean_z, c.mean_over_error,
+                      c.binomial_p < kRejectionP ? "REJECTED" : "not rejected"));
       Json row = CoverageJson(c);
       row["case"] = name;
       row["result"] = result;
