@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+#include "shown_views.h"
 #include "thicklens/error.h"
 
 namespace thicklens::estimator {
@@ -16,11 +17,6 @@ namespace {
 constexpr double kRounding = 1e-9;
 // Weights of files.
 constexpr double kSameWeight = 1e-6;
-
-void CheckLightField(const model::LightField& light_field) {
-  std::string why;
-  if (!light_field.IsValid(&why)) throw Error("light field: " + why);
-}
 
 // Where a view crosses the aperture: mm with a camera, else view steps, from the centre.
 Eigen::Vector2d AperturePosition(const model::LightField& light_field, int k, int l) {

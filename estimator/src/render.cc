@@ -11,8 +11,7 @@
 #include <vector>
 
 #include "catmull_rom.h"
-#include "ray_irradiance.h"
-#include "ray_landing.h"
+#include "shown_views.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
 
@@ -24,129 +23,9 @@ constexpr double kRounding = 1e-9;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-void CheckLightField(const model::LightField& light_field) {
-  std::string why;
-  if (!light_field.IsValid(&why)) throw Error("light field: " + why);
-}
-
 void CheckIndex(const char* name, int value, int count) {
   if (value >= 0 && value < count) return;
   throw Error(fmt::format("{} is {}: it must be from 0 to {}", name, value, count - 1));
-}
-
-// The weights of the views that there are. Throws Error if they do not fit or nothing is left.
-Eigen::ArrayXXd PresentWeights(const model::LightField& light_field,
-                               const Eigen::ArrayXXd& weights) {
-  if (weights.cols() != light_field.u_count || weights.rows() != light_field.v_count) {
-    throw Error(fmt::format("weights are {}x{} for {}x{} views: the counts must be equal",
-                            weights.cols(), weights.rows(), light_field.u_count,
-                            light_field.v_count));
-  }
-  if (!(weights >= 0).all() || !weights.allFinite()) {
-    throw Error("weights of the views: they must be finite and >= 0");
-  }
-  Eigen::ArrayXXd present = weights;
-  for (int l = 0; l < light_field.v_count; ++l) {
-    for (int k = 0; k < light_field.u_count; ++k) {
-      if (!light_field.IsPresent(k, l)) present(l, k) = 0;
-    }
-  }
-  if (!(present.sum() > 0)) {
-    throw Error("weights of the views: no view that is present has a weight > 0");
-  }
-  return present;
-}
-
-model::LinearPicture BlackPicture(int width_px, int height_px, int channels) {
-  return {width_px, height_px, channels,
-          std::vector<float>(Index(width_px) * Index(height_px) * Index(channels), 0.0F)};
-}
-
-// All views of one channel, in the order of the light field.
-std::vector<float> ChannelOf(const model::LightField& light_field, int channel) {
-  const auto start = light_field.values.begin() +
-                     static_cast<std::ptrdiff_t>(light_field.ViewStart(channel, 0, 0));
-  const std::size_t count =
-      Index(light_field.u_count) * Index(light_field.v_count) * light_field.view_size();
-  return {start, start + static_cast<std::ptrdiff_t>(count)};
-}
-
-// Calls work(view, k, l) for all views.
-template <typename Work>
-void ForEachView(const model::LightField& light_field, int threads, const Work& work) {
-  model::ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int view) {
-    work(view, view % light_field.u_count, view / light_field.u_count);
-  });
-}
-
-// Irradiance of every ray, by view, relative to that of `weights` at the principal point; empty
-// where `seen` is 0.
-std::vector<std::vector<float>> FalloffOfViews(const model::LightField& light_field,
-                                               const model::Camera& camera,
-                                               const Eigen::ArrayXXd& weights,
-                                               const Eigen::ArrayXXd& seen, int threads) {
-  std::vector<std::vector<float>> falloff(Index(light_field.u_count * light_field.v_count));
-  ForEachView(light_field, threads, [&](int view, int k, int l) {
-    if (seen(l, k) == 0) return;
-    falloff[Index(view)] = RelativeFalloff(*light_field.grid, camera, weights, k, l);
-  });
-  return falloff;
-}
-
-// What the aperture passes of every ray, by view; empty where `seen` is 0.
-std::vector<std::vector<float>> PassedByViews(const model::LightField& light_field,
-                                              const Vignetting& vignetting,
-                                              const Eigen::ArrayXXd& seen, int threads) {
-  std::vector<std::vector<float>> passed(Index(light_field.u_count * light_field.v_count));
-  ForEachView(light_field, threads, [&](int view, int k, int l) {
-    if (seen(l, k) > 0) passed[Index(view)] = PassedRays(light_field, vignetting, k, l);
-  });
-  return passed;
-}
-
-// The mean of what is passed over the rays of each pixel. Throws Error where there are rays and
-// none is passed.
-std::vector<float> BundleOf(const model::LightField& light_field,
-                            const kernels::BlockGeometry& whole, kernels::Splat splat,
-                            const std::vector<std::vector<float>>& passed,
-                            kernels::Kernels<float>* kernels) {
-  std::vector<float> rays;
-  rays.reserve(passed.size() * light_field.view_size());
-  for (const std::vector<float>& view : passed) {
-    rays.insert(rays.end(), view.begin(), view.end());
-    if (view.empty()) rays.resize(rays.size() + light_field.view_size());
-  }
-  std::vector<float> bundle = kernels->FormPicture(whole, splat, rays);
-  if (std::all_of(bundle.begin(), bundle.end(), [](float sum) { return sum > 0; })) return bundle;
-  std::fill(rays.begin(), rays.end(), 1.0F);
-  const std::vector<float> landed = kernels->FormPicture(whole, splat, rays);
-  for (std::size_t i = 0; i < bundle.size(); ++i) {
-    if (bundle[i] > 0) continue;
-    if (landed[i] == 0) {  // black, with vignetting or without
-      bundle[i] = 1;
-      continue;
-    }
-    const auto pixel = static_cast<int>(i);
-    throw Error(fmt::format(
-        "vignetting: the aperture passes no ray of the light field that lands at the pixel ({}, "
-        "{}), with the UV plane at a depth of {:g} mm: a larger aperture, more views, or no "
-        "vignetting is needed",
-        pixel % light_field.s_count, pixel / light_field.s_count,
-        light_field.grid->planes.uv_depth_mm));
-  }
-  return bundle;
-}
-
-// Share by share; `product` may be empty, as if it were 1.
-void MultiplyInto(const std::vector<std::vector<float>>& shares,
-                  std::vector<std::vector<float>>* product) {
-  if (product->empty()) {
-    *product = shares;
-    return;
-  }
-  for (std::size_t view = 0; view < shares.size(); ++view) {
-    for (std::size_t i = 0; i < shares[view].size(); ++i) (*product)[view][i] *= shares[view][i];
-  }
 }
 
 // The samples x of [0, count) for which x - shift_px lies inside the view, and how to read there.
@@ -239,55 +118,6 @@ void CheckRepeat(int repeat_px) {
 }
 
 }  // namespace
-
-model::LinearPicture Photograph(const model::LightField& light_field,
-                                const Eigen::ArrayXXd& weights, const model::Camera* falloff,
-                                const Vignetting* vignetting, kernels::Kernels<float>* kernels,
-                                int threads) {
-  CheckLightField(light_field);
-  const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
-  const bool is_vignetted = vignetting != nullptr && IsOffAperture(light_field);
-  // A view that the principal point sees nothing of may pass rays of other pixels.
-  const Eigen::ArrayXXd seen =
-      is_vignetted
-          ? PresentWeights(light_field, Eigen::ArrayXXd::Ones(weights.rows(), weights.cols()))
-          : present;
-  std::vector<std::vector<float>> share_of_rays;
-  if (falloff != nullptr && light_field.grid) {
-    share_of_rays = FalloffOfViews(light_field, *falloff, present, seen, threads);
-  }
-  // As the rays were taken apart, so they are put together.
-  const kernels::Splat splat =
-      light_field.origin.splat == "nearest" ? kernels::Splat::kNearest : kernels::Splat::kBilinear;
-  const kernels::BlockGeometry whole =
-      BlockOf(light_field, {0, 0, light_field.s_count, light_field.t_count}, seen);
-  std::vector<float> bundle;  // of each pixel, where its rays have weights of their own
-  if (is_vignetted) {
-    const std::vector<std::vector<float>> passed =
-        PassedByViews(light_field, *vignetting, seen, threads);
-    bundle = BundleOf(light_field, whole, splat, passed, kernels);
-    MultiplyInto(passed, &share_of_rays);
-  }
-
-  model::LinearPicture photograph =
-      BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
-  for (int channel = 0; channel < light_field.channels; ++channel) {
-    std::vector<float> rays = ChannelOf(light_field, channel);
-    if (!share_of_rays.empty()) {
-      ForEachView(light_field, threads, [&](int view, int, int) {
-        const std::vector<float>& share = share_of_rays[Index(view)];
-        float* values = rays.data() + Index(view) * light_field.view_size();
-        for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
-      });
-    }
-    std::vector<float> pixels = kernels->FormPicture(whole, splat, rays);
-    for (std::size_t i = 0; i < bundle.size(); ++i) pixels[i] /= bundle[i];
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      photograph.values[i * Index(light_field.channels) + Index(channel)] = pixels[i];
-    }
-  }
-  return photograph;
-}
 
 model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,
                              double disparity_v_px, const Eigen::ArrayXXd& weights, int threads) {

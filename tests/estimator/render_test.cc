@@ -98,8 +98,15 @@ double IrradianceAt(const model::LightField& field, const model::Ray& ray) {
 
 model::LinearPicture TakePhotograph(const model::LightField& field, const Eigen::ArrayXXd& weights,
                                     bool falloff, int threads = 1) {
-  return Photograph(field, weights, falloff && field.camera ? &*field.camera : nullptr, nullptr,
-                    kernels::NewReference<float>().get(), threads);
+  const model::Camera* camera = falloff && field.camera ? &*field.camera : nullptr;
+  const auto twin = kernels::NewReference<float>();
+  model::LinearPicture photograph =
+      Photograph(field, weights, camera, nullptr, twin.get(), threads);
+  const model::LinearPicture native = Photograph(field, weights, camera, nullptr, nullptr, threads);
+  for (std::size_t i = 0; i < photograph.values.size(); ++i) {
+    EXPECT_NEAR(native.values[i], photograph.values[i], 2e-6) << i;
+  }
+  return photograph;
 }
 
 // --- The photograph.

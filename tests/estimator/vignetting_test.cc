@@ -63,8 +63,15 @@ model::SceneSimulationOptions SineScene(model::Psf psf, double depth_mm, double 
 
 model::LinearPicture PhotographOf(const model::LightField& field, const Vignetting* vignetting,
                                   const model::Camera* falloff = nullptr) {
-  return Photograph(field, field.weights, falloff, vignetting, kernels::NewReference<float>().get(),
-                    1);
+  const auto twin = kernels::NewReference<float>();
+  model::LinearPicture photograph =
+      Photograph(field, field.weights, falloff, vignetting, twin.get(), 1);
+  const model::LinearPicture native =
+      Photograph(field, field.weights, falloff, vignetting, nullptr, 1);
+  for (std::size_t i = 0; i < photograph.values.size(); ++i) {
+    EXPECT_NEAR(native.values[i], photograph.values[i], 2e-6) << i;
+  }
+  return photograph;
 }
 
 double RmsDifference(const model::LinearPicture& a, const model::LinearPicture& b) {

@@ -16,7 +16,9 @@ namespace thicklens::estimator {
 // aperture the rays of a view cross it in different places: those that land at a pixel have the
 // weights of `vignetting`, with sum 1 over the views that are present, `weights` being those of the
 // principal point (with ST in the plane of focus); null: `weights` everywhere. Throws Error, too,
-// if a pixel's rays are all outside of the aperture.
+// if a pixel's rays are all outside of the aperture. Without `kernels` it is computed on the
+// processor, vectorised on `threads` of them; the numbers are those of the kernels but for
+// rounding.
 model::LinearPicture Photograph(const model::LightField& light_field,
                                 const Eigen::ArrayXXd& weights, const model::Camera* falloff,
                                 const Vignetting* vignetting, kernels::Kernels<float>* kernels,
