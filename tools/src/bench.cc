@@ -3,16 +3,17 @@
 
 #include <algorithm>
 #include <chrono>
-#include <fstream>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
+#include "bench_gamma.h"
+#include "bench_machine.h"
 #include "bench_scene.h"
-#include "build_info.h"
+#include "bench_solvers.h"
+#include "bench_source.h"
 #include "commands.h"
 #include "interrupt.h"
 #include "light_field_options.h"
@@ -21,9 +22,6 @@
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate.h"
-#include "thicklens/estimator/functional_solver.h"
-#include "thicklens/estimator/grid_solver.h"
-#include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/parallel.h"
 
@@ -32,7 +30,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kBlockPx = 16;
 constexpr int kSamplePx = 64;  // edge of the part that blocks are measured on
 
 struct BenchOptions {
@@ -44,11 +41,9 @@ struct BenchOptions {
   std::uint64_t seed = 1;
 };
 
-// One way from picture and depth to the views, all of it.
 struct Contender {
-  std::string solver, block_solver, prior;
+  LightFieldSolver way;
   const BenchScene* scene = nullptr;
-  std::function<model::LightField(const BenchScene&)> estimate;
   std::vector<double> seconds;
   double psnr_db = 0;
 };
@@ -62,89 +57,17 @@ std::pair<int, int> SizeOf(const std::string& text) {
   return {parts[0], parts[1]};
 }
 
-std::string ProcessorName() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    if (line.rfind("model name", 0) != 0) continue;
-    const std::size_t colon = line.find(": ");
-    if (colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown";
-}
-
-double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t middle = values.size() / 2;
-  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
-}
-
 std::vector<Contender> Contenders(const BenchScene& whole, const BenchScene& sample, int threads,
                                   kernels::Backend* backend) {
   std::vector<Contender> contenders;
   for (const auto solver : {estimator::BlockSolver::kUmfpack, estimator::BlockSolver::kCholmod,
                             estimator::BlockSolver::kEigen}) {
     if (!estimator::IsBuiltIn(solver)) continue;
-    contenders.push_back({"blocks",
-                          estimator::BlockSolverName(solver),
-                          "ridge",
-                          &sample,
-                          [=](const BenchScene& scene) {
-                            estimator::BlockOptions options;
-                            options.solver = solver;
-                            options.block_px = kBlockPx;
-                            options.threads = threads;
-                            options.progress = [](int, int) { ThrowIfInterrupted(); };
-                            estimator::EstimateSummary summary;
-                            return estimator::EstimateByBlocks(scene.input, options, backend,
-                                                               &summary);
-                          },
-                          {},
-                          0});
+    contenders.push_back({SolverByBlocks(solver, threads, backend), &sample, {}, 0});
   }
-  for (const auto prior : {estimator::Prior::kRidge, estimator::Prior::kGradient,
-                           estimator::Prior::kTotalVariation, estimator::Prior::kPatches}) {
-    contenders.push_back({"scene",
-                          "",
-                          estimator::PriorName(prior),
-                          &whole,
-                          [=](const BenchScene& scene) {
-                            estimator::SceneOptions options;
-                            options.prior = prior;
-                            options.threads = threads;
-                            options.progress = [](int, int) { ThrowIfInterrupted(); };
-                            estimator::SceneSummary summary;
-                            return estimator::EstimateScene(scene.input, options, &summary,
-                                                            nullptr);
-                          },
-                          {},
-                          0});
+  for (LightFieldSolver& solver : WholePictureSolvers(threads)) {
+    contenders.push_back({std::move(solver), &whole, {}, 0});
   }
-  for (const bool on_grid : {false, true}) {
-    contenders.push_back({on_grid ? "grid" : "functional",
-                          "",
-                          "ridge",
-                          &whole,
-                          [=](const BenchScene& scene) {
-                            estimator::FunctionalOptions options;
-                            options.threads = threads;
-                            options.progress = [](int, int) { ThrowIfInterrupted(); };
-                            const auto estimate =
-                                on_grid ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
-                            estimator::FunctionalSummary summary;
-                            return estimate(scene.input, options, &summary);
-                          },
-                          {},
-                          0});
-  }
-  contenders.push_back({"dibr",
-                        "",
-                        "",
-                        &whole,
-                        [=](const BenchScene& scene) {
-                          return estimator::WarpedLightField(scene.input, true, threads);
-                        },
-                        {},
-                        0});
   return contenders;
 }
 
@@ -164,7 +87,7 @@ void Measure(const BenchOptions& options, int threads, std::vector<Contender>* c
     for (Contender& contender : *contenders) {
       ThrowIfInterrupted();
       const Clock::time_point start = Clock::now();
-      const model::LightField estimate = contender.estimate(*contender.scene);
+      const model::LightField estimate = contender.way.estimate(contender.scene->input);
       contender.seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
       if (round == 0) contender.psnr_db = PsnrDb(*contender.scene, estimate, threads);
       progress.Show(++done, total);
@@ -211,9 +134,9 @@ CommandResult BenchSolvers(const BenchOptions& options) {
     const auto or_null = [](const std::string& name) {
       return name.empty() ? nlohmann::json() : nlohmann::json(name);
     };
-    rows.push_back({{"solver", contender.solver},
-                    {"block_solver", or_null(contender.block_solver)},
-                    {"prior", or_null(contender.prior)},
+    rows.push_back({{"solver", contender.way.solver},
+                    {"block_solver", or_null(contender.way.block_solver)},
+                    {"prior", or_null(contender.way.prior)},
                     {"size", {width_px, height_px}},
                     {"views", {u_count, v_count}},
                     {"threads", threads},
@@ -222,9 +145,9 @@ CommandResult BenchSolvers(const BenchOptions& options) {
                     {"seconds", seconds},
                     {"seconds_of_runs", contender.seconds},
                     {"psnr_db", contender.psnr_db}});
-    text += fmt::format("{:<11}{:<9}{:<10}{:>9.3g}{}{:>14.4g}{:>10.2f}\n", contender.solver,
-                        contender.block_solver, contender.prior, seconds, extrapolated ? "*" : " ",
-                        *blocks_seconds / seconds, contender.psnr_db);
+    text += fmt::format("{:<11}{:<9}{:<10}{:>9.3g}{}{:>14.4g}{:>10.2f}\n", contender.way.solver,
+                        contender.way.block_solver, contender.way.prior, seconds,
+                        extrapolated ? "*" : " ", *blocks_seconds / seconds, contender.psnr_db);
   }
   if (extrapolated_any) {
     text += fmt::format(
@@ -235,11 +158,7 @@ CommandResult BenchSolvers(const BenchOptions& options) {
   PrintResult(options.common, text);
   return {{{"status", "ok"},
            {"reason", ""},
-           {"machine",
-            {{"processor", ProcessorName()},
-             {"cores", static_cast<int>(std::thread::hardware_concurrency())},
-             {"build", BuildInfo()},
-             {"date", NowIso8601()}}},
+           {"machine", MachineJson()},
            {"scene", {{"kind", "slanted plane of noise"}, {"channels", 1}, {"seed", options.seed}}},
            {"repeat", options.repeat},
            {"rows", rows}},
@@ -252,6 +171,8 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
   CLI::App* bench =
       program->add_subcommand("bench", "What accuracy costs in time, on this machine");
   bench->require_subcommand(1);
+  AddBenchSourceCommand(bench, action);
+  AddBenchGammaCommand(bench, action);
   CLI::App* command = bench->add_subcommand(
       "solvers", "All light-field solvers on one simulated picture, in one run");
   const auto options = std::make_shared<BenchOptions>();

@@ -1,6 +1,8 @@
 #include "bench_scene.h"
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -15,24 +17,6 @@ namespace {
 
 constexpr double kFocusDepthMm = 1000;
 constexpr double kNearMm = 750, kFarMm = 1500;
-
-model::Camera BenchCamera(int width_px, int height_px) {
-  model::Camera camera;
-  camera.name = "bench";
-  camera.lens.front_focal_length_mm = camera.lens.rear_focal_length_mm = 12.5;
-  camera.lens.aperture_radius_mm = 4.46;
-  camera.sensor.width_px = width_px;
-  camera.sensor.height_px = height_px;
-  camera.sensor.pixel_pitch_mm = 0.0028;
-  camera.sensor.principal_point_px = {(width_px - 1) / 2.0, (height_px - 1) / 2.0};
-  camera.sensor.transfer = model::TransferCurve::Srgb();
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, kFocusDepthMm), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  camera.calibration->evidence.method = "assumed";
-  return camera;
-}
 
 // 1/z is linear in the picture: (1 - slope tan)/depth on a plane of that slope.
 model::PlaneOptions SlantedPlane(const model::Camera& camera) {
@@ -61,10 +45,34 @@ model::LightField GreyViews(const model::LightField& colours) {
 
 }  // namespace
 
+model::Camera BenchCamera(int width_px, int height_px) {
+  model::Camera camera;
+  camera.name = "bench";
+  camera.lens.front_focal_length_mm = camera.lens.rear_focal_length_mm = 12.5;
+  camera.lens.aperture_radius_mm = 4.46;
+  camera.sensor.width_px = width_px;
+  camera.sensor.height_px = height_px;
+  camera.sensor.pixel_pitch_mm = 0.0028;
+  camera.sensor.principal_point_px = {(width_px - 1) / 2.0, (height_px - 1) / 2.0};
+  camera.sensor.transfer = model::TransferCurve::Srgb();
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm =
+      model::Estimate{model::ImageDistanceMm(camera.lens, kFocusDepthMm), 0};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
+  camera.calibration->evidence.method = "assumed";
+  return camera;
+}
+
 BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count, std::uint64_t seed,
                           int threads, const std::function<void(int done, int total)>& progress) {
+  return MakeBenchScene(BenchCamera(width_px, height_px), u_count, v_count, seed, threads,
+                        progress);
+}
+
+BenchScene MakeBenchScene(const model::Camera& camera, int u_count, int v_count, std::uint64_t seed,
+                          int threads, const std::function<void(int done, int total)>& progress) {
   model::SceneSimulationOptions options;
-  options.camera = BenchCamera(width_px, height_px);
+  options.camera = camera;
   options.noise_sigma_grey_levels = 1;
   options.u_count = u_count;
   options.v_count = v_count;
@@ -87,31 +95,42 @@ BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count,
   input.grid = model::DefaultGrid(options.camera, u_count, v_count);
   input.weights =
       model::ApertureWeights(model::ApertureShapeOf(options.camera.psf), u_count, v_count);
-  input.disparity =
-      estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values, width_px, height_px);
+  input.disparity = estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values,
+                                               camera.sensor.width_px, camera.sensor.height_px);
   return scene;
 }
 
-BenchScene MiddleOf(const BenchScene& scene, int width_px, int height_px) {
+BenchScene PartOf(const BenchScene& scene, const model::PixelRect& part) {
   const estimator::EstimateInput& whole = scene.input;
-  const model::PixelRect part{(whole.picture.width_px - width_px) / 2,
-                              (whole.picture.height_px - height_px) / 2, width_px, height_px};
-  BenchScene middle;
-  middle.truth = model::CropViews(scene.truth, part);
-  middle.input = whole;
-  middle.input.picture = model::CropPicture(whole.picture, part);
-  middle.input.camera = model::CropCamera(*whole.camera, part);
-  middle.input.grid = middle.truth.grid;
-  middle.input.disparity.width_px = width_px;
-  middle.input.disparity.height_px = height_px;
-  middle.input.disparity.disparity.clear();
-  for (int y = part.y; y < part.y + height_px; ++y) {
+  BenchScene cut;
+  if (scene.has_truth()) cut.truth = model::CropViews(scene.truth, part);
+  cut.input = whole;
+  cut.input.picture = model::CropPicture(whole.picture, part);
+  if (whole.camera) cut.input.camera = model::CropCamera(*whole.camera, part);
+  if (whole.falloff_camera) {
+    cut.input.falloff_camera = model::CropCamera(*whole.falloff_camera, part);
+  }
+  if (cut.input.grid) {
+    cut.input.grid->s_count = part.width;
+    cut.input.grid->t_count = part.height;
+    cut.input.grid->st_origin_index -= Eigen::Vector2d(part.x, part.y);
+  }
+  cut.input.disparity.width_px = part.width;
+  cut.input.disparity.height_px = part.height;
+  cut.input.disparity.disparity.clear();
+  for (int y = part.y; y < part.y + part.height; ++y) {
     const auto row = whole.disparity.disparity.begin() +
                      static_cast<std::ptrdiff_t>(y) * whole.picture.width_px + part.x;
-    middle.input.disparity.disparity.insert(middle.input.disparity.disparity.end(), row,
-                                            row + width_px);
+    cut.input.disparity.disparity.insert(cut.input.disparity.disparity.end(), row,
+                                         row + part.width);
   }
-  return middle;
+  return cut;
+}
+
+BenchScene MiddleOf(const BenchScene& scene, int width_px, int height_px) {
+  const model::LinearPicture& picture = scene.input.picture;
+  return PartOf(scene, {(picture.width_px - width_px) / 2, (picture.height_px - height_px) / 2,
+                        width_px, height_px});
 }
 
 }  // namespace thicklens::tools

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "thicklens/estimator/estimate.h"
+#include "thicklens/model/camera.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::tools {
@@ -15,12 +16,19 @@ namespace thicklens::tools {
 // The photograph is made of hundreds of rays a pixel, far finer than any solver's views.
 struct BenchScene {
   estimator::EstimateInput input;
-  model::LightField truth;
+  model::LightField truth;  // no values: it is not known
+  bool has_truth() const { return !truth.values.empty(); }
 };
+// f/1.4, 12.5 mm, thin, focused at 1 m.
+model::Camera BenchCamera(int width_px, int height_px);
+// With any other lens that is focused there; the planes' depths stay.
+BenchScene MakeBenchScene(const model::Camera& camera, int u_count, int v_count, std::uint64_t seed,
+                          int threads, const std::function<void(int done, int total)>& progress);
 BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count, std::uint64_t seed,
                           int threads, const std::function<void(int done, int total)>& progress);
 
-// The same for a part of the picture, in its middle.
+// The same for a part of the picture.
+BenchScene PartOf(const BenchScene& scene, const model::PixelRect& part);
 BenchScene MiddleOf(const BenchScene& scene, int width_px, int height_px);
 
 }  // namespace thicklens::tools

@@ -1,0 +1,65 @@
+#include "bench_machine.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include "build_info.h"
+#include "commands.h"
+#include "thicklens/model/parallel.h"
+
+namespace thicklens::tools {
+namespace {
+
+std::string ProcessorName() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.rfind("model name", 0) != 0) continue;
+    const std::size_t colon = line.find(": ");
+    if (colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+void TriadOf(const float* b, const float* c, std::size_t count, float* a) {
+  for (std::size_t i = 0; i < count; ++i) a[i] = b[i] + 3 * c[i];
+}
+
+}  // namespace
+
+nlohmann::json MachineJson() {
+  return {{"processor", ProcessorName()},
+          {"cores", static_cast<int>(std::thread::hardware_concurrency())},
+          {"build", BuildInfo()},
+          {"date", NowIso8601()}};
+}
+
+double TriadBytesPerSecond(int threads) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::size_t kCount = std::size_t{1} << 25U;
+  constexpr int kParts = 64, kRuns = 5;
+  std::vector<float> a(kCount), b(kCount, 1.0F), c(kCount, 2.0F);
+  double best = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const Clock::time_point start = Clock::now();
+    model::ParallelFor(kParts, threads, [&](int part) {
+      constexpr std::size_t kOfPart = kCount / kParts;
+      const std::size_t first = static_cast<std::size_t>(part) * kOfPart;
+      TriadOf(b.data() + first, c.data() + first, kOfPart, a.data() + first);
+    });
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    best = std::max(best, 3.0 * sizeof(float) * kCount / seconds);
+  }
+  return best;
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+}
+
+}  // namespace thicklens::tools

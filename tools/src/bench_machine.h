@@ -1,0 +1,21 @@
+#ifndef THICKLENS_TOOLS_BENCH_MACHINE_H_
+#define THICKLENS_TOOLS_BENCH_MACHINE_H_
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+namespace thicklens::tools {
+
+// What times are to be read with: processor, cores, build, date.
+nlohmann::json MachineJson();
+
+// Bytes a second that memory gives `threads` of them, as the STREAM benchmark does and counts it:
+// of a = b + 3 c, two arrays read and one written, far larger than any cache. The best of a few
+// runs.
+double TriadBytesPerSecond(int threads);
+
+double Median(std::vector<double> values);  // not empty
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_BENCH_MACHINE_H_

@@ -1,0 +1,177 @@
+#include "bench_source_rows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bench_machine.h"
+
+namespace thicklens::tools {
+namespace {
+
+using nlohmann::json;
+
+template <typename Value>
+json OrNull(const std::optional<Value>& value) {
+  return value ? json(*value) : json();
+}
+
+std::string OrDash(const std::optional<double>& value, int digits) {
+  return value ? fmt::format("{:.{}f}", *value, digits) : "-";
+}
+
+const char* Heading(int table) {
+  switch (table) {
+    case 1:
+      return "Table 1. Light field from a picture by blocks of 16 px (UMFPACK, gamma 1): matrices "
+             "by "
+             "OpenCL kernels,\nor all on one thread; below what this program has beside";
+    case 2:
+      return "Table 2. Picture from a light field: OpenCL, transfers included, against one thread; "
+             "below our best\ncode for the processor. bandwidth: bytes that must be moved, a "
+             "second, "
+             "over the machine's triad";
+    case 3:
+      return "Table 3. Linear solvers of the blocks (16 px, gamma 1; iterations to 1e-6, residual "
+             "recomputed), then\nthe whole picture at once; one thread each, ViennaCL on the "
+             "OpenCL "
+             "device";
+    default:
+      return "Table 4. Thick against thin lens, focused on the same plane: the picture formed "
+             "again "
+             "from the estimate\n(what the source measured), and what that does not see, the true "
+             "views";
+  }
+}
+
+// What the ratios of a table are taken to.
+const char* BaseOf(int table) { return table == 3 ? "umfpack" : "cpu"; }
+
+const SourceRow* BaseRow(const SourceRow& row, const std::vector<SourceRow>& rows) {
+  const auto base = std::find_if(rows.begin(), rows.end(), [&](const SourceRow& other) {
+    return other.table == row.table && other.picture == row.picture && other.views == row.views &&
+           other.implementation == BaseOf(row.table);
+  });
+  return base == rows.end() ? nullptr : &*base;
+}
+
+std::string Ratio(double base, double seconds) { return fmt::format("{:.3g}", base / seconds); }
+
+std::string TimeLine(const SourceRow& row, const std::vector<SourceRow>& rows) {
+  const double seconds = Median(row.seconds);
+  const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+  const SourceRow* base = BaseRow(row, rows);
+  std::string published = "-", published_ratio = "-";
+  if (row.published) {
+    published = fmt::format("{:.2f}", MeanOf(*row.published));
+    if (base != nullptr && base->published) {
+      published_ratio = Ratio(MeanOf(*base->published), MeanOf(*row.published));
+    }
+  }
+  std::string more;
+  if (row.table == 2) more = fmt::format("{:>11}", OrDash(row.bandwidth_share, 2));
+  if (row.table == 3) {
+    more = fmt::format("{:>11}{}",
+                       row.relative_residual ? fmt::format("{:.1e}", *row.relative_residual) : "-",
+                       row.converged.value_or(true) ? "" : " not converged");
+  }
+  return fmt::format("{:<9}{:>5}  {:<17}{:>8}{:>10.4g}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n",
+                     row.picture, fmt::format("{0}x{0}", row.views), row.implementation,
+                     row.threads, seconds, row.extrapolated ? "*" : "",
+                     fmt::format("{:.4g} .. {:.4g}", *least, *most),
+                     base == nullptr ? "-" : Ratio(Median(base->seconds), seconds), published,
+                     published_ratio, OrDash(row.psnr_true_views_db, 2), more);
+}
+
+std::string FidelityLine(const SourceRow& row) {
+  return fmt::format(
+      "{:<9}{:>5}  {:<17}{:>10.4g}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", row.picture,
+      fmt::format("{0}x{0}", row.views), row.implementation, Median(row.seconds),
+      row.extrapolated ? "*" : "", OrDash(row.macade_standin, 3), OrDash(row.delta_e94_mean, 2),
+      row.published_fidelity ? fmt::format("{:.3f}", MeanOf(row.published_fidelity->macade)) : "-",
+      row.published_fidelity ? fmt::format("{:.2f}", MeanOf(row.published_fidelity->delta_e94_mean))
+                             : "-",
+      OrDash(row.psnr_true_views_db, 2));
+}
+
+std::string Columns(int table) {
+  if (table == 4) {
+    return fmt::format("{:<9}{:>5}  {:<17}{:>10}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", "picture",
+                       "views", "", "seconds", "", "MACADE'", "M-dE94", "published:", "",
+                       "PSNR dB");
+  }
+  return fmt::format("{:<9}{:>5}  {:<17}{:>8}{:>10}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n", "picture",
+                     "views", "", "threads", "seconds", "", "runs", "x faster",
+                     "published:", "x faster", "PSNR dB",
+                     table == 2   ? "  bandwidth"
+                     : table == 3 ? "   residual"
+                                  : "");
+}
+
+std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
+  std::string text;
+  std::vector<std::string> samples;
+  for (const SourceRow& row : rows) {
+    if (row.table != table || !row.extrapolated) continue;
+    const std::string sample =
+        fmt::format("{} of {} of {}", row.extrapolated->solved, row.extrapolated->all, row.picture);
+    if (std::find(samples.begin(), samples.end(), sample) == samples.end())
+      samples.push_back(sample);
+  }
+  if (!samples.empty()) {
+    std::string list;
+    for (const std::string& sample : samples) list += (list.empty() ? "" : ", ") + sample;
+    text += fmt::format("* extrapolated from blocks: {}; --full runs all\n", list);
+  }
+  if (table == 4) text += "MACADE': a stand-in; the source's definition could not be had\n";
+  return text;
+}
+
+}  // namespace
+
+json SourceRowJson(const SourceRow& row) {
+  json out = {{"table", row.table},
+              {"picture", row.picture},
+              {"size", {row.width_px, row.height_px}},
+              {"views", {row.views, row.views}},
+              {"implementation", row.implementation},
+              {"threads", row.threads},
+              {"seconds", Median(row.seconds)},
+              {"seconds_of_runs", row.seconds},
+              {"extrapolated_from", nullptr},
+              {"published_seconds", nullptr},
+              {"published_seconds_of_pictures", OrNull(row.published)},
+              {"psnr_true_views_db", OrNull(row.psnr_true_views_db)}};
+  if (row.extrapolated) {
+    out["extrapolated_from"] = {{"blocks", row.extrapolated->solved},
+                                {"of", row.extrapolated->all}};
+  }
+  if (row.published) out["published_seconds"] = MeanOf(*row.published);
+  if (row.table == 2) out["bandwidth_share"] = OrNull(row.bandwidth_share);
+  if (row.table == 3) {
+    out["relative_residual"] = OrNull(row.relative_residual);
+    out["converged"] = OrNull(row.converged);
+  }
+  if (row.table == 4) {
+    out["macade_standin"] = OrNull(row.macade_standin);
+    out["delta_e94_mean"] = OrNull(row.delta_e94_mean);
+    out["published_macade_of_pictures"] = nullptr;
+    out["published_delta_e94_mean_of_pictures"] = nullptr;
+    if (row.published_fidelity) {
+      out["published_macade_of_pictures"] = row.published_fidelity->macade;
+      out["published_delta_e94_mean_of_pictures"] = row.published_fidelity->delta_e94_mean;
+    }
+  }
+  return out;
+}
+
+std::string SourceTableText(int table, const std::vector<SourceRow>& rows) {
+  std::string text = fmt::format("{}\n{}", Heading(table), Columns(table));
+  for (const SourceRow& row : rows) {
+    if (row.table != table) continue;
+    text += table == 4 ? FidelityLine(row) : TimeLine(row, rows);
+  }
+  return text + Footnotes(table, rows);
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,47 @@
+#ifndef THICKLENS_TOOLS_BENCH_SOURCE_ROWS_H_
+#define THICKLENS_TOOLS_BENCH_SOURCE_ROWS_H_
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "source_figures.h"
+
+namespace thicklens::tools {
+
+// Blocks that were solved, of all that the picture has.
+struct BlockSample {
+  int solved = 0, all = 0;
+};
+
+// One line of one of the source's tables, measured here.
+struct SourceRow {
+  int table = 0;
+  std::string picture;  // "K", "L", or the name of a file
+  int width_px = 0, height_px = 0;
+  int views = 0;  // across and down
+  std::string implementation;
+  int threads = 1;
+  std::vector<double> seconds;                // of each run, for the whole picture
+  std::optional<BlockSample> extrapolated;    // absent: all of it was run
+  std::optional<PublishedFigures> published;  // seconds
+  std::optional<double> psnr_true_views_db;
+  // Table 2: bytes of the light field and of the picture, a second, over the machine's triad.
+  std::optional<double> bandwidth_share;
+  // Table 3: the largest of the blocks, and whether an iterative solver reached its tolerance.
+  std::optional<double> relative_residual;
+  std::optional<bool> converged;
+  // Table 4: of the picture formed again.
+  std::optional<double> macade_standin, delta_e94_mean;
+  std::optional<PublishedFidelity> published_fidelity;
+};
+
+nlohmann::json SourceRowJson(const SourceRow& row);
+
+// The rows of one table, with its heading, ratios and what was published beside.
+std::string SourceTableText(int table, const std::vector<SourceRow>& rows);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_BENCH_SOURCE_ROWS_H_
