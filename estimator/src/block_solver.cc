@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "block_system.h"
@@ -333,7 +334,8 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   CheckOptions(given);
   CheckInput(input);
   const bool symmetric = given.stencil == Stencil::kWarp;
-  NewLinearSolver(given.solver, symmetric);  // refuses what this build or the stencil does not have
+  // Refuses what this build or the stencil does not have.
+  const std::string device_of_solver = NewLinearSolver(given.solver, symmetric)->device();
 
   const auto start = Clock::now();
   const int threads = model::ResolveThreads(given.threads);
@@ -352,6 +354,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   *summary = EstimateSummary();
   summary->threads = threads;
   summary->device = on_device ? backend->name() : "cpu (" + backend->name() + " has no double)";
+  if (!device_of_solver.empty()) summary->device += ", " + device_of_solver;
   summary->gamma = options.gamma;
   summary->ridge = *options.ridge;
   double bytes = 0;

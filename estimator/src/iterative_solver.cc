@@ -1,5 +1,6 @@
 #include "iterative_solver.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -51,9 +52,9 @@ std::vector<double> IterativeSolver::Solve(const std::vector<double>& b) {
   std::vector<double> residual = b;
   double left = Norm(residual);
   const double goal = limits_.tolerance * left;
-  // What a method calls done is at times twice what it is; and a pass that changes too little is
-  // asked for more.
-  double share = 0.5;
+  // What a method calls done may be more than it is: the next pass is asked for half, and after one
+  // that changed too little for a tenth.
+  double share = 1;
   constexpr double kProgress = 0.9;
   constexpr int kMostIdlePasses = 3;
   int idle_passes = 0;
@@ -65,7 +66,10 @@ std::vector<double> IterativeSolver::Solve(const std::vector<double>& b) {
     std::vector<double> next_residual = ResidualOf(matrix_, next, b);
     const double next_left = Norm(next_residual);
     // Written so that what is not finite counts as no progress.
-    if (!(next_left < kProgress * left)) {
+    if (next_left < kProgress * left) {
+      idle_passes = 0;
+      share = std::min(share, 0.5);
+    } else {
       ++idle_passes;
       share *= 0.1;
     }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "linear_solver.h"
@@ -16,6 +17,7 @@ class IterativeMethod {
   // Bytes it keeps of a matrix, beside a few vectors.
   virtual double BytesOf(const kernels::CsrMatrix<double>& matrix) const = 0;
   virtual void SetMatrix(const kernels::CsrMatrix<double>& matrix) = 0;
+  virtual std::string device() const { return {}; }  // as LinearSolver's
   // From x = 0 until the residual is `tolerance` of |b|, or `max_iterations` are done; adds those
   // that were to `iterations`.
   virtual std::vector<double> Run(const std::vector<double>& b, double tolerance,
@@ -35,6 +37,7 @@ class IterativeSolver : public LinearSolver {
   std::optional<double> rcond() const override { return std::nullopt; }
   std::vector<double> Solve(const std::vector<double>& b) override;
   int iterations() const override { return iterations_; }
+  std::string device() const override { return method_->device(); }
 
  private:
   std::unique_ptr<IterativeMethod> method_;

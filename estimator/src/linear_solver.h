@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "thicklens/estimator/estimate.h"
@@ -38,6 +39,8 @@ class LinearSolver {
   virtual std::vector<double> Solve(const std::vector<double>& b) = 0;
   // Of the last Solve.
   virtual int iterations() const { return 0; }
+  // Of its own, where it has one: for people. Empty: it computes where the caller does.
+  virtual std::string device() const { return {}; }
 };
 
 // `symmetric` promises a symmetric positive definite matrix; CHOLMOD and conjugate gradients are

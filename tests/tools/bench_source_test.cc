@@ -52,12 +52,13 @@ class BenchSourceTest : public ::testing::Test {
 };
 
 TEST_F(BenchSourceTest, MeasuresTheFourTables) {
-  const nlohmann::json rows = Rows({"source", "--size", "64x64", "--views", "3", "--threads", "2"});
+  const nlohmann::json rows = Rows({"source", "--size", "64x64", "--views", "2", "--threads", "2"});
   std::map<int, std::set<std::string>> found;
   std::map<std::string, double> psnr_db;
   for (const auto& row : rows) {
     const std::string name = row["implementation"];
     SCOPED_TRACE(row.dump());
+    EXPECT_TRUE(row["failure"].is_null());
     found[row["table"]].insert(name);
     EXPECT_EQ(row["size"], nlohmann::json({64, 64}));
     EXPECT_EQ(row["seconds_of_runs"].size(), 1U);
@@ -144,6 +145,11 @@ TEST_F(BenchSourceTest, RefusesWhatCannotBeMeant) {
   EXPECT_THAT(refusal({"--camera", "x.yaml"}), HasSubstr("--image"));
   EXPECT_THAT(refusal({"--image", "a.png", "--depth", "b.pfm", "--size", "K"}),
               HasSubstr("--size"));
+  EXPECT_THAT(refusal({"--image", "a.png", "--depth", "b.pfm", "--seed", "3"}),
+              HasSubstr("--seed"));
+  EXPECT_THAT(refusal({"--image", "a.png", "--depth", "b.pfm", "--table", "4"}),
+              HasSubstr("--camera"));
+  EXPECT_THAT(refusal({"--depth-kind", "z"}), HasSubstr("--depth-kind"));
 }
 
 // What table 4 takes for granted.
@@ -163,6 +169,17 @@ TEST(BenchSceneTest, ThinTwinHasTheSameGridAndDisparities) {
   }
 }
 
+TEST(SourceTableText, TellsWhatCouldNotBeRun) {
+  SourceRow row;
+  row.table = 3;
+  row.picture = "L";
+  row.views = 3;
+  row.implementation = "viennacl";
+  row.failure = "no device";
+  EXPECT_THAT(SourceTableText(3, {row}), HasSubstr("viennacl           not run: no device"));
+  EXPECT_EQ(SourceRowJson(row, {row})["failure"], "no device");
+}
+
 TEST(SourceTableText, PutsThePublishedBesideTheMeasured) {
   SourceRow cpu;
   cpu.table = 2;
@@ -178,10 +195,12 @@ TEST(SourceTableText, PutsThePublishedBesideTheMeasured) {
   opencl.extrapolated = BlockSample{4, 9};
   const std::string text = SourceTableText(2, {cpu, opencl});
   // 2 s over .5 s; 27.4475 over .3325.
-  EXPECT_THAT(text, HasSubstr("82.5"));
+  EXPECT_THAT(text, ::testing::ContainsRegex("0.5 .. 0.5 +4 +0.33 +82.5"));
   EXPECT_THAT(text, AllOf(HasSubstr("27.45"), HasSubstr("0.5 .. 0.5"), HasSubstr("1 .. 3"),
                           HasSubstr("4 of 9 of K")));
-  const nlohmann::json json = SourceRowJson(opencl);
+  const nlohmann::json json = SourceRowJson(opencl, {cpu, opencl});
+  EXPECT_EQ(json["times_faster"], 4);
+  EXPECT_EQ(json["times_faster_than"], "cpu");
   EXPECT_NEAR(json["published_seconds"].get<double>(), 0.3325, 1e-12);
   EXPECT_EQ(json["published_seconds_of_pictures"].size(), 4U);
   EXPECT_EQ(json["extrapolated_from"], nlohmann::json({{"blocks", 4}, {"of", 9}}));

@@ -32,8 +32,8 @@ void ExpectSpeedUps(int table, const std::vector<SpeedUps>& printed, double roun
 }
 
 TEST(SourceFigures, SpeedUpsOfTable1AreThePrinted) {
-  // Two of the 24 are not what the seconds beside them make: K3's 0.13 is 0.125, cut as L1's 0.19
-  // is 0.186; all are within a hundredth.
+  // Two of the 24 are not what the seconds beside them make: K3's 0.13 at 3 x 3 is 0.1248, L3's
+  // 0.25 is 0.2446.
   ExpectSpeedUps(1,
                  {{'K', 0, {0.15, 0.75, 1.29}},
                   {'K', 1, {0.14, 0.74, 1.23}},

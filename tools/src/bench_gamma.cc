@@ -68,8 +68,9 @@ void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Bac
     estimate = estimator::EstimateByBlocks(scene.input, blocks, backend, &summary);
   } catch (const Interrupted&) {
     throw;
-  } catch (const Error& error) {  // a factor that is singular to the last bit
-    row->failure = error.what();
+  } catch (const Error& error) {
+    if (std::string(error.what()).find("singular") == std::string::npos) throw;
+    row->failure = "a block's system is singular to the last bit";
     return;
   }
   row->seconds.push_back(summary.setup_seconds + summary.solve_seconds);
@@ -91,8 +92,8 @@ void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Bac
 
 std::string RowText(const GammaRow& row) {
   if (!row.failure.empty()) {
-    return fmt::format("{:>7.0e}{:>9}{:>10}  a block is singular to the last bit\n", row.gamma,
-                       row.ridge ? "none" : "usual", "-");
+    return fmt::format("{:>7.0e}{:>9}{:>10}  {}\n", row.gamma, row.ridge ? "none" : "usual", "-",
+                       row.failure);
   }
   return fmt::format("{:>7.0e}{:>9}{:>10.3g}{:>10.1e}{:>11.1e}{:>12.2f}{:>11.2f}  {}\n", row.gamma,
                      row.ridge ? "none" : "usual", Median(row.seconds), row.rcond,
@@ -163,6 +164,10 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
            {"machine", MachineJson()},
            {"size", {options.size_px, options.size_px}},
            {"views", {options.views, options.views}},
+           {"block_solver", estimator::BlockSolverName(estimator::DefaultBlockSolver())},
+           {"threads", model::ResolveThreads(options.common.threads)},
+           {"repeat", options.repeat},
+           {"seed", options.seed},
            {"dibr_psnr_db", dibr_db},
            {"rows", json_rows}},
           ""};

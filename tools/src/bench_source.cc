@@ -42,15 +42,19 @@ using estimator::BlockSolver;
 
 struct BenchSourceOptions {
   CommonOptions common;
-  std::vector<int> tables = {1, 2, 3, 4};
-  std::vector<int> views = {3, 5, 7};
+  std::vector<int> tables;         // empty: all
+  std::vector<int> views;          // empty: 3, 5 and 7, and of table 4 kViewsOfTable4
   std::vector<std::string> sizes;  // empty: K and L
   EstimateOptions given;           // picture, depth, camera
   std::string device = "auto";
   int repeat = 5;
   bool full = false;
-  std::uint64_t seed = 1;
+  std::optional<std::uint64_t> seed;
 };
+
+// The source does not say how many views its table 4 had.
+constexpr int kViewsOfTable4 = 5;
+constexpr std::uint64_t kUsualSeed = 1;
 
 // A picture of one number of views, and the parts of it that stand for it where all would take too
 // long.
@@ -59,8 +63,10 @@ struct SourcePicture {
   char size = ' ';  // 'K' or 'L' of the source
   int views = 0;
   BenchScene whole;
+  std::vector<model::PixelRect> rects;  // of the parts
   std::vector<BenchScene> parts;
-  std::optional<BlockSample> sample;  // absent: the parts are the whole
+  std::optional<BlockSample> sample;  // absent: the part is the whole
+  double pixels_per_part_pixel = 1;
 };
 
 // Something to be measured: runs once and says how many seconds that took, or would take for the
@@ -87,28 +93,38 @@ int BlocksOf(const model::LinearPicture& picture) {
   return blocks(picture.width_px) * blocks(picture.height_px);
 }
 
+// 'K' or 'L' of a picture of the source's sizes, else a blank.
+char SizeNameOf(int width_px, int height_px) {
+  if (width_px == 640 && height_px == 480) return 'K';
+  return width_px == 256 && height_px == 256 ? 'L' : ' ';
+}
+
 // Four parts of four by four blocks, in the middles of the picture's quarters: near, far and at
 // the plane of focus.
 void CutParts(bool full, SourcePicture* picture) {
   constexpr int kPartPx = 4 * kSourceBlockPx;
   const int width_px = picture->whole.input.picture.width_px;
   const int height_px = picture->whole.input.picture.height_px;
+  picture->size = SizeNameOf(width_px, height_px);
   const bool is_small = width_px < 2 * kPartPx || height_px < 2 * kPartPx ||
                         width_px * height_px == 4 * kPartPx * kPartPx;
   if (full || is_small) {
+    picture->rects = {{0, 0, width_px, height_px}};
     picture->parts = {picture->whole};
     return;
   }
   BlockSample sample{0, BlocksOf(picture->whole.input.picture)};
   for (const int quarter_y : {1, 3}) {
     for (const int quarter_x : {1, 3}) {
-      picture->parts.push_back(
-          PartOf(picture->whole, {quarter_x * width_px / 4 - kPartPx / 2,
-                                  quarter_y * height_px / 4 - kPartPx / 2, kPartPx, kPartPx}));
+      picture->rects.push_back({quarter_x * width_px / 4 - kPartPx / 2,
+                                quarter_y * height_px / 4 - kPartPx / 2, kPartPx, kPartPx});
+      picture->parts.push_back(PartOf(picture->whole, picture->rects.back()));
       sample.solved += BlocksOf(picture->parts.back().input.picture);
     }
   }
   picture->sample = sample;
+  picture->pixels_per_part_pixel =
+      static_cast<double>(width_px) * height_px / (4.0 * kPartPx * kPartPx);
 }
 
 SourceRow RowOf(int table, const SourcePicture& picture, const std::string& implementation,
@@ -128,47 +144,78 @@ int BorderPx(const model::LinearPicture& picture) {
   return std::min(20, std::min(picture.width_px, picture.height_px) / 4);
 }
 
-double PsnrDb(const BenchScene& scene, const model::LightField& estimate, int threads) {
-  return estimator::CompareLightFields(scene.truth, estimate, BorderPx(scene.input.picture),
+// Of a part, against what is true there.
+double PsnrDb(const BenchScene& part, const model::LightField& estimate, int threads) {
+  return estimator::CompareLightFields(part.truth, estimate, BorderPx(part.input.picture),
                                        std::nullopt, threads)
       .mean.psnr_db;
 }
 
-// Solves the parts by blocks; the row gets the mean of their PSNRs and the worst residual.
+// The parts, solved by blocks, and what that says of the whole.
+struct PartsRun {
+  std::vector<model::LightField> estimates;
+  double seconds = 0;  // of the whole picture: set-up, which is that of any size, and solving
+  double relative_residual = 0;
+  bool converged = true;
+  std::string device;
+};
+PartsRun RunParts(const SourcePicture& picture, BlockSolver solver, int threads,
+                  kernels::Backend* backend) {
+  estimator::BlockOptions options;
+  options.solver = solver;
+  options.block_px = kSourceBlockPx;
+  options.threads = threads;
+  options.progress = [](int, int) { ThrowIfInterrupted(); };
+  PartsRun run;
+  double setup_seconds = 0, solve_seconds = 0;
+  for (const BenchScene& part : picture.parts) {
+    estimator::EstimateSummary summary;
+    run.estimates.push_back(estimator::EstimateByBlocks(part.input, options, backend, &summary));
+    setup_seconds = std::max(setup_seconds, summary.setup_seconds);
+    solve_seconds += summary.solve_seconds;
+    run.relative_residual = std::max(run.relative_residual, summary.relative_residual);
+    run.converged = run.converged && summary.converged;
+    run.device = summary.device;
+  }
+  run.seconds = setup_seconds + solve_seconds * picture.pixels_per_part_pixel;
+  return run;
+}
+
+// One block, so that what a device does but once is done.
+void WarmUp(const SourcePicture& picture, BlockSolver solver, kernels::Backend* backend) {
+  SourcePicture block;
+  block.whole = PartOf(picture.parts.front(), {0, 0, kSourceBlockPx, kSourceBlockPx});
+  CutParts(true, &block);
+  RunParts(block, solver, 1, backend);
+}
+
+// The row gets the mean of the parts' PSNRs and the worst residual.
 Contender ByBlocks(SourceRow row, const SourcePicture& picture, BlockSolver solver, int threads,
                    kernels::Backend* backend) {
   row.extrapolated = picture.sample;
-  return {
-      row, [&picture, solver, threads, backend](SourceRow* out) {
-        estimator::BlockOptions options;
-        options.solver = solver;
-        options.block_px = kSourceBlockPx;
-        options.threads = threads;
-        options.progress = [](int, int) { ThrowIfInterrupted(); };
-        double seconds = 0, psnr_db = 0, residual = 0;
-        bool converged = true;
-        for (const BenchScene& part : picture.parts) {
-          estimator::EstimateSummary summary;
-          const model::LightField estimate =
-              estimator::EstimateByBlocks(part.input, options, backend, &summary);
-          seconds += summary.setup_seconds + summary.solve_seconds;
-          residual = std::max(residual, summary.relative_residual);
-          converged = converged && summary.converged;
-          if (out->seconds.empty() && part.has_truth()) {
-            psnr_db += PsnrDb(part, estimate, threads) / static_cast<double>(picture.parts.size());
-          }
-        }
-        if (out->seconds.empty() && picture.whole.has_truth()) {
-          out->psnr_true_views_db = psnr_db;
-        }
-        if (out->table == 3) {
-          out->relative_residual = residual;
-          if (estimator::IsIterative(solver)) out->converged = converged;
-        }
-        return picture.sample ? seconds * picture.sample->all / picture.sample->solved : seconds;
-      }};
+  row.block_solver = estimator::BlockSolverName(solver);
+  return {row, [&picture, solver, threads, backend](SourceRow* out) {
+            const bool is_first = out->seconds.empty();
+            if (is_first) WarmUp(picture, solver, backend);
+            const PartsRun run = RunParts(picture, solver, threads, backend);
+            if (!is_first) return run.seconds;
+            out->device = run.device;
+            if (picture.whole.has_truth()) {
+              double psnr_db = 0;
+              for (std::size_t i = 0; i < run.estimates.size(); ++i) {
+                psnr_db += PsnrDb(picture.parts[i], run.estimates[i], threads);
+              }
+              out->psnr_true_views_db = psnr_db / static_cast<double>(run.estimates.size());
+            }
+            if (out->table == 3) {
+              out->relative_residual = run.relative_residual;
+              if (estimator::IsIterative(solver)) out->converged = run.converged;
+            }
+            return run.seconds;
+          }};
 }
 
+// Its PSNR is of the same parts as that of the blocks.
 Contender OfWholePicture(SourceRow row, const SourcePicture& picture, LightFieldSolver solver,
                          int threads) {
   return {std::move(row), [&picture, solver = std::move(solver), threads](SourceRow* out) {
@@ -176,7 +223,12 @@ Contender OfWholePicture(SourceRow row, const SourcePicture& picture, LightField
             const model::LightField estimate = solver.estimate(picture.whole.input);
             const double seconds = SecondsSince(start);
             if (out->seconds.empty() && picture.whole.has_truth()) {
-              out->psnr_true_views_db = PsnrDb(picture.whole, estimate, threads);
+              double psnr_db = 0;
+              for (std::size_t i = 0; i < picture.parts.size(); ++i) {
+                psnr_db +=
+                    PsnrDb(picture.parts[i], model::CropViews(estimate, picture.rects[i]), threads);
+              }
+              out->psnr_true_views_db = psnr_db / static_cast<double>(picture.parts.size());
             }
             return seconds;
           }};
@@ -195,7 +247,12 @@ void AddTable1(const Bench& bench, const SourcePicture& picture,
     contenders->push_back(
         ByBlocks(std::move(row), picture, estimator::DefaultBlockSolver(), threads, backend));
   };
-  if (bench.device) add("opencl", 1, bench.device.get());
+  if (bench.device && !bench.device->has_double()) {
+    spdlog::warn("{} has no double precision, which table 1 needs: its row is left out",
+                 bench.device->description());
+  } else if (bench.device) {
+    add("opencl", 1, bench.device.get());
+  }
   add("cpu", 1, bench.processor.get());
   if (bench.threads > 1) add("cpu, all threads", bench.threads, bench.processor.get());
   for (LightFieldSolver& solver : WholePictureSolvers(bench.threads)) {
@@ -214,21 +271,18 @@ void AddTable2(const Bench& bench, const SourcePicture& picture,
   const auto& pixels = picture.whole.input.picture;
   const double bytes =
       sizeof(float) * static_cast<double>(light_field->values.size() + pixels.values.size());
-  const double triad = bench.triad_bytes_per_second;
+  const double triad_seconds = bytes / bench.triad_bytes_per_second;
   const auto add = [&](const std::string& name, int threads,
                        std::shared_ptr<kernels::Kernels<float>> kernels) {
     SourceRow row = RowOf(2, picture, name, threads);
     row.published = PublishedSeconds(2, name, picture.size, picture.views);
-    contenders->push_back(
-        {std::move(row), [light_field, kernels, threads, bytes, triad](SourceRow* out) {
-           const Clock::time_point start = Clock::now();
-           estimator::Photograph(*light_field, light_field->weights, nullptr, nullptr,
-                                 kernels.get(), threads);
-           const double seconds = SecondsSince(start);
-           const double share = bytes / seconds / triad;
-           out->bandwidth_share = std::max(out->bandwidth_share.value_or(0), share);
-           return seconds;
-         }});
+    row.triad_seconds = triad_seconds;
+    contenders->push_back({std::move(row), [light_field, kernels, threads](SourceRow*) {
+                             const Clock::time_point start = Clock::now();
+                             estimator::Photograph(*light_field, light_field->weights, nullptr,
+                                                   nullptr, kernels.get(), threads);
+                             return SecondsSince(start);
+                           }});
   };
   if (bench.device) add("opencl", 1, bench.device->NewFloat());
   add("cpu", 1, bench.processor->NewFloat());
@@ -240,6 +294,10 @@ void AddTable3(const Bench& bench, const SourcePicture& picture,
                std::vector<Contender>* contenders) {
   for (const BlockSolver solver : estimator::BuiltInBlockSolvers()) {
     const std::string name = estimator::BlockSolverName(solver);
+    if (solver == BlockSolver::kViennaCl && !bench.device) {
+      spdlog::warn("the row of ViennaCL, which computes by OpenCL, is left out");
+      continue;
+    }
     SourceRow row = RowOf(3, picture, name, 1);
     row.published = PublishedSeconds(3, name, picture.size, picture.views);
     contenders->push_back(ByBlocks(std::move(row), picture, solver, 1, bench.processor.get()));
@@ -262,40 +320,36 @@ Contender OfLens(const std::string& lens, const SourcePicture& picture, const mo
   BenchScene taken = picture.whole;
   taken.input.camera = camera;
   taken.input.grid = model::DefaultGrid(camera, picture.views, picture.views);
+  taken.input.falloff_camera.reset();
   auto parts = std::make_shared<SourcePicture>();
   parts->whole = std::move(taken);
   CutParts(!picture.sample, parts.get());
+  row.block_solver = estimator::BlockSolverName(estimator::DefaultBlockSolver());
   return {
       row, [parts, &bench](SourceRow* out) {
-        estimator::BlockOptions options;
-        options.block_px = kSourceBlockPx;
-        options.threads = bench.threads;
-        options.progress = [](int, int) { ThrowIfInterrupted(); };
+        const PartsRun run =
+            RunParts(*parts, estimator::DefaultBlockSolver(), bench.threads, bench.processor.get());
+        if (!out->seconds.empty()) return run.seconds;
         const auto count = static_cast<double>(parts->parts.size());
-        double seconds = 0, macade = 0, delta_e94 = 0, psnr_db = 0;
+        double macade = 0, delta_e94 = 0, psnr_db = 0;
         bool has_edges = true;
-        for (const BenchScene& part : parts->parts) {
-          estimator::EstimateSummary summary;
-          const model::LightField estimate =
-              estimator::EstimateByBlocks(part.input, options, bench.processor.get(), &summary);
-          seconds += summary.setup_seconds + summary.solve_seconds;
-          if (!out->seconds.empty()) continue;
-          const model::LinearPicture again = estimator::Photograph(
-              estimate, part.input.weights, &*part.input.camera, nullptr, nullptr, bench.threads);
+        for (std::size_t i = 0; i < parts->parts.size(); ++i) {
+          const BenchScene& part = parts->parts[i];
+          const model::LinearPicture again =
+              estimator::Photograph(run.estimates[i], part.input.weights, &*part.input.camera,
+                                    nullptr, nullptr, bench.threads);
           const estimator::PictureScores scores = estimator::ComparePictures(
               estimator::StoredValuesOf(part.input.picture, part.input.transfer),
               estimator::StoredValuesOf(again, part.input.transfer), BorderPx(part.input.picture));
           has_edges = has_edges && scores.macade_standin.has_value();
           macade += scores.macade_standin.value_or(0) / count;
           delta_e94 += scores.delta_e94_mean / count;
-          if (part.has_truth()) psnr_db += PsnrDb(part, estimate, bench.threads) / count;
+          if (part.has_truth()) psnr_db += PsnrDb(part, run.estimates[i], bench.threads) / count;
         }
-        if (out->seconds.empty()) {
-          if (has_edges) out->macade_standin = macade;
-          out->delta_e94_mean = delta_e94;
-          if (parts->whole.has_truth()) out->psnr_true_views_db = psnr_db;
-        }
-        return parts->sample ? seconds * parts->sample->all / parts->sample->solved : seconds;
+        if (has_edges) out->macade_standin = macade;
+        out->delta_e94_mean = delta_e94;
+        if (parts->whole.has_truth()) out->psnr_true_views_db = psnr_db;
+        return run.seconds;
       }};
 }
 
@@ -312,10 +366,6 @@ model::Camera ThickBenchCamera(int width_px, int height_px) {
 
 void AddTable4(const Bench& bench, const SourcePicture& picture,
                std::vector<Contender>* contenders) {
-  if (!picture.whole.input.camera) {
-    spdlog::warn("{}: table 4 needs --camera; it is left out", picture.name);
-    return;
-  }
   const model::Camera& camera = *picture.whole.input.camera;
   contenders->push_back(OfLens("thick", picture, camera, bench));
   contenders->push_back(OfLens("thin", picture, model::ThinTwin(camera), bench));
@@ -334,9 +384,15 @@ void Measure(const BenchSourceOptions& options, std::vector<Contender>* contende
       Contender& contender = (*contenders)[i];
       // Of what takes so long, fewer runs tell as much as more.
       constexpr double kEnoughSeconds = 60;
-      if (spent[i] < kEnoughSeconds) {
+      if (spent[i] < kEnoughSeconds && contender.row.failure.empty()) {
         const Clock::time_point start = Clock::now();
-        contender.row.seconds.push_back(contender.run(&contender.row));
+        try {
+          contender.row.seconds.push_back(contender.run(&contender.row));
+        } catch (const Interrupted&) {
+          throw;
+        } catch (const Error& error) {  // one row, and not those beside it
+          contender.row.failure = error.what();
+        }
         spent[i] += SecondsSince(start);
       }
       progress.Show(++done, total);
@@ -347,7 +403,6 @@ void Measure(const BenchSourceOptions& options, std::vector<Contender>* contende
 
 struct PictureSize {
   std::string name;
-  char size = ' ';
   int width_px = 0, height_px = 0;
 };
 
@@ -356,16 +411,16 @@ std::vector<PictureSize> SizesOf(const BenchSourceOptions& options) {
   for (const std::string& text :
        options.sizes.empty() ? std::vector<std::string>{"L", "K"} : options.sizes) {
     if (text == "K") {
-      sizes.push_back({"K", 'K', 640, 480});
+      sizes.push_back({"K", 640, 480});
     } else if (text == "L") {
-      sizes.push_back({"L", 'L', 256, 256});
+      sizes.push_back({"L", 256, 256});
     } else {
       const auto parts = SplitPixels("--size", text, 'x', "K, L or WIDTHxHEIGHT");
       if (parts.size() != 2 || parts[0] < 64 || parts[1] < 64) {
         throw UsageError(fmt::format(
             "--size: K, L or WIDTHxHEIGHT, both at least 64, is expected, found '{}'", text));
       }
-      sizes.push_back({text, ' ', parts[0], parts[1]});
+      sizes.push_back({text, parts[0], parts[1]});
     }
   }
   return sizes;
@@ -376,12 +431,12 @@ SourcePicture Simulated(const BenchSourceOptions& options, const PictureSize& si
   ProgressLine progress("simulating", options.common.quiet);
   SourcePicture picture;
   picture.name = size.name;
-  picture.size = size.size;
   picture.views = views;
-  picture.whole = MakeBenchScene(camera, views, views, options.seed, 0, [&](int done, int total) {
-    ThrowIfInterrupted();
-    progress.Show(done, total);
-  });
+  picture.whole = MakeBenchScene(camera, views, views, options.seed.value_or(kUsualSeed),
+                                 options.common.threads, [&](int done, int total) {
+                                   ThrowIfInterrupted();
+                                   progress.Show(done, total);
+                                 });
   CutParts(options.full, &picture);
   return picture;
 }
@@ -399,20 +454,14 @@ SourcePicture Given(const BenchSourceOptions& options, int views) {
   return picture;
 }
 
-void MeasureTimes(const Bench& bench, const SourcePicture& picture, std::vector<SourceRow>* rows) {
-  const auto& tables = bench.options->tables;
-  const auto wants = [&](int table) {
-    return std::find(tables.begin(), tables.end(), table) != tables.end();
-  };
+void MeasureTimes(const Bench& bench, const std::set<int>& tables, const SourcePicture& picture,
+                  std::vector<SourceRow>* rows) {
   std::vector<Contender> contenders;
-  if (wants(1)) AddTable1(bench, picture, &contenders);
-  if (wants(2)) AddTable2(bench, picture, &contenders);
-  if (wants(3)) AddTable3(bench, picture, &contenders);
+  if (tables.count(1) > 0) AddTable1(bench, picture, &contenders);
+  if (tables.count(2) > 0) AddTable2(bench, picture, &contenders);
+  if (tables.count(3) > 0) AddTable3(bench, picture, &contenders);
   Measure(*bench.options, &contenders, rows);
 }
-
-// The source does not say how many views its table 4 had.
-constexpr int kViewsOfTable4 = 5;
 
 void MeasureLenses(const Bench& bench, const SourcePicture& picture, std::vector<SourceRow>* rows) {
   std::vector<Contender> contenders;
@@ -420,47 +469,62 @@ void MeasureLenses(const Bench& bench, const SourcePicture& picture, std::vector
   Measure(*bench.options, &contenders, rows);
 }
 
+std::set<int> TablesOf(const BenchSourceOptions& options) {
+  std::set<int> tables(options.tables.begin(), options.tables.end());
+  if (tables.empty()) tables = {1, 2, 3, 4};
+  if (!options.given.picture_path.empty() && options.given.camera_path.empty()) {
+    if (!options.tables.empty() && tables.count(4) > 0) {
+      throw UsageError("--table 4 compares lenses: with --image it needs --camera");
+    }
+    if (tables.erase(4) > 0) spdlog::warn("table 4 needs --camera; it is left out");
+  }
+  return tables;
+}
+
 std::vector<SourceRow> MeasureAll(const Bench& bench) {
   const BenchSourceOptions& options = *bench.options;
-  const std::set<int> tables(options.tables.begin(), options.tables.end());
+  const std::set<int> tables = TablesOf(options);
+  std::set<int> views(options.views.begin(), options.views.end());
+  if (views.empty()) views = {3, 5, 7};
+  const int views_of_lenses = options.views.empty() ? kViewsOfTable4 : *views.rbegin();
   const bool times = *tables.begin()<4, lenses = tables.count(4)> 0;
   std::vector<SourceRow> rows;
   if (!options.given.picture_path.empty()) {
-    if (times) {
-      for (const int views : options.views) MeasureTimes(bench, Given(options, views), &rows);
+    for (const int count : views) {
+      if (times) MeasureTimes(bench, tables, Given(options, count), &rows);
     }
-    if (lenses) MeasureLenses(bench, Given(options, kViewsOfTable4), &rows);
+    if (lenses) MeasureLenses(bench, Given(options, views_of_lenses), &rows);
     return rows;
   }
   for (const PictureSize& size : SizesOf(options)) {
-    if (times) {
-      for (const int views : options.views) {
-        MeasureTimes(bench,
-                     Simulated(options, size, BenchCamera(size.width_px, size.height_px), views),
-                     &rows);
-      }
+    const model::Camera thin = BenchCamera(size.width_px, size.height_px);
+    for (const int count : views) {
+      if (times) MeasureTimes(bench, tables, Simulated(options, size, thin, count), &rows);
     }
-    if (lenses) {
-      MeasureLenses(
-          bench,
-          Simulated(options, size, ThickBenchCamera(size.width_px, size.height_px), kViewsOfTable4),
-          &rows);
-    }
+    if (!lenses) continue;
+    const model::Camera thick = ThickBenchCamera(size.width_px, size.height_px);
+    MeasureLenses(bench, Simulated(options, size, thick, views_of_lenses), &rows);
   }
   return rows;
 }
 
 void CheckUsage(const BenchSourceOptions& options) {
   const EstimateOptions& given = options.given;
-  if (given.picture_path.empty() != given.depth_path.empty()) {
-    throw UsageError("--image and --depth belong together");
-  }
-  if (given.picture_path.empty() && !given.camera_path.empty()) {
-    throw UsageError("--camera is that of --image, which is not given");
-  }
-  if (!given.picture_path.empty() && !options.sizes.empty()) {
-    throw UsageError("--size is of simulated pictures, and --image gives one");
-  }
+  const bool has_picture = !given.picture_path.empty();
+  const auto needs = [](bool is_given, bool fits, const std::string& message) {
+    if (is_given && !fits) throw UsageError(message);
+  };
+  needs(has_picture != !given.depth_path.empty(), false, "--image and --depth belong together");
+  needs(!given.camera_path.empty(), has_picture, "--camera is that of --image, which is not given");
+  const DepthOptions usual;
+  needs(!given.depth.kind.empty() || !given.depth.unit.empty() ||
+            given.depth.disparity_scale != usual.disparity_scale ||
+            given.depth.disparity_offset_px != usual.disparity_offset_px,
+        has_picture, "--depth-kind and what belongs to it are of --depth, which is not given");
+  needs(!options.sizes.empty(), !has_picture,
+        "--size is of simulated pictures, and --image gives one");
+  needs(options.seed.has_value(), !has_picture,
+        "--seed is of simulated pictures, and --image gives one");
 }
 
 CommandResult BenchSource(const BenchSourceOptions& options) {
@@ -493,7 +557,7 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
     if (std::none_of(rows.begin(), rows.end(), is_of_table)) continue;
     text += "\n" + SourceTableText(table, rows);
     for (const SourceRow& row : rows) {
-      if (row.table == table) json_rows.push_back(SourceRowJson(row));
+      if (row.table == table) json_rows.push_back(SourceRowJson(row, rows));
     }
   }
   PrintResult(options.common, text);
@@ -505,7 +569,8 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
            {"reason", ""},
            {"machine", machine},
            {"repeat", options.repeat},
-           {"seed", options.seed},
+           {"seed", options.seed.value_or(kUsualSeed)},
+           {"full", options.full},
            {"rows", json_rows}},
           ""};
 }
@@ -519,7 +584,9 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
   command->add_option("--table", options->tables, "Which (all): 1 2 3 4")
       ->check(CLI::Range(1, 4))
       ->type_name("N");
-  command->add_option("--views", options->views, "Of tables 1 to 3, across and down (3 5 7)")
+  command
+      ->add_option("--views", options->views,
+                   "Across and down (3 5 7; of table 4 the largest given, else 5)")
       ->check(CLI::Range(2, 31))
       ->type_name("N");
   command
@@ -536,9 +603,7 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
       ->capture_default_str()
       ->type_name("N");
   command->add_flag("--full", options->full, "All blocks of the pictures, not a sample");
-  command->add_option("--seed", options->seed, "Of texture and noise")
-      ->capture_default_str()
-      ->type_name("N");
+  command->add_option("--seed", options->seed, "Of texture and noise (1)")->type_name("N");
   AddDeviceOption(command, &options->device);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {

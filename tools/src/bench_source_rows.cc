@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "bench_machine.h"
+#include "thicklens/estimator/estimate.h"
 
 namespace thicklens::tools {
 namespace {
@@ -20,42 +21,56 @@ std::string OrDash(const std::optional<double>& value, int digits) {
   return value ? fmt::format("{:.{}f}", *value, digits) : "-";
 }
 
-const char* Heading(int table) {
+std::string UsualSolver() { return estimator::BlockSolverName(estimator::DefaultBlockSolver()); }
+
+std::string Heading(int table) {
   switch (table) {
     case 1:
-      return "Table 1. Light field from a picture by blocks of 16 px (UMFPACK, gamma 1): matrices "
-             "by "
-             "OpenCL kernels,\nor all on one thread; below what this program has beside";
+      return fmt::format(
+          "Table 1. Light field from a picture by blocks of 16 px ({}, gamma 1): matrices by\n"
+          "OpenCL kernels, or all on one thread; below what this program has beside",
+          UsualSolver());
     case 2:
-      return "Table 2. Picture from a light field: OpenCL, transfers included, against one thread; "
-             "below our best\ncode for the processor. bandwidth: bytes that must be moved, a "
-             "second, "
+      return "Table 2. Picture from a light field: OpenCL, transfers included, against one "
+             "thread;\n"
+             "below our best code for the processor. bandwidth: bytes that must be moved, a "
+             "second,\n"
              "over the machine's triad";
     case 3:
-      return "Table 3. Linear solvers of the blocks (16 px, gamma 1; iterations to 1e-6, residual "
-             "recomputed), then\nthe whole picture at once; one thread each, ViennaCL on the "
-             "OpenCL "
-             "device";
+      return "Table 3. Linear solvers of the blocks (16 px, gamma 1; iterations to 1e-6, residual\n"
+             "recomputed), then the whole picture at once; one thread each, but for ViennaCL, "
+             "which\n"
+             "takes an OpenCL device for itself";
     default:
       return "Table 4. Thick against thin lens, focused on the same plane: the picture formed "
-             "again "
-             "from the estimate\n(what the source measured), and what that does not see, the true "
+             "again\n"
+             "from the estimate (what the source measured), and what that does not see, the true\n"
              "views";
   }
 }
 
 // What the ratios of a table are taken to.
-const char* BaseOf(int table) { return table == 3 ? "umfpack" : "cpu"; }
+std::string BaseOf(int table) { return table == 3 ? UsualSolver() : "cpu"; }
 
 const SourceRow* BaseRow(const SourceRow& row, const std::vector<SourceRow>& rows) {
   const auto base = std::find_if(rows.begin(), rows.end(), [&](const SourceRow& other) {
-    return other.table == row.table && other.picture == row.picture && other.views == row.views &&
-           other.implementation == BaseOf(row.table);
+    return other.failure.empty() && other.table == row.table && other.picture == row.picture &&
+           other.views == row.views && other.implementation == BaseOf(row.table);
   });
   return base == rows.end() ? nullptr : &*base;
 }
 
 std::string Ratio(double base, double seconds) { return fmt::format("{:.3g}", base / seconds); }
+
+std::optional<double> BandwidthShare(const SourceRow& row) {
+  if (!row.triad_seconds) return std::nullopt;
+  return *row.triad_seconds / Median(row.seconds);
+}
+
+std::string NameColumns(const SourceRow& row) {
+  return fmt::format("{:<9} {:>5}  {:<17}", row.picture, fmt::format("{0}x{0}", row.views),
+                     row.implementation);
+}
 
 std::string TimeLine(const SourceRow& row, const std::vector<SourceRow>& rows) {
   const double seconds = Median(row.seconds);
@@ -69,14 +84,13 @@ std::string TimeLine(const SourceRow& row, const std::vector<SourceRow>& rows) {
     }
   }
   std::string more;
-  if (row.table == 2) more = fmt::format("{:>11}", OrDash(row.bandwidth_share, 2));
+  if (row.table == 2) more = fmt::format("{:>11}", OrDash(BandwidthShare(row), 2));
   if (row.table == 3) {
     more = fmt::format("{:>11}{}",
                        row.relative_residual ? fmt::format("{:.1e}", *row.relative_residual) : "-",
                        row.converged.value_or(true) ? "" : " not converged");
   }
-  return fmt::format("{:<9}{:>5}  {:<17}{:>8}{:>10.4g}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n",
-                     row.picture, fmt::format("{0}x{0}", row.views), row.implementation,
+  return fmt::format("{}{:>8}{:>10.4g}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n", NameColumns(row),
                      row.threads, seconds, row.extrapolated ? "*" : "",
                      fmt::format("{:.4g} .. {:.4g}", *least, *most),
                      base == nullptr ? "-" : Ratio(Median(base->seconds), seconds), published,
@@ -85,8 +99,7 @@ std::string TimeLine(const SourceRow& row, const std::vector<SourceRow>& rows) {
 
 std::string FidelityLine(const SourceRow& row) {
   return fmt::format(
-      "{:<9}{:>5}  {:<17}{:>10.4g}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", row.picture,
-      fmt::format("{0}x{0}", row.views), row.implementation, Median(row.seconds),
+      "{}{:>10.4g}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", NameColumns(row), Median(row.seconds),
       row.extrapolated ? "*" : "", OrDash(row.macade_standin, 3), OrDash(row.delta_e94_mean, 2),
       row.published_fidelity ? fmt::format("{:.3f}", MeanOf(row.published_fidelity->macade)) : "-",
       row.published_fidelity ? fmt::format("{:.2f}", MeanOf(row.published_fidelity->delta_e94_mean))
@@ -95,17 +108,14 @@ std::string FidelityLine(const SourceRow& row) {
 }
 
 std::string Columns(int table) {
+  const std::string names = fmt::format("{:<9} {:>5}  {:<17}", "picture", "views", "");
   if (table == 4) {
-    return fmt::format("{:<9}{:>5}  {:<17}{:>10}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", "picture",
-                       "views", "", "seconds", "", "MACADE'", "M-dE94", "published:", "",
-                       "PSNR dB");
+    return fmt::format("{}{:>10}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", names, "seconds", "", "MACADE'",
+                       "M-dE94", "published:", "", "PSNR dB");
   }
-  return fmt::format("{:<9}{:>5}  {:<17}{:>8}{:>10}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n", "picture",
-                     "views", "", "threads", "seconds", "", "runs", "x faster",
-                     "published:", "x faster", "PSNR dB",
-                     table == 2   ? "  bandwidth"
-                     : table == 3 ? "   residual"
-                                  : "");
+  const char* more = table == 2 ? "  bandwidth" : table == 3 ? "   residual" : "";
+  return fmt::format("{}{:>8}{:>10}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n", names, "threads",
+                     "seconds", "", "runs", "x faster", "published:", "x faster", "PSNR dB", more);
 }
 
 std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
@@ -121,20 +131,37 @@ std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
   if (!samples.empty()) {
     std::string list;
     for (const std::string& sample : samples) list += (list.empty() ? "" : ", ") + sample;
-    text += fmt::format("* extrapolated from blocks: {}; --full runs all\n", list);
+    text += fmt::format(
+        "* extrapolated from blocks: {}; --full runs all. PSNRs are of these in every row\n", list);
   }
-  if (table == 4) text += "MACADE': a stand-in; the source's definition could not be had\n";
+  if (table == 4) {
+    text +=
+        "MACADE': a stand-in; the source's definition could not be had. Of two lenses focused on\n"
+        "the same plane the rays are the same, so that nothing but the fall-off can differ\n";
+  }
   return text;
 }
 
 }  // namespace
 
-json SourceRowJson(const SourceRow& row) {
+json SourceRowJson(const SourceRow& row, const std::vector<SourceRow>& rows) {
+  const auto or_null = [](const std::string& text) { return text.empty() ? json() : json(text); };
+  if (!row.failure.empty()) {
+    return {{"table", row.table},
+            {"picture", row.picture},
+            {"size", {row.width_px, row.height_px}},
+            {"views", {row.views, row.views}},
+            {"implementation", row.implementation},
+            {"failure", row.failure}};
+  }
   json out = {{"table", row.table},
               {"picture", row.picture},
               {"size", {row.width_px, row.height_px}},
               {"views", {row.views, row.views}},
               {"implementation", row.implementation},
+              {"block_solver", or_null(row.block_solver)},
+              {"device", or_null(row.device)},
+              {"failure", nullptr},
               {"threads", row.threads},
               {"seconds", Median(row.seconds)},
               {"seconds_of_runs", row.seconds},
@@ -147,7 +174,11 @@ json SourceRowJson(const SourceRow& row) {
                                 {"of", row.extrapolated->all}};
   }
   if (row.published) out["published_seconds"] = MeanOf(*row.published);
-  if (row.table == 2) out["bandwidth_share"] = OrNull(row.bandwidth_share);
+  const SourceRow* base = BaseRow(row, rows);
+  out["times_faster"] =
+      base == nullptr ? json() : json(Median(base->seconds) / Median(row.seconds));
+  out["times_faster_than"] = base == nullptr ? json() : json(base->implementation);
+  if (row.table == 2) out["bandwidth_share"] = OrNull(BandwidthShare(row));
   if (row.table == 3) {
     out["relative_residual"] = OrNull(row.relative_residual);
     out["converged"] = OrNull(row.converged);
@@ -169,7 +200,11 @@ std::string SourceTableText(int table, const std::vector<SourceRow>& rows) {
   std::string text = fmt::format("{}\n{}", Heading(table), Columns(table));
   for (const SourceRow& row : rows) {
     if (row.table != table) continue;
-    text += table == 4 ? FidelityLine(row) : TimeLine(row, rows);
+    if (!row.failure.empty()) {
+      text += fmt::format("{}  not run: {}\n", NameColumns(row), row.failure);
+    } else {
+      text += table == 4 ? FidelityLine(row) : TimeLine(row, rows);
+    }
   }
   return text + Footnotes(table, rows);
 }

@@ -22,13 +22,15 @@ struct SourceRow {
   int width_px = 0, height_px = 0;
   int views = 0;  // across and down
   std::string implementation;
+  std::string block_solver, device;  // where they are not in the name; may be empty
+  std::string failure;               // why it could not be run; the rest is unknown then
   int threads = 1;
   std::vector<double> seconds;                // of each run, for the whole picture
   std::optional<BlockSample> extrapolated;    // absent: all of it was run
   std::optional<PublishedFigures> published;  // seconds
   std::optional<double> psnr_true_views_db;
-  // Table 2: bytes of the light field and of the picture, a second, over the machine's triad.
-  std::optional<double> bandwidth_share;
+  // Table 2: the time in which the machine's triad moves the bytes of light field and picture.
+  std::optional<double> triad_seconds;
   // Table 3: the largest of the blocks, and whether an iterative solver reached its tolerance.
   std::optional<double> relative_residual;
   std::optional<bool> converged;
@@ -37,7 +39,8 @@ struct SourceRow {
   std::optional<PublishedFidelity> published_fidelity;
 };
 
-nlohmann::json SourceRowJson(const SourceRow& row);
+// `rows`: all, among them that to which the ratios are taken.
+nlohmann::json SourceRowJson(const SourceRow& row, const std::vector<SourceRow>& rows);
 
 // The rows of one table, with its heading, ratios and what was published beside.
 std::string SourceTableText(int table, const std::vector<SourceRow>& rows);
