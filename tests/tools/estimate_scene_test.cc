@@ -130,6 +130,32 @@ model::StoredPicture ConfidenceFile(const std::string& folder, int k, int l) {
       ReadPictureFile(fmt::format("{}/confidence/view_{:02}_{:02}.png", folder, l, k)));
 }
 
+TEST_F(EstimateSceneTest, HiddenRaysMayBeInpainted) {
+  const Arguments strip = {Picture(), Depth(Strip), "--depth-kind", "disparity",
+                           "--views", "3x3",        "--format",     "tiff"};
+  EXPECT_TRUE(Summary(strip)["inpainting"].is_null());
+  const model::LightField own = ReadLightField(Output(), {});
+  EXPECT_EQ(own.origin.method, "scene");
+  ProgramResult result;
+  const json inpainting = Summary(With(strip, {"--fill", "telea"}), &result)["inpainting"];
+  EXPECT_GT(inpainting["rays"].get<int>(), 100);
+  EXPECT_EQ(inpainting["filled"].get<int>() + inpainting["carried"].get<int>(),
+            inpainting["rays"].get<int>());
+  EXPECT_THAT(result.out, HasSubstr("inpainting   "));
+  const model::LightField telea = ReadLightField(Output(), {});
+  EXPECT_EQ(telea.origin.method, "scene+telea");
+  int changed = 0;
+  for (std::size_t i = 0; i < own.values.size(); ++i) {
+    if (own.values[i] != telea.values[i]) ++changed;
+  }
+  EXPECT_GT(changed, 0);
+  EXPECT_LE(changed, 3 * inpainting["rays"].get<int>());  // channels
+  const ProgramResult report =
+      ChildProgram({"report", Output(), "-o", folder_ / "page.html"}, scratch_.path(), 0).Wait();
+  EXPECT_EQ(report.exit_code, 0) << report.err;
+  EXPECT_THAT(ContentOf(folder_ / "page.html"), HasSubstr("scene+telea"));
+}
+
 TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
   const json summary = Summary(
       {Picture(), Depth(Strip), "--depth-kind", "disparity", "--views", "3x3", "--threads", "2"});

@@ -295,6 +295,8 @@ TEST_F(EstimateTest, SettingsThatCannotBe) {
 TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
   const Arguments relative = AsDisparity(Picture(), Disparity());
   EXPECT_THAT(Refusal(With(relative, {"--st-depth-mm", "700"}), 2), HasSubstr("--camera"));
+  EXPECT_THAT(Refusal(With(relative, {"--block-solver", "viennacl"}), 2),
+              HasSubstr("--device cpu is not for"));
   EXPECT_THAT(Refusal(With(relative, {"--sparse"}), 2), HasSubstr("--aperture-of"));
   EXPECT_THAT(Refusal(With(relative, {"--grid", "9"}), 2), HasSubstr("--aperture-of"));
   EXPECT_THAT(Refusal(With(relative, {"--aperture-of", "x", "--aperture-shape", "disc"}), 2),
@@ -307,8 +309,7 @@ TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
   for (const Arguments& iterative :
        std::vector<Arguments>{{"--tolerance", "1e-3"}, {"--max-iterations", "9"}, {"--double"}}) {
     EXPECT_THAT(Refusal(With(relative, iterative), 2),
-                HasSubstr(iterative.front() +
-                          " is of --solver scene, functional or grid, the solver is blocks"));
+                HasSubstr(iterative.front() + " is of --solver scene, functional or grid"));
   }
   EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "100x3"}, 2),
               HasSubstr("from 1 to 99"));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bench_gamma.h"
+#include "bench_inpainting.h"
 #include "bench_machine.h"
 #include "bench_scene.h"
 #include "bench_solvers.h"
@@ -173,6 +174,7 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
   bench->require_subcommand(1);
   AddBenchSourceCommand(bench, action);
   AddBenchGammaCommand(bench, action);
+  AddBenchInpaintingCommand(bench, action);
   CLI::App* command = bench->add_subcommand(
       "solvers", "All light-field solvers on one simulated picture, in one run");
   const auto options = std::make_shared<BenchOptions>();

@@ -63,6 +63,42 @@ model::Camera BenchCamera(int width_px, int height_px) {
   return camera;
 }
 
+namespace {
+
+model::SceneLayer GreyLayer(model::TextureKind texture) {
+  model::SceneLayer layer;
+  layer.texture.kind = texture;
+  layer.texture.saturation = 0;
+  return layer;
+}
+
+BenchScene SceneOf(const model::Camera& camera, const std::vector<model::SceneLayer>& layers,
+                   int u_count, int v_count, std::uint64_t seed, const model::SceneRun& run) {
+  model::SceneSimulationOptions options;
+  options.camera = camera;
+  options.noise_sigma_grey_levels = 1;
+  options.u_count = u_count;
+  options.v_count = v_count;
+  options.seed = seed;
+  options.layers = layers;
+  const model::SceneSimulator simulator(options, std::vector<model::LayerPixels>(layers.size()));
+
+  BenchScene scene;
+  scene.truth = GreyViews(simulator.RenderLightField(u_count, v_count, run));
+  estimator::EstimateInput& input = scene.input;
+  input.camera = camera;
+  input.transfer = camera.sensor.transfer;
+  input.picture = model::ToGrey(
+      model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer));
+  input.grid = model::DefaultGrid(camera, u_count, v_count);
+  input.weights = model::ApertureWeights(model::ApertureShapeOf(camera.psf), u_count, v_count);
+  input.disparity = estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values,
+                                               camera.sensor.width_px, camera.sensor.height_px);
+  return scene;
+}
+
+}  // namespace
+
 BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count, std::uint64_t seed,
                           int threads, const std::function<void(int done, int total)>& progress) {
   return MakeBenchScene(BenchCamera(width_px, height_px), u_count, v_count, seed, threads,
@@ -71,33 +107,28 @@ BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count,
 
 BenchScene MakeBenchScene(const model::Camera& camera, int u_count, int v_count, std::uint64_t seed,
                           int threads, const std::function<void(int done, int total)>& progress) {
-  model::SceneSimulationOptions options;
-  options.camera = camera;
-  options.noise_sigma_grey_levels = 1;
-  options.u_count = u_count;
-  options.v_count = v_count;
-  options.seed = seed;
-  model::SceneLayer plane;
-  plane.plane = SlantedPlane(options.camera);
-  plane.texture.kind = model::TextureKind::kNoise;
-  plane.texture.saturation = 0;
-  options.layers = {plane};
-  const model::SceneSimulator simulator(options, {{}});
-  const model::SceneRun run{threads, progress};
+  model::SceneLayer plane = GreyLayer(model::TextureKind::kNoise);
+  plane.plane = SlantedPlane(camera);
+  return SceneOf(camera, {plane}, u_count, v_count, seed, {threads, progress});
+}
 
-  BenchScene scene;
-  scene.truth = GreyViews(simulator.RenderLightField(u_count, v_count, run));
-  estimator::EstimateInput& input = scene.input;
-  input.camera = options.camera;
-  input.transfer = options.camera.sensor.transfer;
-  input.picture = model::ToGrey(
-      model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer));
-  input.grid = model::DefaultGrid(options.camera, u_count, v_count);
-  input.weights =
-      model::ApertureWeights(model::ApertureShapeOf(options.camera.psf), u_count, v_count);
-  input.disparity = estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values,
-                                               camera.sensor.width_px, camera.sensor.height_px);
-  return scene;
+BenchScene MakeOccludedScene(int width_px, int height_px, int u_count, int v_count,
+                             std::uint64_t seed, int threads,
+                             const std::function<void(int done, int total)>& progress) {
+  model::SceneLayer wall = GreyLayer(model::TextureKind::kNoise);
+  wall.plane.depth_mm = 1200;
+  std::vector<model::SceneLayer> layers = {wall};
+  for (int i = 0; i < 3; ++i) {
+    model::SceneLayer card = GreyLayer(model::TextureKind::kDeadLeaves);
+    card.plane.depth_mm = 700 + 100 * i;
+    card.outline.shape = model::OutlineOptions::Shape::kRectangle;
+    card.outline.unit = model::OutlineOptions::Unit::kPx;
+    card.outline.centre = {(0.2 + 0.3 * i) * width_px, (0.35 + 0.15 * i) * height_px};
+    card.outline.size = {0.18 * width_px, 0.3 * height_px};
+    layers.push_back(card);
+  }
+  return SceneOf(BenchCamera(width_px, height_px), layers, u_count, v_count, seed,
+                 {threads, progress});
 }
 
 BenchScene PartOf(const BenchScene& scene, const model::PixelRect& part) {

@@ -29,6 +29,7 @@
 #include "report_folder.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
+#include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/output_file.h"
@@ -81,7 +82,8 @@ void CheckBlur(const EstimateOptions& options, const estimator::EstimateInput& i
   outcome->blur.emplace(estimator::CheckBlur(input, settings), input, options.depth);
 }
 
-// Views go to the writer as they are made, unless a page is to show them.
+// Views go to the writer as they are made, unless a page is to show them or they are to be
+// inpainted.
 void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& input,
                 const model::EffectSet& on, const Progress& progress, LightFieldWriter* writer,
                 EstimateOutcome* outcome) {
@@ -93,7 +95,7 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
   const estimator::SceneOptions settings = SceneSettings(options, input, on, progress);
   if (options.check_blur) CheckBlur(options, input, on, outcome);
   estimator::SceneSummary scene;
-  if (!options.report_folder.empty()) {
+  if (!options.report_folder.empty() || options.fill == "telea") {
     outcome->light_field =
         estimator::EstimateScene(input, settings, &scene, &outcome->maps, backend.get());
   } else {
@@ -165,6 +167,22 @@ void Solve(const EstimateOptions& options, const PreparedEstimate& prepared,
   SolveFunctional(options, input, on, progress, outcome);
 }
 
+void Inpaint(const EstimateOptions& options, const estimator::EstimateInput& input,
+             EstimateOutcome* outcome) {
+  ProgressLine line("inpainting", options.common.quiet);
+  estimator::InpaintOptions settings;
+  settings.threads = options.common.threads;
+  settings.progress = [&line](int done, int total) {
+    ThrowIfInterrupted();
+    line.Show(done, total);
+  };
+  outcome->inpainting.emplace();
+  estimator::InpaintHiddenRays(input.disparity, settings, &outcome->light_field,
+                               &*outcome->inpainting);
+  outcome->light_field.origin.method += "+telea";
+  outcome->seconds.views += outcome->inpainting->seconds;
+}
+
 // What was not written as it was made.
 void WriteRays(const EstimateOptions& options, const estimator::EstimateInput& input,
                const EstimateOutcome& outcome, LightFieldWriter* writer) {
@@ -232,6 +250,7 @@ CommandResult Estimate(const EstimateOptions& options) {
                           options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng,
                           &outputs.light_field);
   Solve(options, prepared, progress, &writer, &outcome);
+  if (options.fill == "telea") Inpaint(options, prepared.input, &outcome);
   model::LightFieldOrigin& origin = outcome.light_field.origin;
   origin.seconds = outcome.seconds.setup + outcome.seconds.solve + outcome.seconds.views;
   origin.effects = prepared.effects.on.Names();

@@ -90,6 +90,13 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("MM");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
                     "Takes the depth as it is, however noisy: it is smoothed along surfaces else");
+  command
+      ->add_option("--fill", options->fill,
+                   "What the centre view does not show: as the solver has it, or by the source's "
+                   "inpainting (telea), view by view, for comparison")
+      ->check(CLI::IsMember({"solver", "telea"}))
+      ->capture_default_str()
+      ->type_name("NAME");
   AddEffectOptions(command, &options->effects);
   command
       ->add_option("--format", options->format,
@@ -248,8 +255,19 @@ void CheckSolverUsage(const EstimateOptions& options) {
         std::find(solvers.begin(), solvers.end(), options.solver) != solvers.end()) {
       continue;
     }
-    throw UsageError(fmt::format("{} is of --solver {}, the solver is {}", option.name,
-                                 Either(solvers), options.solver));
+    const bool is_iterations =
+        option.name == std::string("--tolerance") || option.name == std::string("--max-iterations");
+    throw UsageError(
+        fmt::format("{} is of --solver {}{}, the solver is {}", option.name, Either(solvers),
+                    options.by_blocks() && is_iterations
+                        ? ", or of blocks with an iterative --block-solver (cg, bicgstab, viennacl)"
+                        : "",
+                    options.solver));
+  }
+  if (options.block_solver == "viennacl" && options.device != "auto") {
+    throw UsageError(fmt::format(
+        "--device {} is not for --block-solver viennacl, which takes a device for itself (auto)",
+        options.device));
   }
   if (options.solver != "scene" && !options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
     throw UsageError(fmt::format(

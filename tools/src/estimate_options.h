@@ -34,6 +34,7 @@ struct EstimateOptions {
   std::string solver = "scene";
   std::optional<double> memory_limit_mib;
   bool keep_depth_noise = false;
+  std::string fill = "solver";  // or "telea"
   EffectOptions effects{{}, {}, {}, "--effect-tolerance"};
   std::string device = "auto";
   std::string format = "png";

@@ -135,6 +135,15 @@ void AddFunctional(const estimator::FunctionalSummary& functional, json* out) {
                {"residual_rms", nullptr}});
 }
 
+json InpaintingJson(const EstimateOutcome& outcome) {
+  if (!outcome.inpainting) return nullptr;
+  return {{"rays", outcome.inpainting->holes},
+          {"filled", outcome.inpainting->filled},
+          {"carried", outcome.inpainting->carried},
+          {"views_visited", outcome.inpainting->views_visited},
+          {"seconds", outcome.inpainting->seconds}};
+}
+
 // How the iterations of a solver ended; a direct solver has none.
 struct Iterations {
   int count = 0;
@@ -329,6 +338,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
                     {"median_mm", prepared.depth.depth->median_mm},
                     {"max_mm", prepared.depth.depth->max_mm}};
   }
+  out["inpainting"] = InpaintingJson(outcome);
   if (outcome.scene) AddScene(options, outcome, &out);
   if (outcome.blocks) AddBlocks(outcome, &out);
   if (outcome.functional) AddFunctional(*outcome.functional, &out);
@@ -350,6 +360,7 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
   text += AccuracyText(outcome);
   if (outcome.blur) text += fmt::format("blur check   {}\n", outcome.blur->Summary());
   text += ConfidenceText(outcome.confidence);
+  if (outcome.inpainting) text += fmt::format("inpainting   {}\n", outcome.inpainting->message);
   text += fmt::format(
       "time         {:.2f} s: set-up {:.2f}, solve {:.2f}, views {:.2f}, files {:.2f}\n",
       seconds.total, seconds.setup, seconds.solve, seconds.views, seconds.files);

@@ -12,6 +12,7 @@
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/ray_confidence.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field.h"
@@ -34,6 +35,7 @@ struct EstimateOutcome {
   std::optional<estimator::EstimateSummary> blocks;
   std::optional<estimator::FunctionalSummary> functional;  // `grid`, too
   std::optional<BlurProposal> blur;                        // of `scene`, if it was asked for
+  std::optional<estimator::InpaintSummary> inpainting;     // --fill telea
   EstimateSeconds seconds;
   double clipped_fraction = 0;             // of the values, by the views' files
   estimator::ConfidenceShares confidence;  // of all rays

@@ -9,7 +9,9 @@
 namespace thicklens::tools {
 
 bool IsEstimated(const LightFieldPageInput& input) {
-  const std::string& method = input.light_field->origin.method;
+  // Without what filled its hidden rays: "scene" of "scene+telea".
+  const std::string& whole = input.light_field->origin.method;
+  const std::string method = whole.substr(0, whole.find('+'));
   return input.estimate || method == "scene" || method == "blocks" || method == "functional" ||
          method == "grid";
 }
