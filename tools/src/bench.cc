@@ -12,6 +12,7 @@
 #include "bench_gamma.h"
 #include "bench_inpainting.h"
 #include "bench_machine.h"
+#include "bench_options.h"
 #include "bench_scene.h"
 #include "bench_solvers.h"
 #include "bench_source.h"
@@ -157,13 +158,12 @@ CommandResult BenchSolvers(const BenchOptions& options) {
         kSamplePx, kSamplePx, share);
   }
   PrintResult(options.common, text);
-  return {{{"status", "ok"},
-           {"reason", ""},
-           {"machine", MachineJson()},
-           {"scene", {{"kind", "slanted plane of noise"}, {"channels", 1}, {"seed", options.seed}}},
+  return {
+      BenchSummary(
+          {{"scene", {{"kind", "slanted plane of noise"}, {"channels", 1}, {"seed", options.seed}}},
            {"repeat", options.repeat},
-           {"rows", rows}},
-          ""};
+           {"rows", rows}}),
+      ""};
 }
 
 }  // namespace
@@ -182,14 +182,9 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
       ->capture_default_str()
       ->type_name("WIDTHxHEIGHT");
   AddViewsOption(command, &options->views, "Views across and down; default 7x7");
-  command->add_option("--repeat", options->repeat, "Times that each is run; the median counts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str()
-      ->type_name("N");
+  AddRepeatOption(command, &options->repeat);
   command->add_flag("--full", options->full, "Blocks of the whole picture, not of a sample");
-  command->add_option("--seed", options->seed, "Of texture and noise")
-      ->capture_default_str()
-      ->type_name("N");
+  AddSeedOption(command, &options->seed);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] { RunCommand(options->common, [&] { return BenchSolvers(*options); }); };

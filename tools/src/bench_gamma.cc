@@ -13,8 +13,9 @@
 #include <vector>
 
 #include "bench_machine.h"
+#include "bench_options.h"
+#include "bench_parts.h"
 #include "bench_scene.h"
-#include "bench_solvers.h"
 #include "interrupt.h"
 #include "option_values.h"
 #include "progress_line.h"
@@ -159,18 +160,16 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
       "true "
       "ones.\nBelow an rcond of 1e-12 `estimate` ends with an error.\n";
   PrintResult(options.common, text);
-  return {{{"status", "ok"},
-           {"reason", ""},
-           {"machine", MachineJson()},
-           {"size", {options.size_px, options.size_px}},
-           {"views", {options.views, options.views}},
-           {"block_solver", estimator::BlockSolverName(estimator::DefaultBlockSolver())},
-           {"threads", model::ResolveThreads(options.common.threads)},
-           {"repeat", options.repeat},
-           {"seed", options.seed},
-           {"dibr_psnr_db", dibr_db},
-           {"rows", json_rows}},
-          ""};
+  return {
+      BenchSummary({{"size", {options.size_px, options.size_px}},
+                    {"views", {options.views, options.views}},
+                    {"block_solver", estimator::BlockSolverName(estimator::DefaultBlockSolver())},
+                    {"threads", model::ResolveThreads(options.common.threads)},
+                    {"repeat", options.repeat},
+                    {"seed", options.seed},
+                    {"dibr_psnr_db", dibr_db},
+                    {"rows", json_rows}}),
+      ""};
 }
 
 }  // namespace
@@ -179,21 +178,10 @@ void AddBenchGammaCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
       "gamma", "What the source's multiplier gamma does to quality, conditioning and time");
   const auto options = std::make_shared<BenchGammaOptions>();
-  command->add_option("--size-px", options->size_px, "Side of the simulated picture")
-      ->check(CLI::Range(64, 4096))
-      ->capture_default_str()
-      ->type_name("PX");
-  command->add_option("--views", options->views, "Across and down")
-      ->check(CLI::Range(2, 31))
-      ->capture_default_str()
-      ->type_name("N");
-  command->add_option("--repeat", options->repeat, "Times that each is run; the median counts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str()
-      ->type_name("N");
-  command->add_option("--seed", options->seed, "Of texture and noise")
-      ->capture_default_str()
-      ->type_name("N");
+  AddSizeOption(command, 64, &options->size_px);
+  AddSquareViewsOption(command, &options->views);
+  AddRepeatOption(command, &options->repeat);
+  AddSeedOption(command, &options->seed);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] { RunCommand(options->common, [&] { return BenchGamma(*options); }); };

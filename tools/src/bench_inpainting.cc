@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "bench_machine.h"
+#include "bench_options.h"
 #include "bench_scene.h"
 #include "bench_solvers.h"
 #include "interrupt.h"
@@ -195,13 +196,10 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
     json_rows.push_back(RowJson(row));
   }
   PrintResult(options.common, text);
-  return {{{"status", "ok"},
-           {"reason", ""},
-           {"machine", MachineJson()},
-           {"size", {options.size_px, options.size_px}},
-           {"views", {options.views, options.views}},
-           {"threads", threads},
-           {"rows", json_rows}},
+  return {BenchSummary({{"size", {options.size_px, options.size_px}},
+                        {"views", {options.views, options.views}},
+                        {"threads", threads},
+                        {"rows", json_rows}}),
           ""};
 }
 
@@ -211,21 +209,10 @@ void AddBenchInpaintingCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
       "inpainting", "The source's inpainting of hidden rays against the solvers' own filling");
   const auto options = std::make_shared<BenchInpaintingOptions>();
-  command->add_option("--size-px", options->size_px, "Side of the simulated picture")
-      ->check(CLI::Range(96, 4096))
-      ->capture_default_str()
-      ->type_name("PX");
-  command->add_option("--views", options->views, "Across and down")
-      ->check(CLI::Range(2, 31))
-      ->capture_default_str()
-      ->type_name("N");
-  command->add_option("--repeat", options->repeat, "Times that each is run; the median counts")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str()
-      ->type_name("N");
-  command->add_option("--seed", options->seed, "Of texture and noise")
-      ->capture_default_str()
-      ->type_name("N");
+  AddSizeOption(command, 96, &options->size_px);
+  AddSquareViewsOption(command, &options->views);
+  AddRepeatOption(command, &options->repeat);
+  AddSeedOption(command, &options->seed);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] { RunCommand(options->common, [&] { return BenchInpainting(*options); }); };

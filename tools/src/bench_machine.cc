@@ -9,10 +9,17 @@
 
 #include "build_info.h"
 #include "commands.h"
+#include "thicklens/estimator/blas.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
+
+void TriadOf(const float* b, const float* c, std::size_t count, float* a) {
+  for (std::size_t i = 0; i < count; ++i) a[i] = b[i] + 3 * c[i];
+}
+
+}  // namespace
 
 std::string ProcessorName() {
   std::ifstream info("/proc/cpuinfo");
@@ -24,17 +31,15 @@ std::string ProcessorName() {
   return "unknown";
 }
 
-void TriadOf(const float* b, const float* c, std::size_t count, float* a) {
-  for (std::size_t i = 0; i < count; ++i) a[i] = b[i] + 3 * c[i];
-}
-
-}  // namespace
-
-nlohmann::json MachineJson() {
-  return {{"processor", ProcessorName()},
-          {"cores", static_cast<int>(std::thread::hardware_concurrency())},
-          {"build", BuildInfo()},
-          {"date", NowIso8601()}};
+nlohmann::json BenchSummary(nlohmann::json fields) {
+  fields["status"] = "ok";
+  fields["reason"] = "";
+  fields["machine"] = {{"processor", ProcessorName()},
+                       {"cores", static_cast<int>(std::thread::hardware_concurrency())},
+                       {"build", BuildInfo()},
+                       {"blas", estimator::BlasDescription()},
+                       {"date", NowIso8601()}};
+  return fields;
 }
 
 double TriadBytesPerSecond(int threads) {

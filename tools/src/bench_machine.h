@@ -2,12 +2,15 @@
 #define THICKLENS_TOOLS_BENCH_MACHINE_H_
 
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 namespace thicklens::tools {
 
-// What times are to be read with: processor, cores, build, date.
-nlohmann::json MachineJson();
+// The summary of a bench that went well: its fields, and what times are to be read with, `machine`:
+// processor, cores, build, BLAS, date.
+nlohmann::json BenchSummary(nlohmann::json fields);
+std::string ProcessorName();
 
 // Bytes a second that memory gives `threads` of them, as the STREAM benchmark does and counts it:
 // of a = b + 3 c, two arrays read and one written, far larger than any cache. The best of a few

@@ -5,24 +5,27 @@
 #include <string>
 #include <vector>
 
+#include "estimate_plan.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::tools {
 
+// By blocks of the source's size, with its gamma of 1.
+EstimatePlan SourcePlan(estimator::BlockSolver solver);
+// Of the whole picture: scene with each prior, functional, grid.
+std::vector<EstimatePlan> WholePicturePlans();
+
 // One way from picture and depth to the views, all of it, stopped by an interrupt.
 struct LightFieldSolver {
   std::string solver, block_solver, prior;  // empty: it has none
   std::function<model::LightField(const estimator::EstimateInput&)> estimate;
 };
-
-constexpr int kSourceBlockPx = 16;  // the source's
-
-// By blocks of kSourceBlockPx with the source's gamma of 1; keeps `backend`.
+// Keeps `backend`.
 LightFieldSolver SolverByBlocks(estimator::BlockSolver solver, int threads,
                                 kernels::Backend* backend);
-// scene with each prior, functional, grid, and at last the baseline dibr.
+// Those of WholePicturePlans(), and at last the baseline dibr.
 std::vector<LightFieldSolver> WholePictureSolvers(int threads);
 
 }  // namespace thicklens::tools

@@ -6,14 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "bench_parts.h"
 #include "source_figures.h"
 
 namespace thicklens::tools {
-
-// Blocks that were solved, of all that the picture has.
-struct BlockSample {
-  int solved = 0, all = 0;
-};
 
 // One line of one of the source's tables, measured here.
 struct SourceRow {

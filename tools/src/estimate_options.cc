@@ -248,35 +248,6 @@ std::string Either(const std::vector<std::string>& names) {
   return fmt::format("{} or {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
 }
 
-void CheckSolverUsage(const EstimateOptions& options) {
-  for (const OptionOfSolvers& option : OptionsOfSolvers(options)) {
-    const auto& solvers = option.solvers;
-    if (!option.is_given ||
-        std::find(solvers.begin(), solvers.end(), options.solver) != solvers.end()) {
-      continue;
-    }
-    const bool is_iterations =
-        option.name == std::string("--tolerance") || option.name == std::string("--max-iterations");
-    throw UsageError(
-        fmt::format("{} is of --solver {}{}, the solver is {}", option.name, Either(solvers),
-                    options.by_blocks() && is_iterations
-                        ? ", or of blocks with an iterative --block-solver (cg, bicgstab, viennacl)"
-                        : "",
-                    options.solver));
-  }
-  if (options.block_solver == "viennacl" && options.device != "auto") {
-    throw UsageError(fmt::format(
-        "--device {} is not for --block-solver viennacl, which takes a device for itself (auto)",
-        options.device));
-  }
-  if (options.solver != "scene" && !options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
-    throw UsageError(fmt::format(
-        "--device {} is for --solver scene or blocks; the solver {} computes on the processor "
-        "(auto or cpu)",
-        options.device, options.solver));
-  }
-}
-
 // The light field's folder is replaced as a whole; a page in it would go with the older one.
 void RequireReportBesideLightField(const EstimateOptions& options) {
   if (options.report_folder.empty()) return;
@@ -311,6 +282,35 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
   AddFunctionalOptions(command, options);
   AddBlockOptions(command, options);
   AddCommonOptions(command, &options->common);
+}
+
+void CheckSolverUsage(const EstimateOptions& options) {
+  for (const OptionOfSolvers& option : OptionsOfSolvers(options)) {
+    const auto& solvers = option.solvers;
+    if (!option.is_given ||
+        std::find(solvers.begin(), solvers.end(), options.solver) != solvers.end()) {
+      continue;
+    }
+    const bool is_iterations =
+        option.name == std::string("--tolerance") || option.name == std::string("--max-iterations");
+    throw UsageError(
+        fmt::format("{} is of --solver {}{}, the solver is {}", option.name, Either(solvers),
+                    options.by_blocks() && is_iterations
+                        ? ", or of blocks with an iterative --block-solver (cg, bicgstab, viennacl)"
+                        : "",
+                    options.solver));
+  }
+  if (options.block_solver == "viennacl" && options.device != "auto") {
+    throw UsageError(fmt::format(
+        "--device {} is not for --block-solver viennacl, which takes a device for itself (auto)",
+        options.device));
+  }
+  if (options.solver != "scene" && !options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
+    throw UsageError(fmt::format(
+        "--device {} is for --solver scene or blocks; the solver {} computes on the processor "
+        "(auto or cpu)",
+        options.device, options.solver));
+  }
 }
 
 void CheckEstimateUsage(const EstimateOptions& options) {

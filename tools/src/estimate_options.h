@@ -56,6 +56,8 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options);
 
 // Throws UsageError for what cannot be meant: nothing that is given is left out without a word.
 void CheckEstimateUsage(const EstimateOptions& options);
+// The part of it that speaks of the solver's own options.
+void CheckSolverUsage(const EstimateOptions& options);
 
 // What is given, and the solver's defaults else; `on`: the effects of the photograph that the
 // solver is to take into account. Throws Error where that is not valid.

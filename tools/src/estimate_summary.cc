@@ -1,12 +1,13 @@
 #include "estimate_summary.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <utility>
+
+#include "peak_memory.h"
 
 namespace thicklens::tools {
 namespace {
@@ -14,12 +15,6 @@ namespace {
 using nlohmann::json;
 
 constexpr double kGreyLevels = 255;
-
-double PeakResidentMib() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024;  // Linux counts KiB
-}
 
 std::string TransferFrom(const EstimateOptions& options) {
   if (!options.transfer.empty()) return "option";
@@ -310,7 +305,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
                 {"views", seconds.views},
                 {"files", seconds.files},
                 {"total", seconds.total}}},
-              {"peak_rss_mib", PeakResidentMib()},
+              {"peak_rss_mib", PeakMemoryMib()},
               {"effects", light_field.origin.effects},
               {"effect_impacts", EffectsJson(prepared.effects)},
               {"holes_filled", prepared.depth.holes},
