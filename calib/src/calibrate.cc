@@ -77,12 +77,22 @@ class Calibrator {
   bool Passed(const std::optional<std::string>& refusal) { return !refusal || Refuse(*refusal); }
 
   void Measure() {
-    if (MeasureAndGate() && MeasureSharpness() && FindDepths()) {
+    const bool needs_scale = options_.fit_blur || !sweep_.offset_mm;
+    if (MeasureAndGate() && MeasureSharpness() && (needs_scale ? FindDepths() : BelieveDepths())) {
       result_.source = RunSourceRecipe(sweep_.camera, result_.frames, used());
       FitPeak();
-      MeasureAndSolve();
+      if (options_.fit_blur) {
+        MeasureAndSolve();
+      } else {
+        EndBeforeFit();
+      }
     }
     NamePlainCause();
+  }
+
+  void EndBeforeFit() {
+    result_.outcome = Outcome::kPartial;
+    result_.reason = "the blur was not to be fitted";
   }
 
   // What the frames that are left fail for is often only the consequence of something plainer.
@@ -194,8 +204,7 @@ class Calibrator {
     }
     ReplaceReference();
     if (sweep_.offset_mm) {
-      result_.bench_offset_mm =
-          Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
+      TakeGivenOffset();
       if (!is_lone_edge) {
         const OffsetCheck check = CheckGivenOffset(sweep_, &result_);
         if (check.refusal) return Refuse(*check.refusal);
@@ -210,6 +219,21 @@ class Calibrator {
     slip_ = FindSlip(scales_, result_.scale);
     if (slip_) WarnOfSlip(*slip_, &result_);
     bend_ = CheckBend(sweep_, scales_, &result_);
+    return PlacedWithinReach();
+  }
+
+  // The given bench zero and the readings as they are.
+  bool BelieveDepths() {
+    TakeGivenOffset();
+    return PlacedWithinReach();
+  }
+
+  void TakeGivenOffset() {
+    result_.bench_offset_mm =
+        Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
+  }
+
+  bool PlacedWithinReach() {
     PlaceFrames();
     return Passed(selection_.KeepPossibleDepths(result_.bench_offset_mm->value,
                                                 sweep_.camera.lens.front_focal_length_mm));

@@ -96,6 +96,34 @@ TEST(Calibrate, OneAndTwoThreadsGiveTheSameBits) {
   EXPECT_TRUE(one.covariance == two.covariance);
 }
 
+TEST(Calibrate, TheSourcesRecipeAndThePeakNeedNoFit) {
+  const SimulatedSweep good = Good();
+  const Calibration whole = Calibrated(good);
+  CalibrationOptions options;
+  options.fit_blur = false;
+  const Calibration alone = Calibrate(good.sweep, options);
+  EXPECT_EQ(alone.outcome, Outcome::kPartial);
+  EXPECT_EQ(alone.reason, "the blur was not to be fitted");
+  ASSERT_TRUE(alone.source.done && alone.sharpness.done);
+  EXPECT_EQ(alone.source.focus_depth_mm, whole.source.focus_depth_mm);
+  EXPECT_EQ(alone.source.blur_ratio, whole.source.blur_ratio);
+  EXPECT_EQ(alone.sharpness.focus_depth_mm, whole.sharpness.focus_depth_mm);
+  EXPECT_FALSE(alone.image_distance_mm || alone.blur_ratio || alone.blur.done || alone.field.done);
+  EXPECT_FALSE(alone.scale.done);  // the bench zero is given
+}
+
+TEST(Calibrate, WithoutFitAnUnknownBenchZeroIsStillFound) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  CalibrationOptions options;
+  options.fit_blur = false;
+  const Calibration alone = Calibrate(s.sweep, options);
+  ASSERT_TRUE(alone.scale.done && alone.bench_offset_mm);
+  EXPECT_NEAR(alone.bench_offset_mm->value, s.truth.bench_offset_mm,
+              4 * alone.bench_offset_mm->sigma);
+  EXPECT_NEAR(alone.sharpness.focus_depth_mm, Calibrated(s).sharpness.focus_depth_mm, 0.1);
+}
+
 TEST(Calibrate, ThreeFramesAreTooFew) {
   SimulatedSweep s = Good();
   Keep(&s, 18, 3);

@@ -14,7 +14,10 @@ namespace thicklens::calib {
 
 struct CalibrationOptions {
   GateOptions gates;
-  bool map_field = true;  // tiles and colour channels too
+  // False: the source's recipe and the sharpness peak alone. Where the bench zero is given they
+  // need no image scale, and no frame is registered then: a wrong reading is not noticed.
+  bool fit_blur = true;
+  bool map_field = true;  // tiles and colour channels too; needs the fit
   int threads = 0;        // 0: one per core
   // Called now and then with (steps done, steps in all); false stops the run (Interrupted).
   std::function<bool(int done, int total)> progress;
