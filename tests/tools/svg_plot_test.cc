@@ -92,6 +92,17 @@ TEST(NiceTicks, AreTheFinestRoundOnesThatFit) {
   }
 }
 
+TEST(NiceLogTicks, ArePowersOfTenOrRoundNumbersBetween) {
+  EXPECT_THAT(NiceLogTicks(0.8, 12, 8), ElementsAre(1, 2, 5, DoubleNear(10, 1e-9)));
+  EXPECT_THAT(NiceLogTicks(0.01, 1000, 6),
+              ElementsAre(DoubleNear(0.01, 1e-9), DoubleNear(0.1, 1e-9), 1, DoubleNear(10, 1e-9),
+                          DoubleNear(100, 1e-9), DoubleNear(1000, 1e-9)));
+  EXPECT_LE(NiceLogTicks(1e-9, 1e9, 5).size(), 5U);
+  EXPECT_THAT(NiceLogTicks(2.1, 3.9, 6), ElementsAre(2.5, 3, 3.5));  // as on a plain axis
+  EXPECT_THAT(NiceLogTicks(0, 1, 5), IsEmpty());
+  EXPECT_THAT(NiceLogTicks(2, 1, 5), IsEmpty());
+}
+
 TEST(TickLabel, HasTheDigitsOfItsStep) {
   EXPECT_EQ(TickLabel(0.5, 0.5), "0.5");
   EXPECT_EQ(TickLabel(1, 0.5), "1.0");
@@ -119,6 +130,20 @@ TEST(SvgPlot, PutsPointsWhereTheyBelong) {
   EXPECT_NEAR(circles[1].Number("cx") - circles[0].Number("cx"),
               circles[2].Number("cx") - circles[1].Number("cx"), 0.15);
   EXPECT_GT(circles[0].Number("cy"), circles[2].Number("cy"));  // up is more
+}
+
+TEST(SvgPlot, LogarithmicAxesPutEqualRatiosEquallyFar) {
+  Plot plot = PlotOf({0.1, 1, 10, -3}, {2, 20, 200, 5});
+  plot.x_axis.logarithmic = plot.y_axis.logarithmic = true;
+  const XmlDocument document = ParseXml(SvgPlot(plot));
+  ASSERT_EQ(document.error, "");
+  const std::vector<XmlElement> circles = DataCircles(document);
+  ASSERT_EQ(circles.size(), 3u);  // what is not above 0 is left out
+  for (const char* place : {"cx", "cy"}) {
+    const double first = circles[1].Number(place) - circles[0].Number(place);
+    EXPECT_NEAR(circles[2].Number(place) - circles[1].Number(place), first, 0.11) << place;
+    EXPECT_GT(std::abs(first), 50) << place;
+  }
 }
 
 TEST(SvgPlot, LeavesOutWhatIsNotFiniteAndBreaksTheLineThere) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "svg_plot.h"
 
@@ -22,6 +23,33 @@ std::vector<double> NiceTicks(double lo, double hi, int at_most) {
     return ticks;
   }
   return ticks;
+}
+
+std::vector<double> NiceLogTicks(double lo, double hi, int at_most) {
+  if (!std::isfinite(lo) || !std::isfinite(hi) || !(lo > 0) || !(lo < hi) || at_most < 1) return {};
+  const int first = static_cast<int>(std::floor(std::log10(lo)));
+  const int last = static_cast<int>(std::floor(std::log10(hi)));
+  const auto ticks_of = [&](const std::vector<double>& factors) {
+    std::vector<double> ticks;
+    for (int power = first; power <= last; ++power) {
+      for (const double factor : factors) {
+        const double tick = factor * std::pow(10, power);
+        if (tick >= lo * (1 - 1e-9) && tick <= hi * (1 + 1e-9)) ticks.push_back(tick);
+      }
+    }
+    return ticks;
+  };
+  for (const std::vector<double>& factors : {std::vector<double>{1, 2, 5}, {1, 3}, {1}}) {
+    const std::vector<double> ticks = ticks_of(factors);
+    if (static_cast<int>(ticks.size()) > at_most) continue;
+    return ticks.size() < 3 && hi < 10 * lo ? NiceTicks(lo, hi, at_most) : ticks;
+  }
+  std::vector<double> ticks = ticks_of({1});
+  const std::size_t every =
+      (ticks.size() + static_cast<std::size_t>(at_most) - 1) / static_cast<std::size_t>(at_most);
+  std::vector<double> fewer;
+  for (std::size_t i = 0; i < ticks.size(); i += every) fewer.push_back(ticks[i]);
+  return fewer;
 }
 
 std::string TickLabel(double value, double step) {

@@ -127,6 +127,70 @@ Interval RangeOf(const Plot& plot, bool horizontal) {
   return Padded(range);
 }
 
+// A plot whose logarithmic axes show logarithms, so that all that draws it need not know of them.
+Plot WithLogarithms(Plot plot) {
+  const auto logarithm = [](double value) {
+    return value > 0 ? std::log10(value) : std::numeric_limits<double>::quiet_NaN();
+  };
+  const auto all = [&](std::vector<double>* values) {
+    std::transform(values->begin(), values->end(), values->begin(), logarithm);
+  };
+  for (PlotAxis* axis : {&plot.x_axis, &plot.y_axis}) {
+    if (!axis->logarithmic) continue;
+    const bool is_x = axis == &plot.x_axis;
+    if (axis->range) {
+      axis->range = {logarithm(axis->range->first), logarithm(axis->range->second)};
+    }
+    for (PlotSeries& series : plot.series) {
+      if (!is_x) {
+        // What the bar reaches upward; downward it would reach farther.
+        for (std::size_t i = 0; i < std::min(series.y_error.size(), series.y.size()); ++i) {
+          series.y_error[i] = logarithm(1 + series.y_error[i] / series.y[i]);
+        }
+      }
+      all(is_x ? &series.x : &series.y);
+    }
+    for (PlotBand& band : plot.bands) {
+      if (is_x) {
+        all(&band.x);
+      } else {
+        all(&band.lo);
+        all(&band.hi);
+      }
+    }
+    for (PlotLine& line : plot.lines) {
+      if (line.vertical == is_x) line.position = logarithm(line.position);
+    }
+    for (PlotNote& note : plot.notes) {
+      double& at = is_x ? note.x : note.y;
+      at = logarithm(at);
+    }
+  }
+  return plot;
+}
+
+// Where a tick is, as drawn, and what stands beside it.
+struct Tick {
+  double at = 0;
+  std::string label;
+};
+
+std::vector<Tick> TicksOf(const PlotAxis& axis, const Interval& range, int at_most) {
+  std::vector<Tick> ticks;
+  if (axis.logarithmic) {
+    for (const double value :
+         NiceLogTicks(std::pow(10, range.lo), std::pow(10, range.hi), at_most)) {
+      ticks.push_back({std::log10(value), fmt::format("{:.4g}", value)});
+    }
+    return ticks;
+  }
+  const std::vector<double> values = NiceTicks(range.lo, range.hi, at_most);
+  const double step =
+      values.size() > 1 ? values[1] - values[0] : std::abs(values.empty() ? 1.0 : values[0]);
+  for (const double value : values) ticks.push_back({value, TickLabel(value, step)});
+  return ticks;
+}
+
 // The drawing area and how numbers map into it.
 struct Frame {
   double left = 0, right = 0, top = 0, bottom = 0;
@@ -203,28 +267,24 @@ void AppendLegend(const std::vector<LegendEntry>& entries,
   }
 }
 
-double StepOf(const std::vector<double>& ticks) {
-  return ticks.size() > 1 ? ticks[1] - ticks[0] : std::abs(ticks.empty() ? 1.0 : ticks[0]);
-}
-
-void AppendAxes(const Plot& plot, const Frame& frame, const std::vector<double>& x_ticks,
-                const std::vector<double>& y_ticks, std::string* svg) {
+void AppendAxes(const Plot& plot, const Frame& frame, const std::vector<Tick>& x_ticks,
+                const std::vector<Tick>& y_ticks, std::string* svg) {
   *svg += "<g class=\"grid\">";
-  for (double tick : y_ticks)
+  for (const Tick& tick : y_ticks)
     *svg += fmt::format("<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>",
-                        frame.left, frame.right, frame.Y(tick), frame.Y(tick));
+                        frame.left, frame.right, frame.Y(tick.at), frame.Y(tick.at));
   *svg += "</g>\n<g class=\"axis\">";
   *svg += fmt::format("<path d=\"M{:.1f} {:.1f}V{:.1f}H{:.1f}\"/>", frame.left, frame.top,
                       frame.bottom, frame.right);
-  for (double tick : x_ticks)
-    *svg += fmt::format("<path d=\"M{:.1f} {:.1f}v5\"/>", frame.X(tick), frame.bottom);
+  for (const Tick& tick : x_ticks)
+    *svg += fmt::format("<path d=\"M{:.1f} {:.1f}v5\"/>", frame.X(tick.at), frame.bottom);
   *svg += "</g>\n";
-  for (double tick : x_ticks)
+  for (const Tick& tick : x_ticks)
     *svg += fmt::format("<text text-anchor=\"middle\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>",
-                        frame.X(tick), frame.bottom + 19, TickLabel(tick, StepOf(x_ticks)));
-  for (double tick : y_ticks)
+                        frame.X(tick.at), frame.bottom + 19, tick.label);
+  for (const Tick& tick : y_ticks)
     *svg += fmt::format("<text text-anchor=\"end\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>",
-                        frame.left - 7, frame.Y(tick) + 4, TickLabel(tick, StepOf(y_ticks)));
+                        frame.left - 7, frame.Y(tick.at) + 4, tick.label);
   *svg +=
       fmt::format("\n<text class=\"name\" text-anchor=\"middle\" x=\"{:.1f}\" y=\"{}\">{}</text>\n",
                   (frame.left + frame.right) / 2, plot.height_px - 6, EscapeXml(plot.x_axis.label));
@@ -323,7 +383,8 @@ void AppendNotes(const Plot& plot, const Frame& frame, std::string* svg) {
 
 }  // namespace
 
-std::string SvgPlot(const Plot& plot) {
+std::string SvgPlot(const Plot& given) {
+  const Plot plot = WithLogarithms(given);
   Frame frame;
   frame.x = RangeOf(plot, true);
   frame.y = RangeOf(plot, false);
@@ -337,18 +398,19 @@ std::string SvgPlot(const Plot& plot) {
       LegendPlaces(legend, frame.right - legend_left);
   frame.top = heading_px + (legend.empty() ? 10 : 14 + kLegendRowPx * (places.back().second + 1));
   frame.bottom = plot.height_px - 46;
-  const std::vector<double> y_ticks = NiceTicks(
-      frame.y.lo, frame.y.hi, std::max(2, static_cast<int>((frame.bottom - frame.top) / 26)));
+  const std::vector<Tick> y_ticks =
+      TicksOf(plot.y_axis, frame.y, std::max(2, static_cast<int>((frame.bottom - frame.top) / 26)));
   // Room for four characters at least: figures below each other then mostly share their left edge.
   double label_width = 4 * kCharWidthPx;
-  for (double tick : y_ticks)
-    label_width = std::max(label_width, TextWidthPx(TickLabel(tick, StepOf(y_ticks))));
+  for (const Tick& tick : y_ticks) label_width = std::max(label_width, TextWidthPx(tick.label));
   frame.left = 26 + label_width + 8;
-  const double widest_x_label = std::max(TextWidthPx(TickLabel(frame.x.lo, frame.x.span() / 10)),
+  const double widest_x_label =
+      plot.x_axis.logarithmic ? 6 * kCharWidthPx  // "0.0005"
+                              : std::max(TextWidthPx(TickLabel(frame.x.lo, frame.x.span() / 10)),
                                          TextWidthPx(TickLabel(frame.x.hi, frame.x.span() / 10)));
-  const std::vector<double> x_ticks =
-      NiceTicks(frame.x.lo, frame.x.hi,
-                std::max(2, static_cast<int>((frame.right - frame.left) / (widest_x_label + 40))));
+  const std::vector<Tick> x_ticks =
+      TicksOf(plot.x_axis, frame.x,
+              std::max(2, static_cast<int>((frame.right - frame.left) / (widest_x_label + 40))));
 
   const std::string id = EscapeXml(plot.id);
   std::string svg = fmt::format(

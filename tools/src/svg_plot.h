@@ -15,6 +15,10 @@ namespace thicklens::tools {
 // >= 1.
 std::vector<double> NiceTicks(double lo, double hi, int at_most);
 
+// The same on a logarithmic axis, for 0 < lo < hi: powers of ten, or 1, 2 and 5 times these, or
+// where the axis is shorter those of NiceTicks.
+std::vector<double> NiceLogTicks(double lo, double hi, int at_most);
+
 // A tick's label with the digits that its step needs, and a true minus sign.
 std::string TickLabel(double value, double step);
 
@@ -61,6 +65,8 @@ struct PlotNote {
 struct PlotAxis {
   std::string label;                               // with its unit
   std::optional<std::pair<double, double>> range;  // absent: from the data
+  // Values are shown by their logarithms; those that are not above 0 are left out.
+  bool logarithmic = false;
 };
 
 struct Plot {
