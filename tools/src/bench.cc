@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench_accuracy.h"
 #include "bench_gamma.h"
 #include "bench_inpainting.h"
 #include "bench_machine.h"
@@ -172,6 +173,7 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
   CLI::App* bench =
       program->add_subcommand("bench", "What accuracy costs in time, on this machine");
   bench->require_subcommand(1);
+  AddBenchAccuracyCommand(bench, action);
   AddBenchSourceCommand(bench, action);
   AddBenchGammaCommand(bench, action);
   AddBenchInpaintingCommand(bench, action);

@@ -28,7 +28,7 @@ std::string ProcessorName() {
     const std::size_t colon = line.find(": ");
     if (colon != std::string::npos) return line.substr(colon + 2);
   }
-  return "unknown";
+  return kUnknownProcessor;
 }
 
 nlohmann::json BenchSummary(nlohmann::json fields) {

@@ -10,7 +10,8 @@ namespace thicklens::tools {
 // The summary of a bench that went well: its fields, and what times are to be read with, `machine`:
 // processor, cores, build, BLAS, date.
 nlohmann::json BenchSummary(nlohmann::json fields);
-std::string ProcessorName();
+constexpr char kUnknownProcessor[] = "unknown";
+std::string ProcessorName();  // or kUnknownProcessor
 
 // Bytes a second that memory gives `threads` of them, as the STREAM benchmark does and counts it:
 // of a = b + 3 c, two arrays read and one written, far larger than any cache. The best of a few

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstddef>
-#include <optional>
+#include <utility>
 #include <vector>
 
 #include "thicklens/model/camera.h"
@@ -28,6 +28,8 @@ model::PlaneOptions SlantedPlane(const model::Camera& camera) {
   return plane;
 }
 
+}  // namespace
+
 model::LightField GreyViews(const model::LightField& colours) {
   model::LightField grey =
       model::MakeLightField(colours.s_count, colours.t_count, colours.u_count, colours.v_count, 1);
@@ -42,8 +44,6 @@ model::LightField GreyViews(const model::LightField& colours) {
   }
   return grey;
 }
-
-}  // namespace
 
 model::Camera BenchCamera(int width_px, int height_px) {
   model::Camera camera;
@@ -72,52 +72,43 @@ model::SceneLayer GreyLayer(model::TextureKind texture) {
   return layer;
 }
 
-BenchScene SceneOf(const model::Camera& camera, const std::vector<model::SceneLayer>& layers,
-                   int u_count, int v_count, std::uint64_t seed, const model::SceneRun& run) {
+model::SceneSimulationOptions SceneOf(const model::Camera& camera,
+                                      std::vector<model::SceneLayer> layers, int u_count,
+                                      int v_count, std::uint64_t seed) {
   model::SceneSimulationOptions options;
   options.camera = camera;
   options.noise_sigma_grey_levels = 1;
   options.u_count = u_count;
   options.v_count = v_count;
   options.seed = seed;
-  options.layers = layers;
-  const model::SceneSimulator simulator(options, std::vector<model::LayerPixels>(layers.size()));
+  options.layers = std::move(layers);
+  return options;
+}
 
-  BenchScene scene;
-  scene.truth = GreyViews(simulator.RenderLightField(u_count, v_count, run));
-  estimator::EstimateInput& input = scene.input;
-  input.camera = camera;
-  input.transfer = camera.sensor.transfer;
-  input.picture = model::ToGrey(
-      model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer));
-  input.grid = model::DefaultGrid(camera, u_count, v_count);
-  input.weights = model::ApertureWeights(model::ApertureShapeOf(camera.psf), u_count, v_count);
-  input.disparity = estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values,
-                                               camera.sensor.width_px, camera.sensor.height_px);
+BenchScene SimulateInGrey(const model::SceneSimulationOptions& options,
+                          const model::SceneRun& run) {
+  BenchScene scene =
+      SimulateBenchScene(options, std::vector<model::LayerPixels>(options.layers.size()), run);
+  scene.truth = GreyViews(scene.truth);
+  scene.input.picture = model::ToGrey(scene.input.picture);
   return scene;
 }
 
 }  // namespace
 
-BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count, std::uint64_t seed,
-                          int threads, const std::function<void(int done, int total)>& progress) {
-  return MakeBenchScene(BenchCamera(width_px, height_px), u_count, v_count, seed, threads,
-                        progress);
-}
-
-BenchScene MakeBenchScene(const model::Camera& camera, int u_count, int v_count, std::uint64_t seed,
-                          int threads, const std::function<void(int done, int total)>& progress) {
+model::SceneSimulationOptions SlantedScene(const model::Camera& camera, int u_count, int v_count,
+                                           std::uint64_t seed) {
   model::SceneLayer plane = GreyLayer(model::TextureKind::kNoise);
   plane.plane = SlantedPlane(camera);
-  return SceneOf(camera, {plane}, u_count, v_count, seed, {threads, progress});
+  return SceneOf(camera, {plane}, u_count, v_count, seed);
 }
 
-BenchScene MakeOccludedScene(int width_px, int height_px, int u_count, int v_count,
-                             std::uint64_t seed, int threads,
-                             const std::function<void(int done, int total)>& progress) {
+model::SceneSimulationOptions CardsScene(const model::Camera& camera, int u_count, int v_count,
+                                         std::uint64_t seed) {
   model::SceneLayer wall = GreyLayer(model::TextureKind::kNoise);
   wall.plane.depth_mm = 1200;
   std::vector<model::SceneLayer> layers = {wall};
+  const double width_px = camera.sensor.width_px, height_px = camera.sensor.height_px;
   for (int i = 0; i < 3; ++i) {
     model::SceneLayer card = GreyLayer(model::TextureKind::kDeadLeaves);
     card.plane.depth_mm = 700 + 100 * i;
@@ -127,8 +118,45 @@ BenchScene MakeOccludedScene(int width_px, int height_px, int u_count, int v_cou
     card.outline.size = {0.18 * width_px, 0.3 * height_px};
     layers.push_back(card);
   }
-  return SceneOf(BenchCamera(width_px, height_px), layers, u_count, v_count, seed,
-                 {threads, progress});
+  return SceneOf(camera, layers, u_count, v_count, seed);
+}
+
+BenchScene SimulateBenchScene(const model::SceneSimulationOptions& options,
+                              const std::vector<model::LayerPixels>& pixels,
+                              const model::SceneRun& run) {
+  const model::SceneSimulator simulator(options, pixels, run.threads);
+  // The simulated camera: the truth of the scene's file is in it.
+  const model::Camera& camera = simulator.camera();
+  BenchScene scene;
+  scene.truth = simulator.RenderLightField(options.u_count, options.v_count, run);
+  estimator::EstimateInput& input = scene.input;
+  input.camera = camera;
+  input.transfer = camera.sensor.transfer;
+  input.picture = model::ToLinear(simulator.Store(simulator.RenderNoiseless(run)), input.transfer);
+  input.grid = model::DefaultGrid(camera, options.u_count, options.v_count);
+  input.weights =
+      model::ApertureWeights(model::ApertureShapeOf(camera.psf), options.u_count, options.v_count);
+  input.disparity = estimator::DisparityOnGrid(*input.grid, simulator.RenderDepth().values,
+                                               camera.sensor.width_px, camera.sensor.height_px);
+  return scene;
+}
+
+BenchScene MakeBenchScene(int width_px, int height_px, int u_count, int v_count, std::uint64_t seed,
+                          int threads, const std::function<void(int done, int total)>& progress) {
+  return MakeBenchScene(BenchCamera(width_px, height_px), u_count, v_count, seed, threads,
+                        progress);
+}
+
+BenchScene MakeBenchScene(const model::Camera& camera, int u_count, int v_count, std::uint64_t seed,
+                          int threads, const std::function<void(int done, int total)>& progress) {
+  return SimulateInGrey(SlantedScene(camera, u_count, v_count, seed), {threads, progress});
+}
+
+BenchScene MakeOccludedScene(int width_px, int height_px, int u_count, int v_count,
+                             std::uint64_t seed, int threads,
+                             const std::function<void(int done, int total)>& progress) {
+  return SimulateInGrey(CardsScene(BenchCamera(width_px, height_px), u_count, v_count, seed),
+                        {threads, progress});
 }
 
 BenchScene PartOf(const BenchScene& scene, const model::PixelRect& part) {

@@ -1,6 +1,7 @@
 // thicklens estimate: one picture and its depth map become a light field.
 #include "thicklens/estimator/estimate.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -19,12 +20,18 @@
 #include "confidence_files.h"
 #include "estimate_input.h"
 #include "estimate_options.h"
+#include "estimate_plan.h"
+#include "estimate_profile.h"
 #include "estimate_records.h"
+#include "estimate_run.h"
 #include "estimate_summary.h"
 #include "interrupt.h"
 #include "light_field_io.h"
 #include "light_field_page.h"
 #include "memory_available.h"
+#include "picture_load.h"
+#include "plan_choice.h"
+#include "printable_text.h"
 #include "progress_line.h"
 #include "report_folder.h"
 #include "thicklens/estimator/functional_solver.h"
@@ -33,6 +40,7 @@
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/output_file.h"
+#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -147,6 +155,27 @@ void SolveFunctional(const EstimateOptions& options, const estimator::EstimateIn
   outcome->functional = std::move(functional);
 }
 
+// By the profile, as fast as this machine is now if it was made on another, or for other threads.
+PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::EstimateInput& input) {
+  const EstimateProfile profile = ProfileFor(options.profile_path);
+  const int threads = model::ResolveThreads(options.common.threads);
+  const auto start = Clock::now();
+  const double speed_ratio =
+      profile.IsFromHere(threads) ? 1 : ProbeSeconds(threads) / profile.probe_seconds;
+  PlanChoice choice =
+      ChoosePlan(profile, options.wish, PictureLoadOf(input), speed_ratio, SecondsSince(start));
+  // What the law does not know.
+  std::vector<std::string> besides;
+  if (!options.report_folder.empty()) besides.emplace_back("--report");
+  if (options.fill == "telea") besides.emplace_back("--fill telea");
+  if (options.memory_limit_mib) besides.emplace_back("--memory-limit");
+  if (options.format == "tiff") besides.emplace_back("--format tiff");
+  if (!besides.empty()) {
+    choice.message += fmt::format("; what {} costs is not in it", fmt::join(besides, ", "));
+  }
+  return choice;
+}
+
 // Throws Error for settings that are not valid.
 void CheckSettings(const EstimateOptions& options) {
   if (options.solver == "scene") {
@@ -231,8 +260,11 @@ std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
   return MakeLightFieldPage(page).html;
 }
 
-CommandResult Estimate(const EstimateOptions& options) {
+}  // namespace
+
+CommandResult RunEstimate(const EstimateOptions& given) {
   const auto start = Clock::now();
+  EstimateOptions options = given;
   ProgressLine line("estimating", options.common.quiet);
   const Progress progress = [&line](int done, int total) {
     ThrowIfInterrupted();
@@ -243,6 +275,14 @@ CommandResult Estimate(const EstimateOptions& options) {
   Outputs outputs(options);
   PreparedEstimate prepared = PrepareEstimate(options);
   ThrowIfInterrupted();
+  std::optional<PlanChoice> choice;
+  if (options.wish.IsMade()) {
+    choice = ChoosePlanHere(options, prepared.input);
+    spdlog::info("{}", PrintableUtf8(choice->message));
+    ApplyPlan(choice->plan, &options);
+    CheckSolverUsage(options);
+    CheckSettings(options);
+  }
 
   EstimateOutcome outcome;
   outcome.seconds.setup = SecondsSince(start);
@@ -271,7 +311,12 @@ CommandResult Estimate(const EstimateOptions& options) {
 
   CommandResult result;
   result.summary = EstimateJson(options, prepared, outcome);
-  const std::string text = EstimateText(prepared, outcome, result.summary);
+  std::string text = EstimateText(prepared, outcome, result.summary);
+  result.summary["plan"] = nullptr;
+  if (choice) {
+    result.summary["plan"] = ChoiceJson(*choice, options.wish, outcome.seconds.total);
+    text += ChoiceText(*choice, outcome.seconds.total);
+  }
   std::string page;
   if (outputs.report) page = Page(options, std::move(prepared), outcome, result.summary);
   ThrowIfInterrupted();
@@ -281,8 +326,6 @@ CommandResult Estimate(const EstimateOptions& options) {
   PrintResult(options.common, text);
   return result;
 }
-
-}  // namespace
 
 void AddEstimateCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command =
@@ -294,8 +337,9 @@ void AddEstimateCommand(CLI::App* program, CommandAction* action) {
       CheckEstimateUsage(*options);
       RequireDistinctFiles(
           {options->common.json_path, options->output_folder, options->report_path()},
-          {options->picture_path, options->depth_path, options->camera_path, options->aperture_of});
-      RunCommand(options->common, [&] { return Estimate(*options); });
+          {options->picture_path, options->depth_path, options->camera_path, options->aperture_of,
+           options->profile_path});
+      RunCommand(options->common, [&] { return RunEstimate(*options); });
     };
   });
 }

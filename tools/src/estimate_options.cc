@@ -281,6 +281,12 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
   AddIterationOptions(command, options);
   AddFunctionalOptions(command, options);
   AddBlockOptions(command, options);
+  AddPlanWishOptions(command, &options->wish);
+  command
+      ->add_option("--profile", options->profile_path,
+                   "What --quality, --within and --psnr-loss choose from, as bench accuracy "
+                   "--save-profile writes it; default: your own, or the one that ships")
+      ->type_name("FILE");
   AddCommonOptions(command, &options->common);
 }
 
@@ -331,6 +337,8 @@ void CheckEstimateUsage(const EstimateOptions& options) {
         "--aperture-shape and --aperture-of say which shape the aperture has; without the effect "
         "aperture-shape it is Gaussian");
   CheckSolverUsage(options);
+  needs(!options.profile_path.empty(), options.wish.IsMade(),
+        "--profile is what --quality, --within or --psnr-loss choose from, and none is given");
   RequireReportBesideLightField(options);
 }
 

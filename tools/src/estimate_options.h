@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "effect_options.h"
 #include "light_field_options.h"
+#include "plan_wish.h"
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/functional_solver.h"
@@ -47,6 +48,10 @@ struct EstimateOptions {
   std::optional<std::string> block_solver, stencil, splat;
   std::optional<double> gamma, ridge;
   std::optional<int> block_px;
+  // In place of these: what it is to be like, chosen from a profile (empty: the person's own, or
+  // the one that ships).
+  PlanWish wish;
+  std::string profile_path;
 
   bool by_blocks() const { return solver == "blocks"; }
   std::string report_path() const;  // of the page in its folder; empty: none

@@ -72,6 +72,8 @@ std::string PlanArguments(const EstimatePlan& plan) {
   if (plan.tolerance) text += fmt::format(" --tolerance {:g}", *plan.tolerance);
   if (plan.double_precision) text += " --double";
   if (plan.on_opencl) text += " --device opencl";
+  if (!plan.on_opencl && plan.solver == "blocks")
+    text += " --device cpu";  // else the best there is
   return text;
 }
 
@@ -100,7 +102,11 @@ EstimatePlan PlanFromJson(const json& fields, const std::string& where) {
   plan.tolerance = OptionalFieldOf<double>(fields, "tolerance", where);
   plan.double_precision = OptionalFieldOf<bool>(fields, "double", where).value_or(false);
   plan.block_px = OptionalFieldOf<int>(fields, "block_px", where);
-  plan.on_opencl = OptionalFieldOf<std::string>(fields, "device", where) == "opencl";
+  const std::string device = OptionalFieldOf<std::string>(fields, "device", where).value_or("cpu");
+  if (device != "cpu" && device != "opencl") {
+    throw Error(fmt::format("{}: device: cpu or opencl is expected, found '{}'", where, device));
+  }
+  plan.on_opencl = device == "opencl";
   if (plan.solver != "scene" && plan.solver != "blocks" && plan.solver != "functional" &&
       plan.solver != "grid") {
     throw Error(fmt::format("{}: solver: scene, blocks, functional or grid is expected, found '{}'",

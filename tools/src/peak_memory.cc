@@ -1,5 +1,6 @@
 #include "peak_memory.h"
 
+#include <malloc.h>
 #include <sys/resource.h>
 
 #include <fstream>
@@ -28,6 +29,9 @@ double PeakMemoryMib() {
 }
 
 std::optional<double> ForgetPeakMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);  // what was freed and kept would hide what is needed next
+#endif
   std::ofstream file("/proc/self/clear_refs");
   file << "5" << std::flush;  // proc(5): resets the peak resident set size
   if (!file) return std::nullopt;

@@ -64,26 +64,6 @@ model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   return scene;
 }
 
-// Picture files of unknown origin are taken as sRGB, as a screen would show them. What a mask
-// stores is no light.
-std::vector<model::LayerPixels> ReadPixels(const model::SceneSimulationOptions& scene) {
-  std::vector<model::LayerPixels> pixels(scene.layers.size());
-  for (std::size_t i = 0; i < scene.layers.size(); ++i) {
-    const model::SceneLayer& layer = scene.layers[i];
-    if (layer.texture.kind == model::TextureKind::kPicture) {
-      pixels[i].texture =
-          model::ToLinear(ToStoredPicture(ReadPictureFile(layer.texture.picture_path)),
-                          model::TransferCurve::Srgb());
-    }
-    if (layer.outline.shape == model::OutlineOptions::Shape::kMask) {
-      pixels[i].mask = model::ToLinear(ToStoredPicture(ReadPictureFile(layer.outline.mask_path)),
-                                       model::TransferCurve::Linear());
-    }
-    if (layer.depth) pixels[i].depth = ReadDepthMap(layer.depth->map_path);
-  }
-  return pixels;
-}
-
 // Progress on the terminal, and an end when the person asks for one.
 model::SceneRun RunWith(const CommonOptions& common, ProgressLine* progress) {
   return {common.threads, [progress](int done, int total) {
@@ -150,7 +130,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
                              {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker,
                               kAttributionPage, kAttributionTable});
 
-  const std::vector<model::LayerPixels> pixels = ReadPixels(scene);
+  const std::vector<model::LayerPixels> pixels = ReadScenePixels(scene);
   const model::SceneSimulator simulator(scene, pixels, options.common.threads);
   const model::RawDepthMap depth = simulator.RenderDepth();
   const model::SceneTruth truth = simulator.Truth(depth);
@@ -202,7 +182,7 @@ CommandResult SimulateLightField(const SceneOptions& options) {
   const model::SceneSimulationOptions scene = ReadConfig(options);
   model::OutputFolder folder(options.output_folder, kLightFieldMarker, LightFieldEntries());
 
-  const model::SceneSimulator simulator(scene, ReadPixels(scene), options.common.threads);
+  const model::SceneSimulator simulator(scene, ReadScenePixels(scene), options.common.threads);
   std::size_t clipped = 0;
   {
     ProgressLine progress("rendering", options.common.quiet);
@@ -247,6 +227,24 @@ CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std
 }
 
 }  // namespace
+
+std::vector<model::LayerPixels> ReadScenePixels(const model::SceneSimulationOptions& scene) {
+  std::vector<model::LayerPixels> pixels(scene.layers.size());
+  for (std::size_t i = 0; i < scene.layers.size(); ++i) {
+    const model::SceneLayer& layer = scene.layers[i];
+    if (layer.texture.kind == model::TextureKind::kPicture) {
+      pixels[i].texture =
+          model::ToLinear(ToStoredPicture(ReadPictureFile(layer.texture.picture_path)),
+                          model::TransferCurve::Srgb());
+    }
+    if (layer.outline.shape == model::OutlineOptions::Shape::kMask) {
+      pixels[i].mask = model::ToLinear(ToStoredPicture(ReadPictureFile(layer.outline.mask_path)),
+                                       model::TransferCurve::Linear());
+    }
+    if (layer.depth) pixels[i].depth = ReadDepthMap(layer.depth->map_path);
+  }
+  return pixels;
+}
 
 void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
   const auto picture = std::make_shared<SceneOptions>();

@@ -1,0 +1,34 @@
+#ifndef THICKLENS_TOOLS_BENCH_REPORT_H_
+#define THICKLENS_TOOLS_BENCH_REPORT_H_
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "svg_plot.h"
+#include "thicklens/model/output_file.h"
+
+namespace thicklens::tools {
+
+void AddBenchReportOption(CLI::App* command, std::string* folder);
+
+// The folder of a price list: a page, a table for other programs, and the page's figures as files.
+class BenchReport {
+ public:
+  explicit BenchReport(const std::string& folder);  // claims it; empty: none. Throws Error
+
+  // Each figure gets the name of its id.
+  void Commit(const std::string& page, const std::string& csv, const std::vector<Plot>& figures);
+
+ private:
+  std::optional<model::OutputFolder> folder_;
+};
+
+// The line from point to point of a front, sorted by cost: between two of them one gets what the
+// cheaper one gives.
+PlotSeries FrontLine(const std::vector<double>& costs, const std::vector<double>& errors);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_BENCH_REPORT_H_

@@ -1,0 +1,14 @@
+#ifndef THICKLENS_TOOLS_ESTIMATE_RUN_H_
+#define THICKLENS_TOOLS_ESTIMATE_RUN_H_
+
+#include "commands.h"
+#include "estimate_options.h"
+
+namespace thicklens::tools {
+
+// `thicklens estimate`, from its files to its files. Throws Error and UsageError.
+CommandResult RunEstimate(const EstimateOptions& options);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_ESTIMATE_RUN_H_

@@ -1,0 +1,160 @@
+#include "price_rows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "bench_machine.h"
+#include "pareto_front.h"
+#include "printable_text.h"
+
+namespace thicklens::tools {
+namespace {
+
+using nlohmann::json;
+
+std::string OrDash(const std::optional<double>& value, const char* form) {
+  return value ? fmt::format(fmt::runtime(form), *value) : "-";
+}
+
+std::string GroupOf(const PriceRow& row) { return fmt::format("{} {}", row.scene, row.views); }
+
+// Groups in the order in which they begin.
+std::vector<std::string> GroupsOf(const std::vector<PriceRow>& rows) {
+  std::vector<std::string> groups;
+  for (const PriceRow& row : rows) {
+    if (std::find(groups.begin(), groups.end(), GroupOf(row)) == groups.end()) {
+      groups.push_back(GroupOf(row));
+    }
+  }
+  return groups;
+}
+
+// A cell of a table of comma-separated values.
+std::string Quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : PrintableUtf8(text)) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string RowText(const PriceRow& row) {
+  const std::string begin = fmt::format("{:<2}{:<32}", row.on_front ? ">" : "", row.Name());
+  if (!row.failure.empty()) return fmt::format("{}  {}\n", begin, row.failure);
+  const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+  return fmt::format(
+      "{}{:>8.3g}{:<2}{:>14}{:>8.2g}{:>8.2g}{:>8.2g}{:>6}{:>7}{:>9}{:>8}{:>7.2f}{:>7.2f}{:>7.2f}"
+      "{:>7.3f}{:>6.1f}{}\n",
+      begin, Median(row.seconds), row.sample ? "*" : "",
+      fmt::format("{:.3g} .. {:.3g}", *least, *most), Median(row.setup_seconds),
+      Median(row.solve_seconds), Median(row.views_seconds), OrDash(row.peak_memory_mib, "{:.0f}"),
+      row.iterations ? fmt::format("{}", *row.iterations) : "-",
+      OrDash(row.relative_residual, "{:.0e}"), OrDash(row.rcond, "{:.0e}"), row.scores.psnr_mean_db,
+      row.scores.psnr_centre_db, row.scores.psnr_corner_db, row.scores.ssim_mean,
+      row.reprojection_db, row.converged ? "" : "  not converged");
+}
+
+}  // namespace
+
+void MarkFront(std::vector<PriceRow>* rows) {
+  for (const std::string& group : GroupsOf(*rows)) {
+    std::vector<PriceRow*> of_group;
+    std::vector<std::pair<double, double>> points;
+    for (PriceRow& row : *rows) {
+      if (GroupOf(row) != group || !row.failure.empty()) continue;
+      of_group.push_back(&row);
+      points.emplace_back(Median(row.seconds), ErrorGreyLevels(row.scores.psnr_mean_db));
+    }
+    const std::vector<bool> on_front = ParetoFront(points);
+    for (std::size_t i = 0; i < of_group.size(); ++i) of_group[i]->on_front = on_front[i];
+  }
+}
+
+double ErrorGreyLevels(double psnr_db) { return 255 * std::pow(10, -psnr_db / 20); }
+
+json PriceRowJson(const PriceRow& row) {
+  const auto or_null = [](const auto& value) { return value ? json(*value) : json(); };
+  json out = {{"scene", row.scene},
+              {"views", {row.views, row.views}},
+              {"name", row.Name()},
+              {"plan", row.is_warping ? json() : PlanJson(row.plan)},
+              {"failure", row.failure.empty() ? json() : json(row.failure)}};
+  if (!row.failure.empty()) return out;
+  out.update({{"seconds", Median(row.seconds)},
+              {"seconds_of_runs", row.seconds},
+              {"setup_seconds", Median(row.setup_seconds)},
+              {"solve_seconds", Median(row.solve_seconds)},
+              {"views_seconds", Median(row.views_seconds)},
+              {"extrapolated_from", nullptr},
+              {"peak_memory_mib", or_null(row.peak_memory_mib)},
+              {"iterations", or_null(row.iterations)},
+              {"converged", row.converged},
+              {"relative_residual", or_null(row.relative_residual)},
+              {"rcond_min", or_null(row.rcond)},
+              {"psnr_true_views_db",
+               {{"mean", row.scores.psnr_mean_db},
+                {"centre", row.scores.psnr_centre_db},
+                {"corner", row.scores.psnr_corner_db}}},
+              {"ssim_true_views",
+               {{"mean", row.scores.ssim_mean},
+                {"centre", row.scores.ssim_centre},
+                {"corner", row.scores.ssim_corner}}},
+              {"reprojection_psnr_db", row.reprojection_db},
+              {"on_front", row.on_front}});
+  if (row.sample) {
+    out["extrapolated_from"] = {{"solved", row.sample->solved}, {"of", row.sample->all}};
+  }
+  return out;
+}
+
+std::string PriceTable(const std::vector<PriceRow>& rows) {
+  std::string text;
+  for (const std::string& group : GroupsOf(rows)) {
+    const auto first = std::find_if(rows.begin(), rows.end(),
+                                    [&](const PriceRow& row) { return GroupOf(row) == group; });
+    text += fmt::format(
+        "\n{0}, {1} x {1} views\n{2:<34}{3:>8}{4:<2}{5:>14}{6:>8}{7:>8}{8:>8}"
+        "{9:>6}{10:>7}{11:>9}{12:>8}{13:>7}{14:>7}{15:>7}{16:>7}{17:>6}\n",
+        PrintableUtf8(first->scene), first->views, "", "seconds", "", "least .. most", "set-up",
+        "solve", "views", "MiB", "iter.", "residual", "rcond", "PSNR", "centre", "corner", "SSIM",
+        "photo");
+    for (const PriceRow& row : rows) {
+      if (GroupOf(row) == group) text += RowText(row);
+    }
+  }
+  return text;
+}
+
+std::string PriceCsv(const std::vector<PriceRow>& rows) {
+  std::string csv =
+      "scene,views,plan,seconds,least_seconds,most_seconds,setup_seconds,solve_seconds,"
+      "views_seconds,blocks_solved,blocks_in_all,peak_memory_mib,iterations,converged,"
+      "relative_residual,rcond_min,psnr_mean_db,psnr_centre_db,psnr_corner_db,ssim_mean,"
+      "ssim_centre,ssim_corner,reprojection_psnr_db,on_front,failure\n";
+  const auto number = [](const auto& value) {
+    return value ? fmt::format("{:.6g}", static_cast<double>(*value)) : std::string();
+  };
+  for (const PriceRow& row : rows) {
+    if (!row.failure.empty()) {
+      csv += fmt::format("{},{},{}{}{}\n", Quoted(row.scene), row.views, Quoted(row.Name()),
+                         std::string(22, ','), Quoted(row.failure));
+      continue;
+    }
+    const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+    csv += fmt::format(
+        "{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},{},{},{},{},{},{:.4f},"
+        "{:.4f},{:.4f},{:.6f},{:.6f},{:.6f},{:.4f},{},\n",
+        Quoted(row.scene), row.views, Quoted(row.Name()), Median(row.seconds), *least, *most,
+        Median(row.setup_seconds), Median(row.solve_seconds), Median(row.views_seconds),
+        row.sample ? fmt::format("{}", row.sample->solved) : "",
+        row.sample ? fmt::format("{}", row.sample->all) : "", number(row.peak_memory_mib),
+        number(row.iterations), row.converged ? 1 : 0, number(row.relative_residual),
+        number(row.rcond), row.scores.psnr_mean_db, row.scores.psnr_centre_db,
+        row.scores.psnr_corner_db, row.scores.ssim_mean, row.scores.ssim_centre,
+        row.scores.ssim_corner, row.reprojection_db, row.on_front ? 1 : 0);
+  }
+  return csv;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,289 @@
+#include "profile_measurement.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include "bench_machine.h"
+#include "bench_parts.h"
+#include "bench_scene.h"
+#include "bench_solvers.h"
+#include "build_info.h"
+#include "depth_io.h"
+#include "estimate_input.h"
+#include "estimate_run.h"
+#include "image_io.h"
+#include "interrupt.h"
+#include "light_field_io.h"
+#include "picture_load.h"
+#include "thicklens/error.h"
+#include "thicklens/estimator/compare.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/output_file.h"
+#include "thicklens/model/parallel.h"
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ValueOf(const char* variable) {
+  const char* value = std::getenv(variable);  // NOLINT: nothing sets it meanwhile
+  return value == nullptr ? "" : value;
+}
+
+// Gone with all that is in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::error_code failure;
+    const fs::path parent = fs::temp_directory_path(failure);
+    std::string name = (parent / "thicklens-profile-XXXXXX").string();
+    if (failure || mkdtemp(name.data()) == nullptr) {
+      throw Error(fmt::format(
+          "TMPDIR: no folder for temporary files can be made in '{}'; it must say where one can be",
+          failure ? ValueOf("TMPDIR") : parent.string()));
+    }
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+// Warnings about made-up pictures are nobody's concern.
+class OnlyErrors {
+ public:
+  OnlyErrors() : level_(spdlog::get_level()) { spdlog::set_level(spdlog::level::err); }
+  ~OnlyErrors() { spdlog::set_level(level_); }
+  OnlyErrors(const OnlyErrors&) = delete;
+  OnlyErrors& operator=(const OnlyErrors&) = delete;
+
+ private:
+  spdlog::level::level_enum level_;
+};
+
+struct Prepared {
+  EstimateOptions options;
+  PictureLoad load;
+  std::optional<model::LightField> truth;
+};
+
+model::StoredPicture FirstChannel(const model::StoredPicture& picture) {
+  model::StoredPicture grey = picture;
+  grey.channels = 1;
+  grey.values.clear();
+  for (std::size_t i = 0; i < picture.values.size();
+       i += static_cast<std::size_t>(picture.channels)) {
+    grey.values.push_back(picture.values[i]);
+  }
+  return grey;
+}
+
+Prepared Prepare(const ProfileCase& what, const ProfileRun& run, const fs::path& folder) {
+  model::Camera camera = BenchCamera(what.size_px, what.size_px);
+  camera.lens.aperture_radius_mm *= what.aperture;
+  model::SceneSimulationOptions scene =
+      what.cards ? CardsScene(camera, what.views, what.views, run.seed)
+                 : SlantedScene(camera, what.views, what.views, run.seed);
+  for (model::SceneLayer& layer : scene.layers) {
+    if (what.colour) layer.texture.saturation = model::SceneLayer().texture.saturation;
+  }
+  const model::SceneRun stoppable = {run.threads, [](int, int) { ThrowIfInterrupted(); }};
+  const model::SceneSimulator simulator(scene, std::vector<model::LayerPixels>(scene.layers.size()),
+                                        run.threads);
+  const model::StoredPicture stored = simulator.Store(simulator.RenderNoiseless(stoppable));
+  fs::create_directories(folder);
+  Prepared prepared;
+  EstimateOptions& options = prepared.options;
+  options.picture_path = (folder / "picture.png").string();
+  options.depth_path = (folder / "depth.pfm").string();
+  options.camera_path = (folder / "camera.yaml").string();
+  options.output_folder = (folder / "light-field").string();
+  model::WriteFileAtomically(options.picture_path,
+                             EncodePng(what.colour ? stored : FirstChannel(stored)));
+  model::WriteFileAtomically(options.depth_path, EncodePfm(simulator.RenderDepth()));
+  model::WriteFileAtomically(options.camera_path, model::CameraToYaml(simulator.camera()));
+  options.depth.kind = "z";
+  options.depth.unit = "mm";
+  options.views.text = fmt::format("{0}x{0}", what.views);
+  options.common.quiet = true;
+  options.common.threads = run.threads;
+  prepared.load = PictureLoadOf(PrepareEstimate(options).input);
+  if (what.use == ProfileCase::Use::kTimeAndViews) {
+    prepared.truth = simulator.RenderLightField(what.views, what.views, stoppable);
+    if (!what.colour) prepared.truth = GreyViews(*prepared.truth);
+  }
+  return prepared;
+}
+
+double PsnrDb(const Prepared& prepared, const model::LightField& estimate, int threads) {
+  const model::LightField& truth = *prepared.truth;
+  return estimator::CompareLightFields(truth, estimate,
+                                       BorderPx({truth.s_count, truth.t_count, 1, {}}),
+                                       std::nullopt, threads)
+      .mean.psnr_db;
+}
+
+// The middle and the largest of |ratio - 1|.
+std::pair<double, double> ErrorsOf(std::vector<double> ratios) {
+  for (double& ratio : ratios) ratio = std::abs(ratio - 1);
+  return {Median(ratios), *std::max_element(ratios.begin(), ratios.end())};
+}
+
+void TakeLarger(const PictureLoad& load, PictureLoad* largest) {
+  largest->megapixels = std::max(largest->megapixels, load.megapixels);
+  largest->channels = std::max(largest->channels, load.channels);
+  largest->views = std::max(largest->views, load.views);
+  largest->blur_sigma_px = std::max(largest->blur_sigma_px, load.blur_sigma_px);
+}
+
+}  // namespace
+
+const std::vector<ProfileCase>& UsualProfileCases() {
+  using Use = ProfileCase::Use;
+  static const std::vector<ProfileCase> cases = {
+      {96, 3, true, false, 1, Use::kTimeAndViews},  {96, 5, false, true, 1, Use::kTimeAndViews},
+      {128, 9, true, true, 0.5, Use::kTime},        {160, 5, true, false, 1, Use::kTimeAndViews},
+      {160, 7, false, true, 1, Use::kTimeAndViews}, {192, 3, false, true, 0.5, Use::kTimeAndViews},
+      {192, 5, true, true, 1, Use::kTimeAndViews},  {224, 9, true, false, 2.5, Use::kTime},
+      {256, 5, true, false, 0.5, Use::kTime},       {288, 9, false, false, 1.5, Use::kTime},
+      {320, 3, true, true, 1, Use::kTime},          {352, 7, true, false, 1, Use::kTime},
+      {384, 5, false, true, 2, Use::kTime},         {416, 5, true, true, 0.5, Use::kTime},
+      {448, 3, false, false, 0.7, Use::kTime},      {448, 7, true, false, 1, Use::kTime},
+      {480, 3, true, false, 1, Use::kTime},         {600, 5, true, true, 1, Use::kCheck},
+      {640, 7, false, true, 0.8, Use::kCheck},      {720, 3, true, false, 1, Use::kCheck}};
+  return cases;
+}
+
+std::vector<EstimatePlan> PlansOfProfile() {
+  std::vector<EstimatePlan> plans;
+  for (EstimatePlan plan : WholePicturePlans()) {
+    if (plan.solver == "grid") continue;
+    plans.push_back(plan);
+    if (plan.prior == "ridge" || plan.prior == "gradient") continue;
+    plan.tolerance = plan.solver == "scene" ? 0.01 : 0.1;
+    plans.push_back(plan);
+  }
+  return plans;
+}
+
+MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const ProfileRun& run) {
+  const OnlyErrors silence;
+  const TemporaryFolder folder;
+  MeasuredProfile measured;
+  EstimateProfile& profile = measured.profile;
+  profile.processor = ProcessorName();
+  profile.date = NowIso8601();
+  profile.build = BuildInfo();
+  profile.threads = model::ResolveThreads(run.threads);
+  profile.probe_seconds = ProbeSeconds(profile.threads);
+  profile.from = "this run";
+  measured.loads.resize(plans.size());
+  measured.checks.resize(plans.size());
+  for (const EstimatePlan& plan : plans) {
+    profile.plans.emplace_back();
+    profile.plans.back().plan = plan;
+  }
+  int& judged = measured.judged;
+  int done = 0;
+  const int total = static_cast<int>(run.cases.size() * plans.size()) * run.repeat;
+  for (const ProfileCase& what : run.cases) {
+    const fs::path of_case = folder.path() / "case";
+    Prepared prepared = Prepare(what, run, of_case);
+    const bool is_check = what.use == ProfileCase::Use::kCheck;
+    if (!is_check) {
+      TakeLarger(prepared.load, &profile.largest);
+    }
+    if (prepared.truth) {
+      ++judged;
+      profile.warping_psnr_db += PsnrDb(
+          prepared, RunWarping(PrepareEstimate(prepared.options).input, run.threads).light_field,
+          run.threads);
+    }
+    std::vector<std::vector<double>> seconds(plans.size());
+    for (int round = 0; round < run.repeat; ++round) {
+      for (std::size_t i = 0; i < plans.size(); ++i) {
+        if (run.progress) run.progress(done++, total);
+        ApplyPlan(plans[i], &prepared.options);
+        const nlohmann::json summary = RunEstimate(prepared.options).summary;
+        seconds[i].push_back(summary["seconds"]["total"].get<double>());
+        if (!prepared.truth || round > 0) continue;
+        profile.plans[i].psnr_db +=
+            PsnrDb(prepared, ReadLightField(prepared.options.output_folder, {}), run.threads);
+      }
+    }
+    for (std::size_t i = 0; i < plans.size(); ++i) {
+      (is_check ? measured.checks : measured.loads)[i].push_back(
+          {prepared.load, Median(seconds[i])});
+    }
+    std::error_code ignored;
+    fs::remove_all(of_case, ignored);
+  }
+  if (judged == 0) throw Error("a profile needs a case that is judged by its true views");
+  profile.warping_psnr_db /= judged;
+  for (std::size_t i = 0; i < plans.size(); ++i) {
+    PlanProfile& plan = profile.plans[i];
+    plan.psnr_db /= judged;
+    plan.law = FitTimeLaw(measured.loads[i]);
+    std::tie(plan.median_error, plan.largest_error) = ErrorsOf(LeftOutRatios(measured.loads[i]));
+  }
+  return measured;
+}
+
+std::string ProfileTable(const MeasuredProfile& measured) {
+  const EstimateProfile& profile = measured.profile;
+  // For people to compare: a picture of a common size.
+  constexpr PictureLoad kUsualLoad{0.64 * 0.48, 3, 49, 2};
+  std::string text = fmt::format("{:<32}{:>10}{:>10}{:>14}{:>18}{:>16}\n", "", "PSNR dB", "loss dB",
+                                 "seconds at K", "law's error: mid", "largest");
+  for (const PlanProfile& plan : profile.plans) {
+    text += fmt::format("{:<32}{:>10.2f}{:>10.2f}{:>14.3g}{:>16.0f} %{:>14.0f} %\n",
+                        PlanName(plan.plan), plan.psnr_db, profile.LossDb(plan),
+                        plan.law.Seconds(kUsualLoad), 100 * plan.median_error,
+                        100 * plan.largest_error);
+  }
+  text += fmt::format(
+      "{:<32}{:>10.2f}{:>10.2f}\n\nPSNR: of the true views, mean over {} of the {} pictures. K: "
+      "640 x "
+      "480 px in colour, 7 x 7 views, blur of 2 px.\nlaw's error: of its prediction of a picture "
+      "that it was not made from.\n\n",
+      "warping (DIBR)", profile.warping_psnr_db, profile.best_psnr_db() - profile.warping_psnr_db,
+      measured.judged, measured.loads.front().size());
+  if (measured.checks.front().empty()) return text;
+  text += "Larger pictures than any of these, as the law foresaw them:\n";
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < profile.plans.size(); ++i) {
+    for (const TimedLoad& check : measured.checks[i]) {
+      const double expected = profile.plans[i].law.Seconds(check.load);
+      text += fmt::format(
+          "{:<32}{:.2f} megapixels, {} channel(s), {} views: {:.2f} s expected, {:.2f} s taken "
+          "({:+.0f} %)\n",
+          PlanName(profile.plans[i].plan), check.load.megapixels, check.load.channels,
+          check.load.views, expected, check.seconds, 100 * (check.seconds / expected - 1));
+      ratios.push_back(check.seconds / expected);
+    }
+  }
+  const auto [middle, largest] = ErrorsOf(ratios);
+  text += fmt::format("off by {:.0f} % in the middle, by {:.0f} % at most\n", 100 * middle,
+                      100 * largest);
+  return text;
+}
+
+}  // namespace thicklens::tools
