@@ -44,14 +44,6 @@ class Frames {
   std::vector<Frame> held_;
 };
 
-cv::Mat AsFile(const model::StoredPicture& picture) {
-  const cv::Mat values(picture.height_px, picture.width_px, CV_16UC(picture.channels),
-                       const_cast<std::uint16_t*>(picture.values.data()));  // NOLINT: only read
-  cv::Mat file;
-  values.convertTo(file, picture.bits == 8 ? CV_8U : CV_16U);
-  return file;
-}
-
 // One simulation of the sweep.
 class SweepWorld {
  public:

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bench_accuracy.h"
+#include "bench_calibration.h"
 #include "bench_gamma.h"
 #include "bench_inpainting.h"
 #include "bench_machine.h"
@@ -177,6 +178,7 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
   AddBenchSourceCommand(bench, action);
   AddBenchGammaCommand(bench, action);
   AddBenchInpaintingCommand(bench, action);
+  AddBenchCalibrationCommand(bench, action);
   CLI::App* command = bench->add_subcommand(
       "solvers", "All light-field solvers on one simulated picture, in one run");
   const auto options = std::make_shared<BenchOptions>();

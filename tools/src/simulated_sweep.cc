@@ -1,5 +1,7 @@
 #include "simulated_sweep.h"
 
+#include <cstdint>
+
 #include "image_io.h"
 #include "thicklens/model/scene.h"
 
@@ -41,6 +43,14 @@ model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
   for (const model::SweepTruth::Frame& frame : truth.frames)
     sweep.frames.push_back({frame.image, frame.reading_mm});
   return sweep;
+}
+
+cv::Mat AsFile(const model::StoredPicture& picture) {
+  const cv::Mat values(picture.height_px, picture.width_px, CV_16UC(picture.channels),
+                       const_cast<std::uint16_t*>(picture.values.data()));  // NOLINT: only read
+  cv::Mat file;
+  values.convertTo(file, picture.bits == 8 ? CV_8U : CV_16U);
+  return file;
 }
 
 }  // namespace thicklens::tools

@@ -1,0 +1,77 @@
+#ifndef THICKLENS_TOOLS_BENCH_CALIBRATION_ROWS_H_
+#define THICKLENS_TOOLS_BENCH_CALIBRATION_ROWS_H_
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::tools {
+
+// What one calibration makes of one quantity. The source's recipe states no sigma.
+struct CalibrationError {
+  double error = 0;  // value minus truth
+  std::optional<double> sigma;
+};
+
+// One calibration of one sweep.
+struct CalibrationTrial {
+  calib::Outcome outcome = calib::Outcome::kRefused;
+  std::string reason;  // of anything but kOk
+  double seconds = 0;
+  std::optional<CalibrationError> focus_depth_mm, image_distance_um, blur_ratio_percent;
+};
+
+// How many of the stated intervals hold the truth.
+struct IntervalCoverage {
+  int trials = 0;     // that stated an interval; 0: nothing is known
+  int inside_68 = 0;  // |error| <= sigma
+  int inside_95 = 0;  // |error| <= 1.96 sigma
+  double fraction_68() const { return static_cast<double>(inside_68) / trials; }
+  double fraction_95() const { return static_cast<double>(inside_95) / trials; }
+};
+// How far a fraction of so many trials scatters about its expectation (one standard deviation).
+double BinomialStandardError(double expected_fraction, int trials);
+
+// The errors of one quantity over the sweeps that gave it.
+struct CalibrationErrors {
+  int count = 0;  // 0: the rest is not known
+  double median_absolute = 0;
+  double root_mean_square = 0;
+  IntervalCoverage coverage;
+};
+CalibrationErrors ErrorsOf(const std::vector<CalibrationError>& errors);
+
+// One way to calibrate, over all sweeps.
+struct CalibrationRow {
+  std::string method;
+  int frames = 0, field_px = 0;
+  int sweeps = 0, ok = 0, partial = 0, refused = 0;  // the last three add up to the first
+  // Of what was not ok; numbers stand as #, so that the same reason is the same text.
+  std::map<std::string, int> reasons;
+  std::vector<double> seconds;  // of each sweep, refused ones among them
+  CalibrationErrors focus_depth_mm, image_distance_um, blur_ratio_percent;
+  bool on_front = false;
+
+  // Whether its d1 can be compared with others': more than half of the sweeps gave it.
+  bool IsComparable() const { return 2 * image_distance_um.count > sweeps; }
+};
+CalibrationRow MakeCalibrationRow(const std::string& method, int frames, int field_px,
+                                  const std::vector<CalibrationTrial>& trials);
+
+// Marks the rows that no other betters: none has both a smaller or equal median error of d1 and a
+// smaller or equal median of seconds, one of them smaller. Rows that are not comparable stay
+// unmarked and better nothing.
+void MarkFront(std::vector<CalibrationRow>* rows);
+
+nlohmann::json CalibrationRowJson(const CalibrationRow& row);
+std::string CalibrationRowsCsv(const std::vector<CalibrationRow>& rows);
+// A table for the terminal, with what was refused and why below it.
+std::string CalibrationRowsText(const std::vector<CalibrationRow>& rows);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_BENCH_CALIBRATION_ROWS_H_
