@@ -104,7 +104,8 @@ TEST(BenchAccuracy, TakesAScenesFileAsItIs) {
                        folder.path(), 0);
   const ProgramResult result = program.Wait();
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  for (const json& row : ReadJson(folder / "prices.json")["rows"]) {
+  const json summary = ReadJson(folder / "prices.json");
+  for (const json& row : summary["rows"]) {
     EXPECT_TRUE(row["failure"].is_null()) << row;
     EXPECT_EQ(row["scene"], folder / "scene.yaml");
   }

@@ -63,6 +63,16 @@ TEST(CalibrationErrors, CountIntervalsThatHoldTheTruth) {
   EXPECT_DOUBLE_EQ(errors.root_mean_square, std::sqrt((0.25 + 1 + 2.25 + 9 + 49) / 5));
 }
 
+TEST(CalibrationRow, CountsReasonsWhoseNumbersDifferAsOne) {
+  const auto reason = [](const std::string& text) {
+    return MakeCalibrationRow("fit", 3, 64, {Refused(text)}).reasons.begin()->first;
+  };
+  EXPECT_EQ(reason("12 of 31 frames. 4.25 px, d1 2"), "# of # frames. # px, d# #");
+  EXPECT_EQ(reason("ends with 7."), "ends with #.");
+  EXPECT_EQ(reason("3.14"), "#");
+  EXPECT_EQ(reason("none"), "none");
+}
+
 TEST(CalibrationErrors, OfNoSweepAreNotKnown) {
   EXPECT_EQ(ErrorsOf({}).count, 0);
   const CalibrationRow row = MakeCalibrationRow("fit", 3, 64, {Refused("has 3"), Refused("has 4")});

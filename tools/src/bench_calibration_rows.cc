@@ -25,18 +25,18 @@ constexpr double kExpected68 = 0.6827, kExpected95 = 0.95;
 std::string Countable(const std::string& reason) {
   constexpr char kDigits[] = "0123456789";
   std::string countable;
-  for (std::size_t i = 0; i < reason.size();) {
-    const std::size_t number = reason.find_first_of(kDigits, i);
-    countable += reason.substr(i, number - i);
-    if (number == std::string::npos) break;
+  std::size_t from = 0;
+  while (from < reason.size()) {
+    const std::size_t number = std::min(reason.find_first_of(kDigits, from), reason.size());
+    countable += reason.substr(from, number - from);
+    if (number == reason.size()) break;
     countable += '#';
-    i = reason.find_first_not_of(kDigits, number);
+    from = std::min(reason.find_first_not_of(kDigits, number), reason.size());
     // What follows the point, unless it ends a sentence.
-    if (i + 1 < reason.size() && reason[i] == '.' &&
-        std::isdigit(static_cast<unsigned char>(reason[i + 1])) != 0) {
-      i = reason.find_first_not_of(kDigits, i + 1);
+    if (from + 1 < reason.size() && reason[from] == '.' &&
+        std::isdigit(static_cast<unsigned char>(reason[from + 1])) != 0) {
+      from = std::min(reason.find_first_not_of(kDigits, from + 1), reason.size());
     }
-    i = std::min(i, reason.size());
   }
   return countable;
 }
