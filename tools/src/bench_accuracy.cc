@@ -47,8 +47,8 @@ using Clock = std::chrono::steady_clock;
 
 struct BenchAccuracyOptions {
   CommonOptions common;
-  std::vector<std::string> scenes;  // empty: kScenes
-  std::vector<int> views;           // empty: kViews and, of the base plans, those beside
+  std::vector<std::string> scenes;  // empty: UsualScenes()
+  std::vector<int> views;           // empty: kUsualViews, and 3 and 7 of each solver by itself
   std::optional<int> size_px;
   std::string device = "auto";
   int repeat = 5;
@@ -264,9 +264,7 @@ std::string AboutText(const BenchAccuracyOptions& options, const Backends& backe
                       double triad_bytes_per_second) {
   return fmt::format(
       "{}, {} thread(s), {:.3g} GB/s (triad), BLAS: {}, OpenCL: {}; medians of {} runs, or of as "
-      "many as "
-      "fill "
-      "20 s; thicklens {}, {}",
+      "many as fill 20 s; thicklens {}, {}",
       ProcessorName(), backends.threads, 1e-9 * triad_bytes_per_second,
       estimator::BlasDescription(), backends.device ? backends.device->description() : "none",
       options.repeat, Version(), NowIso8601());

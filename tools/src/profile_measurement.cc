@@ -260,10 +260,10 @@ std::string ProfileTable(const MeasuredProfile& measured) {
                         100 * plan.largest_error);
   }
   text += fmt::format(
-      "{:<32}{:>10.2f}{:>10.2f}\n\nPSNR: of the true views, mean over {} of the {} pictures. K: "
-      "640 x "
-      "480 px in colour, 7 x 7 views, blur of 2 px.\nlaw's error: of its prediction of a picture "
-      "that it was not made from.\n\n",
+      "{:<32}{:>10.2f}{:>10.2f}\n\n"
+      "PSNR: of the true views, mean over {} of the {} pictures. K: 640 x 480 px in colour, 7 x 7\n"
+      "views, blur of 2 px. law's error: of its prediction of a picture of a size that it was not\n"
+      "made from.\n\n",
       "warping (DIBR)", profile.warping_psnr_db, profile.best_psnr_db() - profile.warping_psnr_db,
       measured.judged, measured.loads.front().size());
   if (measured.checks.front().empty()) return text;
