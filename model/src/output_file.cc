@@ -27,6 +27,22 @@ Error CannotBeWritten(const std::string& target, int error) {
   return Error(fmt::format("{}: cannot be written: {}", target, std::strerror(error)));
 }
 
+// Whether that is the name of what was opened.
+bool IsNamed(int fd, const std::string& name) {
+  struct stat opened {
+  }, named{};
+  return ::fstat(fd, &opened) == 0 && ::stat(name.c_str(), &named) == 0 &&
+         opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+}
+
+// What was written so far would be missing, or be somebody else's, and nobody would know.
+void RequireStillNamed(int fd, const std::string& part, const std::string& target) {
+  if (IsNamed(fd, part)) return;
+  throw Error(fmt::format(
+      "{}: cannot be written: {}, where it is made, was removed or renamed by somebody else",
+      target, part));
+}
+
 enum class PartKind { kFile, kFolder };
 
 // Creates, opens and locks the part file or folder of an output. If another run holds the lock,
@@ -47,12 +63,7 @@ int OpenLocked(const std::string& part, const std::string& target, PartKind kind
           "{}: another run is writing this output; wait for it or choose another name", target));
     }
     // Between open and flock the holder may have renamed or removed what was opened.
-    struct stat opened {
-    }, named{};
-    if (::fstat(fd, &opened) == 0 && ::stat(part.c_str(), &named) == 0 &&
-        opened.st_ino == named.st_ino && opened.st_dev == named.st_dev) {
-      return fd;
-    }
+    if (IsNamed(fd, part)) return fd;
     ::close(fd);
   }
 }
@@ -150,6 +161,32 @@ fs::path NameToStepAside(const fs::path& target) {
   }
 }
 
+// Gives two folders each the other's name, so that there is none at no moment. False where the file
+// system cannot.
+bool ExchangeNames(const std::string& a, const std::string& b) {
+#ifdef RENAME_EXCHANGE
+  return ::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0;
+#else
+  static_cast<void>(a);
+  static_cast<void>(b);
+  return false;
+#endif
+}
+
+// The part takes the place of the folder that is there, which goes. False: nothing was done.
+bool ReplaceAtOnce(const std::string& part, const std::string& target) {
+  // The old folder gets the part's name, under which other runs look for one that nobody holds.
+  const int old = ::open(target.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (old < 0) return false;
+  const bool done = ::flock(old, LOCK_EX | LOCK_NB) == 0 && ExchangeNames(part, target);
+  std::error_code failure, ignored;
+  if (done) fs::remove_all(part, failure);
+  // What cannot be removed must not be in the way of the next run.
+  if (done && failure) fs::rename(part, NameToStepAside(target), ignored);
+  ::close(old);
+  return done;
+}
+
 }  // namespace
 
 struct OutputFile::Impl {
@@ -160,7 +197,7 @@ struct OutputFile::Impl {
 
   ~Impl() {
     if (fd < 0) return;
-    ::unlink(part.c_str());
+    if (IsNamed(fd, part)) ::unlink(part.c_str());  // else it is somebody else's
     ::close(fd);
   }
 };
@@ -191,6 +228,7 @@ void OutputFile::Commit(const std::string& content) {
   Impl& impl = *impl_;
   if (::ftruncate(impl.fd, 0) != 0) throw CannotBeWritten(impl.path, errno);
   WriteAll(impl.fd, content, impl.path);
+  RequireStillNamed(impl.fd, impl.part, impl.path);
   if (::rename(impl.part.c_str(), impl.target.c_str()) != 0)
     throw CannotBeWritten(impl.path, errno);
   ::close(impl.fd);
@@ -210,9 +248,11 @@ struct OutputFolder::Impl {
   std::string Shown(const std::string& name) const { return (fs::path(path) / name).string(); }
   // Where it is written, in a folder that is there.
   std::string Place(const std::string& name) const {
+    RequireStillNamed(fd, part, Shown(name));
     const fs::path file = fs::path(part) / name;
     std::error_code failure;
-    fs::create_directories(file.parent_path(), failure);
+    // Of one that vanished after all this makes none.
+    if (fs::path(name).has_parent_path()) fs::create_directory(file.parent_path(), failure);
     if (failure)
       throw Error(fmt::format("{}: cannot be written: {}", Shown(name), failure.message()));
     return file.string();
@@ -221,7 +261,7 @@ struct OutputFolder::Impl {
   ~Impl() {
     if (fd < 0) return;
     std::error_code ignored;
-    fs::remove_all(part, ignored);
+    if (IsNamed(fd, part)) fs::remove_all(part, ignored);  // else it is somebody else's
     ::close(fd);
   }
 };
@@ -245,6 +285,11 @@ OutputFolder::OutputFolder(const std::string& path, const std::string& marker_fi
   std::error_code ignored;
   for (const auto& left_over : fs::directory_iterator(impl_->part, ignored))
     fs::remove_all(left_over, ignored);
+  if (!fs::is_empty(impl_->part, ignored)) {
+    throw Error(
+        fmt::format("{}: cannot be written: {}, which an earlier run left, cannot be emptied", path,
+                    impl_->part));
+  }
 }
 
 OutputFolder::~OutputFolder() = default;
@@ -283,10 +328,16 @@ void OutputFolder::WriteWith(
 
 void OutputFolder::Commit() {
   Impl& impl = *impl_;
+  RequireStillNamed(impl.fd, impl.part, impl.path);
   RequireReplaceable(impl.path, impl.marker_file, impl.own_entries);  // work may have taken hours
+  if (ReplaceAtOnce(impl.part, impl.path)) {
+    ::close(impl.fd);
+    impl.fd = -1;
+    return;
+  }
   std::error_code failure;
-  // renameat2 with RENAME_EXCHANGE would be one step, but not every file system has it. The old
-  // folder steps aside first and comes back if the new one cannot take its place.
+  // Not every file system can do it at once: the old folder steps aside first and comes back if the
+  // new one cannot take its place.
   const fs::path aside = NameToStepAside(impl.path);
   const bool replaces = fs::exists(impl.path, failure);
   if (replaces) {

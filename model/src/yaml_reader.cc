@@ -1,6 +1,7 @@
 #include "thicklens/model/yaml_reader.h"
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <sstream>
 
 #include "thicklens/model/output_file.h"
 
@@ -68,6 +70,46 @@ std::string KindOf(const YAML::Node& node) {
   }
 }
 
+// Where the documents of a text begin.
+class DocumentStarts : public YAML::EventHandler {
+ public:
+  const std::vector<YAML::Mark>& marks() const { return marks_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override { marks_.push_back(mark); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+ private:
+  std::vector<YAML::Mark> marks_;
+};
+
+// yaml-cpp finds empty documents without end where a text begins with, say, a comma: it is asked
+// for no more than two.
+void RequireOneDocument(const std::string& text, const std::string& source_name) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  DocumentStarts documents;
+  const bool has_one = parser.HandleNextDocument(documents);
+  const bool has_two = has_one && parser.HandleNextDocument(documents);
+  if (has_one && !has_two) return;
+  const std::vector<YAML::Mark>& marks = documents.marks();
+  if (has_two && marks.size() == 2 && marks[0].pos == marks[1].pos) {
+    throw Error(fmt::format("{}:{}:{}: no valid YAML: nothing can begin like this", source_name,
+                            marks[0].line + 1, marks[0].column + 1));
+  }
+  throw Error(fmt::format("{}: one YAML document is expected, found {}", source_name,
+                          has_two ? "more" : "none"));
+}
+
 }  // namespace
 
 struct YamlNode::Impl {
@@ -80,13 +122,9 @@ YamlNode YamlNode::LoadFile(const std::string& path) { return Parse(ReadWholeFil
 
 YamlNode YamlNode::Parse(const std::string& text, const std::string& source_name) {
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() != 1) {
-      throw Error(fmt::format("{}: one YAML document is expected, found {}", source_name,
-                              documents.size()));
-    }
+    RequireOneDocument(text, source_name);
     auto impl = std::make_shared<Impl>();
-    impl->node.reset(documents.front());
+    impl->node.reset(YAML::Load(text));
     impl->source = source_name;
     return YamlNode(impl);
   } catch (const YAML::Exception& e) {

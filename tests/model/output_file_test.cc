@@ -1,5 +1,6 @@
 #include "thicklens/model/output_file.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -8,8 +9,11 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "support/error_message.h"
@@ -26,6 +30,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::StartsWith;
 using ::thicklens::testing::ContentOf;
 using ::thicklens::testing::ErrorOf;
 using ::thicklens::testing::TemporaryFolder;
@@ -371,6 +376,81 @@ TEST(OutputFolder, ManyClaimantsOneHolder) {
   EXPECT_EQ(other_errors, 0);
   EXPECT_THAT(folder.Entries(), ElementsAre("out"));
   EXPECT_EQ(ContentOf(folder / "out/truth.yaml"), ContentOf(folder / "out/frames/a"));
+}
+
+TEST(OutputFolder, VanishedMeanwhileIsAnError) {
+  const TemporaryFolder folder;
+  const std::string parent = folder / "parent";
+  const auto vanish = [&] { fs::remove_all(parent); };
+  const std::string why = "was removed or renamed by somebody else";
+  {
+    fs::create_directory(parent);
+    OutputFolder output(parent + "/out", "marker");
+    output.Write("inner/first", "1");
+    vanish();
+    EXPECT_THAT(ErrorOf([&] { output.Write("inner/second", "2"); }),
+                AllOf(StartsWith(parent + "/out/inner/second: "), HasSubstr(why)));
+    EXPECT_THAT(ErrorOf([&] { output.Write("marker", "2"); }), HasSubstr(why));
+    EXPECT_THAT(ErrorOf([&] { output.Commit(); }),
+                AllOf(StartsWith(parent + "/out: "), HasSubstr(why)));
+    EXPECT_FALSE(fs::exists(parent));
+  }
+  // Somebody who made the folders again has not made what was in them.
+  fs::create_directory(parent);
+  OutputFolder output(parent + "/out", "marker");
+  output.Write("marker", "1");
+  vanish();
+  fs::create_directories(parent + "/.out.part");
+  {
+    OutputFolder dropped = std::move(output);
+    EXPECT_THAT(ErrorOf([&] { dropped.Commit(); }), HasSubstr(why));
+  }
+  // What somebody else made there is not taken away.
+  EXPECT_TRUE(fs::exists(parent + "/.out.part"));
+}
+
+TEST(OutputFile, VanishedMeanwhileIsAnError) {
+  const TemporaryFolder folder;
+  {
+    OutputFile output(folder / "out");
+    fs::remove(folder / ".out.part");
+    folder.Put(".out.part", "of somebody else");
+    EXPECT_THAT(ErrorOf([&] { output.Commit("mine"); }),
+                HasSubstr("was removed or renamed by somebody else"));
+  }
+  EXPECT_FALSE(fs::exists(folder / "out"));
+  EXPECT_EQ(ContentOf(folder / ".out.part"), "of somebody else");
+}
+
+TEST(OutputFolder, IsThereAtEveryMomentWhileItIsReplaced) {
+  const TemporaryFolder folder;
+  const std::string a = folder / "a", b = folder / "b";
+  fs::create_directory(a);
+  fs::create_directory(b);
+  if (::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) != 0)
+    GTEST_SKIP() << "this file system cannot exchange two names";
+  const std::string path = folder / "out";
+  const auto replace = [&](const std::string& content) {
+    OutputFolder output(path, "marker");
+    output.Write("marker", content);
+    output.Commit();
+  };
+  replace("0");
+  std::atomic<bool> done{false};
+  std::atomic<int> missing{0}, seen{0};
+  std::thread watcher([&] {
+    while (!done) {
+      ++(fs::exists(path + "/marker") ? seen : missing);
+    }
+  });
+  for (int i = 1; i <= 300; ++i) replace(std::to_string(i));
+  done = true;
+  watcher.join();
+  EXPECT_EQ(missing, 0);
+  EXPECT_GT(seen, 0);
+  EXPECT_EQ(ReadWholeFile(path + "/marker"), "300");
+  // Nothing is left beside it.
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 3);
 }
 
 TEST(OutputFolder, FullDiskIsAnError) {

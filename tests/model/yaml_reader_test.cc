@@ -149,7 +149,10 @@ TEST(YamlSchema, MissingOtherOrNoMap) {
   EXPECT_THAT(error("just text"), HasSubstr("found 'just text'"));
   EXPECT_THAT(error("# nothing\n"), HasSubstr("f.yaml"));
   EXPECT_THAT(error(""), HasSubstr("f.yaml: one YAML document is expected"));
-  EXPECT_THAT(error("a: 1\n---\nb: 2"), HasSubstr("found 2"));
+  EXPECT_THAT(error("a: 1\n---\nb: 2"), HasSubstr("one YAML document is expected, found more"));
+  // Where yaml-cpp would find documents without end.
+  EXPECT_THAT(error(","), HasSubstr("f.yaml:1:1: no valid YAML"));
+  EXPECT_THAT(error("\n ]a: 1"), HasSubstr("f.yaml:2:2: no valid YAML"));
 }
 
 TEST(YamlPlace, LineAndColumnAreOnesOfTheValue) {
