@@ -11,6 +11,7 @@
 #include "block_system.h"
 #include "estimate_input.h"
 #include "linear_solver.h"
+#include "residual_guard.h"
 #include "run_cost.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
@@ -285,14 +286,15 @@ std::vector<std::vector<double>> SolveBlock(const BlockSystem& system, const Blo
         NameOf(rect), *report->rcond, options.rcond_min, options.ridge.value_or(0)));
   }
   std::vector<std::vector<double>> channels;
-  for (const std::vector<double>& right : system.right_sides) {
-    channels.push_back(worker->solver->Solve(right));
+  for (std::size_t channel = 0; channel < system.right_sides.size(); ++channel) {
+    const std::vector<double>& right = system.right_sides[channel];
+    channels.push_back(worker->solver->SolveFrom(system.starts[channel], right));
     report->iterations = std::max(report->iterations, worker->solver->iterations());
     const double residual = RelativeResidual(system.matrix, channels.back(), right);
     if (!std::isfinite(residual)) {
       throw Error(fmt::format("{}: the solution is not finite", NameOf(rect)));
     }
-    report->relative_residual = std::max(report->relative_residual, residual);
+    report->relative_residual = LargerResidual(report->relative_residual, residual);
   }
   return channels;
 }
@@ -403,8 +405,13 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   if (!iterative) summary->rcond_min = 1;
   for (const BlockReport& block : summary->blocks) {
     if (block.rcond) summary->rcond_min = std::min(*summary->rcond_min, *block.rcond);
-    summary->relative_residual = std::max(summary->relative_residual, block.relative_residual);
+    summary->relative_residual =
+        LargerResidual(summary->relative_residual, block.relative_residual);
     summary->iterations = std::max(summary->iterations, block.iterations);
+  }
+  if (iterative) {
+    RequireProgress("blocks by " + BlockSolverName(options.solver), summary->relative_residual,
+                    summary->iterations, "allow more, a smaller gamma or a larger ridge");
   }
   summary->converged = !iterative || summary->relative_residual <= options.tolerance;
   summary->solve_seconds = SecondsSince(solve_start);

@@ -146,7 +146,7 @@ BlockSystem MakeBlockSystem(const RayField& rays, const BlockGeometry& block,
     values[EntryOf(pattern, ray, ray)] += exists[Index(ray)] ? ridge : 1;
   }
 
-  BlockSystem system{block, {}, {}};
+  BlockSystem system{block, {}, {}, {}};
   system.matrix.rows = system.matrix.columns = pattern.rows;
   system.matrix.row_start = pattern.row_start;
   system.matrix.column = pattern.column;
@@ -156,12 +156,14 @@ BlockSystem MakeBlockSystem(const RayField& rays, const BlockGeometry& block,
   for (int channel = 0; channel < prior.channels; ++channel) {
     std::vector<double> right =
         kernels->MultiplyTransposed(h, PixelsOf(rays.input().picture, block, channel));
+    std::vector<double> start(right.size(), 0.0);
     ForEachRay(block, [&](std::size_t ray, int k, int l, int s, int t) {
-      right[ray] +=
-          ridge *
+      start[ray] =
           prior.values[prior.ViewStart(channel, k, l) + Index(t) * Index(prior.s_count) + Index(s)];
+      right[ray] += ridge * start[ray];
     });
     system.right_sides.push_back(std::move(right));
+    system.starts.push_back(std::move(start));
   }
   return system;
 }

@@ -50,6 +50,7 @@ struct BlockSystem {
   kernels::BlockGeometry block;
   kernels::CsrMatrix<double> matrix;             // H^T H - gamma G + mu Id
   std::vector<std::vector<double>> right_sides;  // H^T I + mu L0, one a channel
+  std::vector<std::vector<double>> starts;       // L0, the same
 };
 // Unknowns that are no rays of the light field get the equation x = 0.
 BlockSystem MakeBlockSystem(const RayField& rays, const kernels::BlockGeometry& block,

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "estimate_input.h"
+#include "residual_guard.h"
 #include "run_cost.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
@@ -81,7 +82,10 @@ void FillOrigin(const std::string& method, const FunctionalSummary& summary, boo
   if (falloff) origin->effects.emplace_back("falloff");
 }
 
-void EndRun(const FunctionalOptions& options, FunctionalSummary* summary) {
+void EndRun(const std::string& solver, const FunctionalOptions& options,
+            FunctionalSummary* summary) {
+  RequireProgress(solver, summary->relative_residual, summary->iterations,
+                  "allow more, a smaller gamma, a larger ridge or double precision");
   summary->converged = summary->relative_residual <= options.tolerance;
   summary->message = MessageOf(options, *summary);
 }

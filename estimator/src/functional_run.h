@@ -17,8 +17,9 @@ void StartRun(const std::string& solver, const EstimateInput& input,
 void RequireMemory(const FunctionalOptions& options, double bytes);
 void FillOrigin(const std::string& method, const FunctionalSummary& summary, bool falloff,
                 model::LightFieldOrigin* origin);
-// Says how it went; iterations and residual are known.
-void EndRun(const FunctionalOptions& options, FunctionalSummary* summary);
+// Says how it went; iterations and residual are known. Throws Error if they led nowhere.
+void EndRun(const std::string& solver, const FunctionalOptions& options,
+            FunctionalSummary* summary);
 
 }  // namespace thicklens::estimator
 

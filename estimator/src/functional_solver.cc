@@ -13,6 +13,7 @@
 #include "functional_run.h"
 #include "iteration_progress.h"
 #include "ray_landing.h"
+#include "residual_guard.h"
 #include "run_cost.h"
 #include "scene_projection.h"
 #include "scene_rays.h"
@@ -181,7 +182,8 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
                                                   [&] { progress.CountUpTo(solved); });
     progress.SkipTo(solved);
     summary->iterations = std::max(summary->iterations, outcome.iterations);
-    summary->relative_residual = std::max(summary->relative_residual, outcome.relative_residual);
+    summary->relative_residual =
+        LargerResidual(summary->relative_residual, outcome.relative_residual);
     const auto views_start = Clock::now();
     summary->solve_seconds += std::chrono::duration<double>(views_start - solve_start).count();
     model::ParallelFor(views, threads, [&](int view) {
@@ -203,7 +205,7 @@ model::LightField EstimateFunctional(const EstimateInput& input, const Functiona
   StartRun("functional solver", input, options, summary);
   const auto solve = options.double_precision ? SolveFunctional<double> : SolveFunctional<float>;
   model::LightField light_field = solve(input, options, summary);
-  EndRun(options, summary);
+  EndRun("functional", options, summary);
   return light_field;
 }
 

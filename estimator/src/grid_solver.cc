@@ -16,6 +16,7 @@
 #include "iteration_progress.h"
 #include "ray_irradiance.h"
 #include "ray_landing.h"
+#include "residual_guard.h"
 #include "run_cost.h"
 #include "thicklens/error.h"
 #include "thicklens/kernels/picture_filter.h"
@@ -209,7 +210,8 @@ model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOption
         light_field.values.data() + light_field.ViewStart(channel, 0, 0));
     progress.SkipTo(solved);
     summary->iterations = std::max(summary->iterations, outcome.iterations);
-    summary->relative_residual = std::max(summary->relative_residual, outcome.relative_residual);
+    summary->relative_residual =
+        LargerResidual(summary->relative_residual, outcome.relative_residual);
   }
   summary->solve_seconds = SecondsSince(solve_start);
   FillOrigin("grid", *summary, falloff, &light_field.origin);
@@ -223,7 +225,7 @@ model::LightField EstimateOnGrid(const EstimateInput& input, const FunctionalOpt
   StartRun("grid solver", input, options, summary);
   const auto solve = options.double_precision ? SolveOnGrid<double> : SolveOnGrid<float>;
   model::LightField light_field = solve(input, options, summary);
-  EndRun(options, summary);
+  EndRun("grid", options, summary);
   return light_field;
 }
 

@@ -47,11 +47,16 @@ void IterativeSolver::Factorize(const kernels::CsrMatrix<double>& matrix) {
 }
 
 std::vector<double> IterativeSolver::Solve(const std::vector<double>& b) {
+  return SolveFrom(std::vector<double>(b.size(), 0.0), b);
+}
+
+std::vector<double> IterativeSolver::SolveFrom(std::vector<double> start,
+                                               const std::vector<double>& b) {
   iterations_ = 0;
-  std::vector<double> x(b.size(), 0.0);
-  std::vector<double> residual = b;
+  std::vector<double> x = std::move(start);
+  std::vector<double> residual = ResidualOf(matrix_, x, b);
   double left = Norm(residual);
-  const double goal = limits_.tolerance * left;
+  const double goal = limits_.tolerance * Norm(b);
   // What a method calls done may be more than it is: the next pass is asked for half, and after one
   // that changed too little for a tenth.
   double share = 1;

@@ -26,8 +26,9 @@ class IterativeMethod {
 
 // Does not believe a method when it says that it is done: recomputes the residual, and has it
 // iterate on what is left, until the residual is as small as asked for, the limit of iterations is
-// reached, or nothing gets better any more. (Eigen's BiCGSTAB reports success always, and
-// ViennaCL's BiCGStab leaves before the update that made the residual small.)
+// reached, or nothing gets better any more: what it leaves is never worse than its start. (Eigen's
+// BiCGSTAB reports success always, and ViennaCL's BiCGStab leaves before the update that made the
+// residual small.)
 class IterativeSolver : public LinearSolver {
  public:
   IterativeSolver(std::unique_ptr<IterativeMethod> method, const IterationLimits& limits);
@@ -36,6 +37,7 @@ class IterativeSolver : public LinearSolver {
   void Factorize(const kernels::CsrMatrix<double>& matrix) override;
   std::optional<double> rcond() const override { return std::nullopt; }
   std::vector<double> Solve(const std::vector<double>& b) override;
+  std::vector<double> SolveFrom(std::vector<double> start, const std::vector<double>& b) override;
   int iterations() const override { return iterations_; }
   std::string device() const override { return method_->device(); }
 

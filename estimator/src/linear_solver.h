@@ -37,6 +37,11 @@ class LinearSolver {
   virtual std::optional<double> rcond() const = 0;
   // A x = b. Only after a Factorize whose rcond() is absent or above 0.
   virtual std::vector<double> Solve(const std::vector<double>& b) = 0;
+  // The same from an answer that is near; a direct solver has no use for it.
+  virtual std::vector<double> SolveFrom(std::vector<double> /*start*/,
+                                        const std::vector<double>& b) {
+    return Solve(b);
+  }
   // Of the last Solve.
   virtual int iterations() const { return 0; }
   // Of its own, where it has one: for people. Empty: it computes where the caller does.

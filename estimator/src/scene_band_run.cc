@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "ray_landing.h"
+#include "residual_guard.h"
 #include "run_cost.h"
 #include "thicklens/error.h"
 
@@ -28,7 +29,7 @@ class JoinedSummary {
     iterations_ = std::max(iterations_, of_band.iterations);
     reweightings_ = std::max(reweightings_, of_band.reweightings);
     converged_ = converged_ && of_band.converged;
-    relative_residual_ = std::max(relative_residual_, of_band.relative_residual);
+    relative_residual_ = LargerResidual(relative_residual_, of_band.relative_residual);
     rows_ += rows;
     row_share_ += rows * of_band.row_share;
     hidden_share_ += rows * of_band.hidden_share;
@@ -36,7 +37,9 @@ class JoinedSummary {
     strength_ = of_band.strength;
   }
 
+  // Throws Error if iterations led nowhere.
   void Fill(SceneSummary* summary) const {
+    RequireProgress("scene", relative_residual_, iterations_, "allow more");
     summary->strength = strength_;
     summary->iterations = iterations_;
     summary->reweightings = reweightings_;

@@ -93,6 +93,10 @@ template <typename Real>
 std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayXXd& weights) {
   constexpr double kPerUnit = 32;  // of a table, per px of the larger step
   const double largest_step = disparity.step.cwiseAbs().maxCoeff();
+  // An aperture without blur has no steps: all views are one.
+  const Eigen::Vector2d share = largest_step > 0
+                                    ? Eigen::Vector2d(disparity.step.cwiseAbs() / largest_step)
+                                    : Eigen::Vector2d::Zero();
   const Eigen::ArrayXd across = weights.colwise().sum().transpose();
   const Eigen::ArrayXd down = weights.rowwise().sum();
   std::vector<Real> table;
@@ -102,9 +106,9 @@ std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayX
     const double size_px = std::abs(static_cast<double>(value)) * largest_step;
     const auto cell = static_cast<std::size_t>(size_px * kPerUnit + 0.5);
     while (table.size() <= cell) {
-      const double unit = static_cast<double>(table.size()) / kPerUnit / largest_step;
-      table.push_back(static_cast<Real>(SquaredAxis(across, unit * std::abs(disparity.step.x())) *
-                                        SquaredAxis(down, unit * std::abs(disparity.step.y()))));
+      const double step_px = static_cast<double>(table.size()) / kPerUnit;
+      table.push_back(static_cast<Real>(SquaredAxis(across, step_px * share.x()) *
+                                        SquaredAxis(down, step_px * share.y())));
     }
     rows.push_back(table[cell]);
   }

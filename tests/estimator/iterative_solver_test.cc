@@ -115,6 +115,25 @@ TEST(IterativeSolverTest, NothingHasTheSolutionNothing) {
   }
 }
 
+TEST(IterativeSolverTest, StartsFromWhatIsNearAndNeverLeavesItForWorse) {
+  const CsrMatrix<double> matrix = Diagonal({2, 5, 3, 7});
+  const std::vector<double> b = {2, 10, 9, 28}, answer = {1, 2, 3, 4};
+  for (const auto make : {NewEigenCgSolver, NewEigenBicgstabSolver}) {
+    const auto solver = make({1e-12, 100});
+    solver->Factorize(matrix);
+    EXPECT_EQ(solver->SolveFrom(answer, b), answer);
+    EXPECT_EQ(solver->iterations(), 0);
+    const std::vector<double> found = solver->SolveFrom({7, 7, 7, 7}, b);
+    for (std::size_t i = 0; i < b.size(); ++i) EXPECT_NEAR(found[i], answer[i], 1e-10);
+    // From nothing to nothing: the tolerance is of |b|, and not of the start's residual.
+    const auto one_pass = make({1e-12, 1});
+    one_pass->Factorize(matrix);
+    const std::vector<double> near = {1, 2, 3, 4.001};
+    EXPECT_LE(RelativeResidual(matrix, one_pass->SolveFrom(near, b), b),
+              RelativeResidual(matrix, near, b));
+  }
+}
+
 // An indefinite matrix on which BiCGSTAB breaks down: Eigen calls that success.
 TEST(IterativeSolverTest, DoesNotBelieveEigensSuccess) {
   CsrMatrix<double> turn;  // (0 1; -1 0): r0 . A p = 0 at once

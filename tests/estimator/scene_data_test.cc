@@ -48,6 +48,13 @@ TEST(SceneData, SquaredRowsAreThoseOfTheProjection) {
   }
 }
 
+// kappa = 0: whatever the depth, every view is the photograph, and a row a single one.
+TEST(SceneData, SquaredRowsOfAnApertureWithoutBlurAreOne) {
+  const DisparityMap map{3, 2, std::vector<float>(6, 40), {0, 0}};
+  const Eigen::ArrayXXd weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
+  for (const double row : SquaredRows<double>(map, weights)) EXPECT_NEAR(row, 1, 1e-12);
+}
+
 TEST(SceneData, BlurIsThatOfThePlacesOfTheAperture) {
   const DisparityMap map{2, 1, {-2, 0.5F}, {1, 1}};
   const Eigen::ArrayXXd weights = model::ApertureWeights(model::ApertureShape::kUniform, 5, 5);
