@@ -68,7 +68,7 @@ std::optional<Eigen::MatrixXd> FillCovariance(const BlurJacobian& jacobian,
   // In units of the parameters' own size, singular values tell what the data leave free.
   const Eigen::VectorXd norms = jacobian.values.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = jacobian.values * norms.cwiseInverse().asDiagonal();
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeThinV);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeThinV);
   const Eigen::VectorXd& singular = svd.singularValues();
   if (!(singular.tail<1>()[0] > kLeastSingular * singular[0])) {
     NameWeak(jacobian.free, svd.matrixV().rightCols<1>(), &result->weak_direction);

@@ -120,8 +120,8 @@ struct Twin {
   // Of the columns named, by SVD of them all.
   static Eigen::MatrixXd Covariance(const Eigen::MatrixXd& jacobian) {
     const Eigen::VectorXd norms = jacobian.colwise().norm();
-    const Eigen::BDCSVD<Eigen::MatrixXd> svd(jacobian * norms.cwiseInverse().asDiagonal(),
-                                             Eigen::ComputeThinV);
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian * norms.cwiseInverse().asDiagonal(),
+                                                Eigen::ComputeThinV);
     const Eigen::MatrixXd half = norms.cwiseInverse().asDiagonal() * svd.matrixV() *
                                  svd.singularValues().cwiseInverse().asDiagonal();
     return half * half.transpose();
