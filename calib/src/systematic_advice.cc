@@ -27,7 +27,8 @@ void SortAndAdvise(Calibration* calibration) {
                      return Width(a.image_distance_mm) > Width(b.image_distance_mm);
                    });
   const double zf_sigma_mm = calibration->focus_depth_mm->sigma;
-  const double zero_sigma_mm = std::min(calibration->bench_offset_mm->sigma, zf_sigma_mm);
+  const double zero_sigma_mm =
+      calibration->bench_offset_mm ? std::min(calibration->bench_offset_mm->sigma, zf_sigma_mm) : 0;
   const double d1_per_zf =
       zf_sigma_mm > 0 ? calibration->image_distance_mm->sigma / zf_sigma_mm : 0;
   const double zero_mm = 2 * 1.96 * d1_per_zf * zero_sigma_mm;
@@ -83,8 +84,9 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
   SystematicPart part;
   part.name = name;
   part.remedy = remedy;
-  Result& zero = *calibration->bench_offset_mm;
-  Eigen::Vector2d zero_mm = zero.systematic.value_or(Eigen::Vector2d(zero.value, zero.value));
+  std::optional<Result>& zero = calibration->bench_offset_mm;
+  Eigen::Vector2d zero_mm(0, 0);
+  if (zero) zero_mm = zero->systematic.value_or(Eigen::Vector2d(zero->value, zero->value));
   for (const BlurFitSetup& setup : setups) {
     const BlurFitResult trial = FitBlur(setup, &fit);
     if (!trial.done) {
@@ -104,7 +106,7 @@ void WidenByTrials(const std::string& name, const std::string& remedy,
     widen(trial.values[kBlurRatio] - fit.values[kBlurRatio], &part.blur_ratio);
     widen(setup.offset_mm.value, &zero_mm);
   }
-  zero.systematic = zero_mm;
+  if (zero) zero->systematic = zero_mm;
   const auto add = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
     if (*result && (*result)->systematic) *(*result)->systematic += moves;
   };

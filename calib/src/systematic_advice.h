@@ -14,8 +14,8 @@ namespace thicklens::calib {
 inline constexpr const char* kShapePart = "shape of the blur";
 
 // The largest part first; then the advice: what would shrink what takes the largest share of the
-// error of d1, the statistical part at its 95 %, what the bench zero brings into it apart. A wrong
-// shape of the blur comes before all shares.
+// error of d1, the statistical part at its 95 %, what the bench zero brings into it apart (nothing,
+// where there is no zero). A wrong shape of the blur comes before all shares.
 void SortAndAdvise(Calibration* calibration);
 
 // Adds a part that moves zf by up to `move_mm` either way, to the table and to the intervals of zf

@@ -126,6 +126,17 @@ TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
   }
 }
 
+// Not every caller has fitted a zero: what is not there has no share, and nothing is read of it.
+TEST(WidenFocus, WithoutAZeroItHasNoShare) {
+  const model::ThickLens lens = BlurBench().lens;
+  Calibration c = Plain(400, 0.5, 0, lens);
+  Calibration without = c;
+  without.bench_offset_mm.reset();
+  for (Calibration* each : {&c, &without}) WidenFocus("a hair", 0.001, "nothing", lens, each);
+  EXPECT_THAT(without.advice, StartsWith("noise and readings are 100 %"));
+  EXPECT_EQ(without.advice, c.advice);
+}
+
 TEST(WidenFocus, WithoutAnyErrorThereIsNoAdvice) {
   const model::ThickLens lens = BlurBench().lens;
   Calibration c = Plain(400, 0, 0, lens);
