@@ -12,6 +12,7 @@
 
 #include "build_info.h"
 #include "commands.h"
+#include "hard_cases.h"
 #include "interrupt.h"
 #include "light_field_options.h"
 #include "svg_plot.h"
@@ -29,6 +30,8 @@ constexpr double kBytesPerMib = 1024.0 * 1024.0;
 struct DoctorOptions {
   CommonOptions common;
   std::string device = "auto";
+  bool hard_cases = false;
+  HardCasesOptions hard;
 };
 
 // What the examination found.
@@ -238,9 +241,30 @@ void AddDoctorCommand(CLI::App* program, CommandAction* action) {
       "doctor", "What this machine computes with: cores, BLAS, OpenCL devices and their agreement");
   const auto options = std::make_shared<DoctorOptions>();
   AddDeviceOption(command, &options->device);
+  CLI::Option* hard = command->add_flag(
+      "--hard-cases", options->hard_cases,
+      "Run the table of hard cases: each solved to a stated accuracy or refused with a reason, by "
+      "every solver, precision and device there is here; takes minutes");
+  command->get_option("--device")->excludes(hard);
+  command
+      ->add_option(
+          "--only", options->hard.only,
+          "Of --hard-cases: one of them, or a group (optics, scene, estimator, calibration)")
+      ->needs(hard)
+      ->type_name("NAME");
+  command
+      ->add_option("--keep", options->hard.keep_folder,
+                   "Of --hard-cases: a new folder that keeps what was read and written")
+      ->needs(hard)
+      ->type_name("DIR");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
-    *action = [options] { RunCommand(options->common, [&] { return Doctor(*options); }); };
+    *action = [options] {
+      RunCommand(options->common, [&] {
+        return options->hard_cases ? RunHardCases(options->hard, options->common)
+                                   : Doctor(*options);
+      });
+    };
   });
 }
 

@@ -1,0 +1,34 @@
+#include "temporary_folder.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <system_error>
+
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+
+namespace fs = std::filesystem;
+
+TemporaryFolder::TemporaryFolder(const std::string& purpose) {
+  std::error_code failure;
+  const fs::path parent = fs::temp_directory_path(failure);
+  std::string name = (parent / ("thicklens-" + purpose + "-XXXXXX")).string();
+  if (failure || mkdtemp(name.data()) == nullptr) {
+    const char* value = std::getenv("TMPDIR");  // NOLINT: nothing sets it meanwhile
+    throw Error(fmt::format(
+        "TMPDIR: no folder for temporary files can be made in '{}'; it must say where one can be",
+        !failure           ? parent.string()
+        : value == nullptr ? ""
+                           : value));
+  }
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,25 @@
+#ifndef THICKLENS_TOOLS_TEMPORARY_FOLDER_H_
+#define THICKLENS_TOOLS_TEMPORARY_FOLDER_H_
+
+#include <filesystem>
+#include <string>
+
+namespace thicklens::tools {
+
+// A new folder below TMPDIR, gone with all that is in it.
+class TemporaryFolder {
+ public:
+  // "thicklens-PURPOSE-XXXXXX". Throws Error that names TMPDIR.
+  explicit TemporaryFolder(const std::string& purpose);
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_TEMPORARY_FOLDER_H_
