@@ -49,8 +49,10 @@ ChildProgram::~ChildProgram() {
   ::waitpid(pid_, &status_, 0);
 }
 
-void ChildProgram::Interrupt() {
-  if (!ended_) ::kill(pid_, SIGINT);
+void ChildProgram::Interrupt() { Send(SIGINT); }
+
+void ChildProgram::Send(int signal) {
+  if (!ended_) ::kill(pid_, signal);
 }
 
 bool ChildProgram::Running() {
@@ -61,7 +63,8 @@ bool ChildProgram::Running() {
 ProgramResult ChildProgram::Wait() {
   if (!ended_) ::waitpid(pid_, &status_, 0);
   ended_ = true;
-  return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -1, model::ReadWholeFile(out_path_),
+  return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -1,
+          WIFSIGNALED(status_) ? WTERMSIG(status_) : 0, model::ReadWholeFile(out_path_),
           model::ReadWholeFile(err_path_)};
 }
 

@@ -10,6 +10,7 @@ namespace thicklens::tools {
 
 struct ProgramResult {
   int exit_code = -1;  // -1: ended by a signal
+  int signal = 0;      // which; 0: none
   std::string out;     // stdout
   std::string err;     // stderr
 };
@@ -25,6 +26,7 @@ class ChildProgram {
   ~ChildProgram();
 
   void Interrupt();  // SIGINT
+  void Send(int signal);
   bool Running();
   ProgramResult Wait();
 

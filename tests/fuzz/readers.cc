@@ -1,0 +1,131 @@
+#include "fuzz/readers.h"
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <stdexcept>
+
+#include "depth_io.h"
+#include "estimate_profile.h"
+#include "estimate_records.h"
+#include "exif.h"
+#include "image_io.h"
+#include "light_field_io.h"
+#include "thicklens/error.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/light_field_file.h"
+#include "thicklens/model/scene_simulator.h"
+#include "thicklens/model/sweep_file.h"
+#include "thicklens/model/sweep_simulator.h"
+
+namespace thicklens::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kViews = 3;
+
+// Reads a file of that name in the folder.
+template <typename Read>
+FuzzedReader OfFile(const std::string& reader, const std::string& name, Read read) {
+  return {reader, [=](const std::string& bytes, const TemporaryFolder& folder) {
+            read(folder.Put(name, bytes));
+          }};
+}
+
+constexpr char kTiffLightField[] = R"(schema: thicklens/light-field/1
+views: [1, 1]
+size: [4, 3]
+channels: 1
+view_format: tiff
+transfer: linear
+disparity: px per view step, near positive
+landing_step_px: [0, 0]
+weights: [[1]]
+origin: {method: simulated}
+)";
+
+constexpr char kCamera[] = R"(schema: thicklens/camera/1
+name: 50 mm at f/2.8
+lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, aperture_radius_mm: 8.9}
+sensor: {width_px: 512, height_px: 512, pixel_pitch_mm: 0.0045, principal_point_px: [255.5, 255.5], transfer: linear}
+psf: gaussian
+)";
+
+}  // namespace
+
+const std::vector<FuzzedReader>& FuzzedReaders() {
+  static const std::vector<FuzzedReader> readers = {
+      OfFile("camera-yaml", "camera.yaml",
+             [](const std::string& path) { model::ReadCamera(path); }),
+      OfFile("sweep-yaml", "sweep.yaml",
+             [](const std::string& path) {
+               std::vector<std::string> notices;
+               model::ReadSweep(path, &notices);
+             }),
+      OfFile("readings-csv", "frames/readings.csv",
+             [](const std::string& path) {
+               std::vector<std::string> notices;
+               model::SweepFromFolder(fs::path(path).parent_path().string(), path, "", &notices);
+             }),
+      OfFile("sweep-truth-yaml", "truth.yaml",
+             [](const std::string& path) { model::ReadSweepTruth(path); }),
+      OfFile("sweep-simulation-yaml", "simulation.yaml",
+             [](const std::string& path) { model::ReadSweepSimulation(path); }),
+      OfFile("scene-yaml", "scene.yaml",
+             [](const std::string& path) { model::ReadSceneSimulation(path); }),
+      OfFile("light-field-yaml", "lightfield.yaml",
+             [](const std::string& path) { model::ReadLightFieldDescription(path); }),
+      OfFile("hci-cfg", "hci/parameters.cfg",
+             [](const std::string& path) {
+               tools::ReadLightField(fs::path(path).parent_path().string(), {});
+             }),
+      OfFile("hci-view", "hci-view/input_Cam000.png",
+             [](const std::string& path) {
+               tools::ReadLightField(fs::path(path).parent_path().string(), {});
+             }),
+      OfFile("view-tiff", "tiff/views/view_00_00.tiff",
+             [](const std::string& path) {
+               tools::ReadLightField(fs::path(path).parent_path().parent_path().string(), {});
+             }),
+      OfFile("depth-map", "depth.pfm", [](const std::string& path) { tools::ReadDepthMap(path); }),
+      {"picture",
+       [](const std::string& bytes, const TemporaryFolder&) {
+         tools::ToStoredPicture(tools::DecodePicture(bytes, "picture.png"));
+       }},
+      OfFile("photo-exif", "photo.jpg",
+             [](const std::string& path) { tools::ReadPhotoExif(path, 640, 480); }),
+      OfFile("profile-json", "profile.json",
+             [](const std::string& path) { tools::ReadProfile(path); }),
+      OfFile("estimate-json", "estimate.json",
+             [](const std::string& path) { tools::ReadEstimateRecord(path); }),
+      OfFile("comparison-json", "comparison.json",
+             [](const std::string& path) { tools::ReadComparisonRecord(path); }),
+  };
+  return readers;
+}
+
+void PrepareFuzzFolder(const TemporaryFolder& folder) {
+  const model::StoredPicture grey{4, 3, 1, 8, std::vector<std::uint16_t>(12, 100)};
+  const std::string png = tools::EncodePng(grey);
+  for (int i = 0; i < kViews; ++i) folder.Put("frames/frame_00" + std::to_string(i) + ".png", png);
+  for (int i = 0; i < kViews * kViews; ++i) {
+    folder.Put("hci/input_Cam00" + std::to_string(i) + ".png", png);
+  }
+  folder.Put("positions.csv", "frame_000.png,412\nframe_001.png,413\nframe_002.png,414\n");
+  folder.Put("camera.yaml", kCamera);
+  folder.Put("tiff/lightfield.yaml", kTiffLightField);
+}
+
+std::string Refusal(const FuzzedReader& reader, const std::string& bytes,
+                    const TemporaryFolder& folder) {
+  try {
+    reader.read(bytes, folder);
+    return "";
+  } catch (const Error& error) {
+    std::string message = error.what();
+    if (message.empty()) throw std::runtime_error("an Error without a message");
+    return message;
+  }
+}
+
+}  // namespace thicklens::testing
