@@ -37,7 +37,7 @@ ProgramResult Bench(const TemporaryFolder& folder, const std::vector<std::string
   return ChildProgram(all, folder.path(), 0).Wait();
 }
 
-CalibrationTrial Trial(double error_um, double sigma_um, double seconds) {
+CalibrationTrial SolvedTrial(double error_um, double sigma_um, double seconds) {
   CalibrationTrial trial;
   trial.outcome = calib::Outcome::kOk;
   trial.seconds = seconds;
@@ -45,7 +45,7 @@ CalibrationTrial Trial(double error_um, double sigma_um, double seconds) {
   return trial;
 }
 
-CalibrationTrial Refused(const std::string& reason) {
+CalibrationTrial RefusedTrial(const std::string& reason) {
   CalibrationTrial trial;
   trial.reason = reason;
   return trial;
@@ -65,7 +65,7 @@ TEST(CalibrationErrors, CountIntervalsThatHoldTheTruth) {
 
 TEST(CalibrationRow, CountsReasonsWhoseNumbersDifferAsOne) {
   const auto reason = [](const std::string& text) {
-    return MakeCalibrationRow("fit", 3, 64, {Refused(text)}).reasons.begin()->first;
+    return MakeCalibrationRow("fit", 3, 64, {RefusedTrial(text)}).reasons.begin()->first;
   };
   EXPECT_EQ(reason("12 of 31 frames. 4.25 px, d1 2"), "# of # frames. # px, d# #");
   EXPECT_EQ(reason("ends with 7."), "ends with #.");
@@ -75,7 +75,8 @@ TEST(CalibrationRow, CountsReasonsWhoseNumbersDifferAsOne) {
 
 TEST(CalibrationErrors, OfNoSweepAreNotKnown) {
   EXPECT_EQ(ErrorsOf({}).count, 0);
-  const CalibrationRow row = MakeCalibrationRow("fit", 3, 64, {Refused("has 3"), Refused("has 4")});
+  const CalibrationRow row =
+      MakeCalibrationRow("fit", 3, 64, {RefusedTrial("has 3"), RefusedTrial("has 4")});
   EXPECT_EQ(row.refused, 2);
   EXPECT_EQ(row.reasons, (std::map<std::string, int>{{"has #", 2}}));
   EXPECT_TRUE(CalibrationRowJson(row)["image_distance_error_um"].is_null());
@@ -90,7 +91,7 @@ TEST(CalibrationErrors, AFractionScattersAsBinomialTrialsDo) {
 }
 
 CalibrationRow Row(double seconds, double error_um) {
-  return MakeCalibrationRow("fit", 31, 64, {Trial(error_um, 1, seconds)});
+  return MakeCalibrationRow("fit", 31, 64, {SolvedTrial(error_um, 1, seconds)});
 }
 
 std::vector<bool> Marked(std::vector<CalibrationRow> rows) {
@@ -109,7 +110,7 @@ TEST(MarkFront, MarksWhatNoOtherRowBetters) {
 
 TEST(MarkFront, LeavesOutWhatMostSweepsDidNotGive) {
   const CalibrationRow half =
-      MakeCalibrationRow("fit", 8, 64, {Trial(0.1, 1, 0.1), Refused("no edges")});
+      MakeCalibrationRow("fit", 8, 64, {SolvedTrial(0.1, 1, 0.1), RefusedTrial("no edges")});
   EXPECT_THAT(Marked({half, Row(1, 5)}), ElementsAre(false, true));
 }
 
@@ -193,7 +194,7 @@ void ExpectRefusalsToBeTold(const json& rows) {
 }
 
 // Of all frames and the larger field.
-json RowOf(const json& rows, const std::string& method) {
+json FirstRowOf(const json& rows, const std::string& method) {
   for (const json& row : rows) {
     if (row["method"] == method && row["field_px"] == 192 && row["frames"] == 31) return row;
   }
@@ -226,8 +227,8 @@ void ExpectASmallErrorOfTheFit(const json& fit, const json& no_field) {
 }
 
 void ExpectTheRecipeToBeCheapAndWrong(const json& rows) {
-  const json fit = RowOf(rows, "fit-no-field"), peak = RowOf(rows, "peak");
-  const json source = RowOf(rows, "source");
+  const json fit = FirstRowOf(rows, "fit-no-field"), peak = FirstRowOf(rows, "peak");
+  const json source = FirstRowOf(rows, "source");
   // The frame that it names is off by up to half a step, and its mean of ratios diverges.
   EXPECT_GT(source["focus_depth_error_mm"]["median_absolute"],
             2 * fit["focus_depth_error_mm"]["median_absolute"].get<double>());
@@ -295,7 +296,7 @@ TEST(BenchCalibration, MeasuresEveryMethodOnTheSameSweeps) {
   const json& rows = summary["rows"];
   ExpectCountsThatAddUp(rows);
   ExpectRefusalsToBeTold(rows);
-  ExpectASmallErrorOfTheFit(RowOf(rows, "fit"), RowOf(rows, "fit-no-field"));
+  ExpectASmallErrorOfTheFit(FirstRowOf(rows, "fit"), FirstRowOf(rows, "fit-no-field"));
   ExpectTheRecipeToBeCheapAndWrong(rows);
   ExpectNoMarkedRowToBeBettered(rows);
   ExpectTheSameRowsAsCsv(report + "/prices.csv", rows);

@@ -87,6 +87,32 @@ TEST(Bench, MeasuresEverySolverOnTheSameScene) {
   EXPECT_GT(ridge_db, dibr_db + 1);
 }
 
+TEST(Bench, LooksAtTheConditionOfEachDiscretisation) {
+  const TemporaryFolder folder;
+  const std::string json = folder / "conditioning.json";
+  const ProgramResult result =
+      ChildProgram({"bench", "conditioning", "--size", "4", "--json", json}, folder.path(), 0)
+          .Wait();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("gamma 1e+06"));
+  std::ifstream file(json);
+  const nlohmann::json summary = nlohmann::json::parse(file);
+  const nlohmann::json& usual = summary["rows"][0];
+  EXPECT_EQ(usual["changed"], "nothing");
+  EXPECT_EQ(usual["rays_warp"]["unknowns"], 16 * 9);
+  EXPECT_EQ(usual["scene_points"]["unknowns"], 16);
+  for (const nlohmann::json& row : summary["rows"]) {
+    const bool has_ridge = row["ridge"].is_null() || row["ridge"] > 0;
+    EXPECT_EQ(row["scene_points"].is_object(), has_ridge) << row["changed"];
+    if (row["gamma"] == 1e6) {
+      EXPECT_GT(row["rays_warp"]["condition"], 1e8);
+    }
+    if (has_ridge) {
+      EXPECT_LT(row["scene_points"]["condition"], 1e6) << row["changed"];
+    }
+  }
+}
+
 TEST(Bench, RefusesASizeThatIsNone) {
   TemporaryFolder scratch;
   for (const char* size : {"32x64", "64", "axb"}) {

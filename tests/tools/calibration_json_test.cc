@@ -7,6 +7,7 @@
 #include <string>
 
 #include "made_up_calibration.h"
+#include "support/special_numbers.h"
 #include "thicklens/model/weighed_aperture.h"
 
 namespace thicklens::tools {
@@ -14,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using thicklens::testing::kNan;
 
 TEST(CalibrationJson, HasTheKeysOfTheFormat) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);

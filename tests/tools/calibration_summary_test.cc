@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "made_up_calibration.h"
+#include "support/special_numbers.h"
 
 namespace thicklens::tools {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using thicklens::testing::kNan;
 
 std::string LineWith(const std::string& text, const std::string& words) {
   std::istringstream lines(text);

@@ -19,6 +19,7 @@
 #include "depth_io.h"
 #include "image_io.h"
 #include "light_field_io.h"
+#include "support/special_numbers.h"
 #include "support/temporary_folder.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field_grid.h"
@@ -36,7 +37,7 @@ using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 using Json = nlohmann::json;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using thicklens::testing::kInfinity;
 constexpr int kWide = 44, kHigh = 36, kDisparityPx = 1, kGrid = 7;
 
 // ---- Table and JSON.

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "encoded_picture.h"
 #include "png_check.h"
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
@@ -38,13 +39,6 @@ std::string Swapped(std::string values) {
     std::reverse(values.begin() + static_cast<std::ptrdiff_t>(i),
                  values.begin() + static_cast<std::ptrdiff_t>(i) + 4);
   return values;
-}
-
-std::string Encoded(const cv::Mat& picture, const std::string& extension,
-                    const std::vector<int>& settings = {}) {
-  std::vector<unsigned char> bytes;
-  cv::imencode(extension, picture, bytes, settings);
-  return {bytes.begin(), bytes.end()};
 }
 
 class DepthFile : public ::testing::Test {

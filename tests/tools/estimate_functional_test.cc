@@ -36,16 +36,16 @@ using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
-constexpr int kW = 60, kH = 44;
+constexpr int kWidthPx = 60, kHeightPx = 44;
 
 // Soft stripes, 1 grey level of noise.
 model::StoredPicture Stripes() {
-  model::StoredPicture picture{kW, kH, 3, 8, {}};
+  model::StoredPicture picture{kWidthPx, kHeightPx, 3, 8, {}};
   std::mt19937 engine(7);
   std::normal_distribution<double> noise(0, 1);
-  for (int i = 0; i < kW * kH * 3; ++i) {
-    const double value =
-        120 + 40 * std::sin(0.35 * (i / 3 % kW) + i % 3) + 30 * std::sin(0.3 * (i / 3 / kW));
+  for (int i = 0; i < kWidthPx * kHeightPx * 3; ++i) {
+    const double value = 120 + 40 * std::sin(0.35 * (i / 3 % kWidthPx) + i % 3) +
+                         30 * std::sin(0.3 * (i / 3 / kWidthPx));
     picture.values.push_back(
         static_cast<std::uint16_t>(std::lround(std::clamp(value + noise(engine), 0.0, 255.0))));
   }
@@ -57,7 +57,11 @@ std::string WideCameraYaml() {
   model::Camera camera;
   camera.name = "wide";
   camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kW, kH, 0.2, {(kW - 1) / 2.0, (kH - 1) / 2.0}, model::TransferCurve::Srgb()};
+  camera.sensor = {kWidthPx,
+                   kHeightPx,
+                   0.2,
+                   {(kWidthPx - 1) / 2.0, (kHeightPx - 1) / 2.0},
+                   model::TransferCurve::Srgb()};
   camera.calibration = model::CameraCalibration{};
   camera.calibration->image_distance_mm =
       model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
@@ -69,8 +73,9 @@ std::string WideCameraYaml() {
 class EstimateFunctionalTest : public ::testing::TestWithParam<const char*> {
  protected:
   std::string Depth(const std::function<double(int x)>& value) const {
-    model::RawDepthMap map{kW, kH, {}, false};
-    for (int i = 0; i < kW * kH; ++i) map.values.push_back(static_cast<float>(value(i % kW)));
+    model::RawDepthMap map{kWidthPx, kHeightPx, {}, false};
+    for (int i = 0; i < kWidthPx * kHeightPx; ++i)
+      map.values.push_back(static_cast<float>(value(i % kWidthPx)));
     return folder_.Put("depth.pfm", EncodePfm(map));
   }
   std::string Picture() const { return folder_.Put("picture.png", EncodePng(Stripes())); }
@@ -181,7 +186,8 @@ TEST_P(EstimateFunctionalTest, TheFallOffCanBeLeftOut) {
   const model::LinearPicture bright = model::ViewPicture(with, 1, 1);
   const model::LinearPicture dark = model::ViewPicture(without, 1, 1);
   EXPECT_GT(bright.at(2, 2, 0), 1.2F * dark.at(2, 2, 0));
-  EXPECT_NEAR(bright.at(kW / 2, kH / 2, 0), dark.at(kW / 2, kH / 2, 0), 0.01);
+  EXPECT_NEAR(bright.at(kWidthPx / 2, kHeightPx / 2, 0), dark.at(kWidthPx / 2, kHeightPx / 2, 0),
+              0.01);
 }
 
 TEST_P(EstimateFunctionalTest, TheReportHasNoMaps) {

@@ -40,15 +40,15 @@ using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
-constexpr int kW = 96, kH = 64;
+constexpr int kColumns = 96, kRows = 64;
 
 // Soft stripes, 1 grey level of noise.
 model::StoredPicture Stripes(int channels) {
-  model::StoredPicture picture{kW, kH, channels, 8, {}};
+  model::StoredPicture picture{kColumns, kRows, channels, 8, {}};
   std::mt19937 engine(7);
   std::normal_distribution<double> noise(0, 1);
-  for (int y = 0; y < kH; ++y) {
-    for (int x = 0; x < kW; ++x) {
+  for (int y = 0; y < kRows; ++y) {
+    for (int x = 0; x < kColumns; ++x) {
       for (int c = 0; c < channels; ++c) {
         const double value = 120 + 40 * std::sin(0.35 * x + 0.5 * c) + 30 * std::sin(0.3 * y);
         picture.values.push_back(
@@ -63,7 +63,7 @@ std::string CameraYaml(const model::TransferCurve& transfer) {
   model::Camera camera;
   camera.name = "bench";
   camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kW, kH, 0.006, {(kW - 1) / 2.0, (kH - 1) / 2.0}, transfer};
+  camera.sensor = {kColumns, kRows, 0.006, {(kColumns - 1) / 2.0, (kRows - 1) / 2.0}, transfer};
   camera.calibration = model::CameraCalibration{};
   camera.calibration->image_distance_mm =
       model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
@@ -78,9 +78,9 @@ class EstimateSceneTest : public ::testing::Test {
     return folder_.Put("picture.png", EncodePng(Stripes(channels)));
   }
   std::string Depth(const std::function<double(int x, int y)>& value) const {
-    model::RawDepthMap map{kW, kH, {}, false};
-    for (int y = 0; y < kH; ++y) {
-      for (int x = 0; x < kW; ++x) map.values.push_back(static_cast<float>(value(x, y)));
+    model::RawDepthMap map{kColumns, kRows, {}, false};
+    for (int y = 0; y < kRows; ++y) {
+      for (int x = 0; x < kColumns; ++x) map.values.push_back(static_cast<float>(value(x, y)));
     }
     return folder_.Put("depth.pfm", EncodePfm(map));
   }
@@ -165,19 +165,19 @@ TEST_F(EstimateSceneTest, WritesTheConfidenceOfEachRay) {
       const model::StoredPicture rays = ConfidenceFile(Output(), k, l);
       ASSERT_EQ(rays.channels, 1);
       ASSERT_EQ(rays.bits, 8);
-      ASSERT_EQ(rays.width_px, kW);
-      ASSERT_EQ(rays.height_px, kH);
+      ASSERT_EQ(rays.width_px, kColumns);
+      ASSERT_EQ(rays.height_px, kRows);
       filled += static_cast<std::size_t>(std::count(rays.values.begin(), rays.values.end(), 0));
       whole += static_cast<std::size_t>(std::count(rays.values.begin(), rays.values.end(), 255));
     }
   }
   EXPECT_GT(filled, 0u);
-  constexpr double kRays = 9.0 * kW * kH;
+  constexpr double kRays = 9.0 * kColumns * kRows;
   EXPECT_NEAR(summary["rays"]["filled_in_share"], static_cast<double>(filled) / kRays, 1e-9);
   EXPECT_NEAR(summary["rays"]["seen_share"], static_cast<double>(whole) / kRays, 1e-9);
   // One step to the right the strip stands one px to the left, the wall half a px to the right.
   const model::StoredPicture right = ConfidenceFile(Output(), 2, 1);
-  const auto row = right.values.begin() + 32 * kW;
+  const auto row = right.values.begin() + 32 * kColumns;
   EXPECT_EQ(row[50], 255);
   EXPECT_EQ(row[59], 0);
   EXPECT_EQ(row[20], 255);
@@ -213,7 +213,7 @@ TEST_F(EstimateSceneTest, IsTheDefaultAndSaysWhatItDid) {
   EXPECT_EQ(summary["device"], "cpu");
   EXPECT_EQ(summary["threads"], 2);
   EXPECT_EQ(summary["views"], json({3, 3}));
-  EXPECT_EQ(summary["size"], json({kW, kH}));
+  EXPECT_EQ(summary["size"], json({kColumns, kRows}));
   EXPECT_EQ(summary["channels"], 3);
   EXPECT_EQ(summary["transfer"], "srgb");
   EXPECT_EQ(summary["effects"], json({"defocus", "aperture-shape", "occlusion"}));
@@ -359,7 +359,7 @@ TEST_F(EstimateSceneTest, WarnsOfStepsThatAreTooLarge) {
       summary["warnings"][0].get<std::string>(),
       AllOf(HasSubstr("1.0 % of the pixels"), HasSubstr("3 px"), HasSubstr("up to 3.2 px")));
   EXPECT_THAT(result.err, HasSubstr("up to 3.2 px"));
-  EXPECT_NEAR(summary["disparity"]["coarse_share"].get<double>(), 1.0 / kW, 1e-9);
+  EXPECT_NEAR(summary["disparity"]["coarse_share"].get<double>(), 1.0 / kColumns, 1e-9);
 }
 
 TEST_F(EstimateSceneTest, SmoothsANoisyDepthAndWarnsWhereItStaysNoisy) {

@@ -395,6 +395,7 @@ TEST_F(EstimateTest, IterationsByBlocksAreTold) {
   EXPECT_EQ(summary["block_solver"], "cg");
   EXPECT_GT(summary["iterations"].get<int>(), 3);
   EXPECT_EQ(summary["converged"], true);
+  EXPECT_EQ(summary["status"], "ok");
   EXPECT_LE(summary["relative_residual"].get<double>(), 1e-6);
   EXPECT_TRUE(summary["rcond_min"].is_null());
   EXPECT_THAT(done.err, ::testing::Not(HasSubstr("not converged")));
@@ -403,6 +404,8 @@ TEST_F(EstimateTest, IterationsByBlocksAreTold) {
   ASSERT_EQ(cut.exit_code, 0) << cut.err;
   summary = nlohmann::json::parse(ContentOf(json));
   EXPECT_EQ(summary["converged"], false);
+  EXPECT_EQ(summary["status"], "partial");
+  EXPECT_THAT(summary["reason"].get<std::string>(), HasSubstr("not converged"));
   EXPECT_THAT(cut.err, AllOf(HasSubstr("not converged"), HasSubstr("--max-iterations")));
   fs::remove_all(Output());
   // A direct solver has no iterations to limit.

@@ -23,7 +23,7 @@ using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
 // f1 = f2 = 50, zf = 300, so K = 60; 40 x 32 px.
-constexpr char kCamera[] =
+constexpr char kCameraWithEffects[] =
     "schema: thicklens/camera/1\n"
     "name: small\n"
     "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, "
@@ -70,7 +70,7 @@ class ExplainEffectsTest : public ::testing::Test {
   }
 
   TemporaryFolder folder_;
-  std::string camera_ = folder_.Put("camera.yaml", kCamera);
+  std::string camera_ = folder_.Put("camera.yaml", kCameraWithEffects);
 };
 
 TEST_F(ExplainEffectsTest, TellsTheLargestImpactOfEachAndWhere) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "explain_table.h"
+#include "support/special_numbers.h"
 #include "thicklens/error.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -13,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using thicklens::testing::kInfinity;
 constexpr double kPitchMm = 0.005;
 
 // f1 = 50, f2 = 52, rho = 4 focused at 1000 mm: d1 = 4 + 52 * 1000/950.

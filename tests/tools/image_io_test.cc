@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "data_hash.h"
+#include "encoded_picture.h"
 #include "frame_files.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
@@ -21,12 +22,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-
-std::string Encoded(const cv::Mat& picture, const std::string& extension) {
-  std::vector<unsigned char> bytes;
-  cv::imencode(extension, picture, bytes);
-  return {bytes.begin(), bytes.end()};
-}
 
 std::string MessageOf(const std::string& bytes) {
   try {

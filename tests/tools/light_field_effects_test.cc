@@ -21,14 +21,15 @@ using model::Effect;
 using model::EffectSet;
 using ::testing::HasSubstr;
 
-constexpr int kWidth = 60, kHeight = 40;
+constexpr int kSensorWidthPx = 60, kSensorHeightPx = 40;
 const EstimateOptions kUsual;
 
 // Thick, with a wide field where the pixels are large.
 model::Camera ThickCamera(double pixel_pitch_mm, double aperture_radius_mm = 4) {
   model::Camera camera;
   camera.lens = {12.5, 14, 6, aperture_radius_mm};
-  camera.sensor = {kWidth, kHeight, pixel_pitch_mm, {29.5, 19.5}, model::TransferCurve::Srgb()};
+  camera.sensor = {
+      kSensorWidthPx, kSensorHeightPx, pixel_pitch_mm, {29.5, 19.5}, model::TransferCurve::Srgb()};
   camera.calibration = model::CameraCalibration{};
   camera.calibration->image_distance_mm =
       model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
@@ -44,7 +45,7 @@ EstimateOptions Without(const std::string& names) {
   options.effects.without = names;
   return options;
 }
-std::string ErrorOf(const std::function<void()>& work) {
+std::string UsageErrorOf(const std::function<void()>& work) {
   try {
     work();
   } catch (const UsageError& error) {
@@ -84,8 +85,9 @@ TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
             (EffectSet{Effect::kDefocus, Effect::kApertureShape}));
   EstimateOptions tolerance;
   tolerance.effects.tolerance = "1gl";
-  EXPECT_THAT(ErrorOf([&] { Decided(tolerance, std::nullopt); }), HasSubstr("--effect-tolerance"));
-  EXPECT_THAT(ErrorOf([] { Decided(Without("falloff"), std::nullopt); }),
+  EXPECT_THAT(UsageErrorOf([&] { Decided(tolerance, std::nullopt); }),
+              HasSubstr("--effect-tolerance"));
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("falloff"), std::nullopt); }),
               HasSubstr("--without: effect falloff is not one of those there are here"));
 }
 
@@ -109,16 +111,17 @@ TEST(LightFieldEffectsTest, WhatIsLeftOutIsWithinTheToleranceThatIsTold) {
 }
 
 TEST(LightFieldEffectsTest, AnEstimateRefusesToLeaveOutWhatItIsAbout) {
-  EXPECT_THAT(ErrorOf([] { Decided(Without("defocus"), ThickCamera(0.2)); }),
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("defocus"), ThickCamera(0.2)); }),
               HasSubstr("compare --dibr"));
-  EXPECT_THAT(ErrorOf([] { Decided(Without("occlusion"), std::nullopt); }),
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("occlusion"), std::nullopt); }),
               HasSubstr("occlusion cannot be left out"));
-  EXPECT_THAT(ErrorOf([] { Decided(Without("shot-noise"), ThickCamera(0.2)); }),
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("shot-noise"), ThickCamera(0.2)); }),
               HasSubstr("--without: effect shot-noise is not one of"));
-  EXPECT_THAT(ErrorOf([] { Decided(Without("bokeh"), ThickCamera(0.2)); }), HasSubstr("\"bokeh\""));
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("bokeh"), ThickCamera(0.2)); }),
+              HasSubstr("\"bokeh\""));
   EstimateOptions options;
   options.effects.effects = "falloff";
-  EXPECT_THAT(ErrorOf([&] { Decided(options, ThickCamera(0.2)); }), HasSubstr("defocus"));
+  EXPECT_THAT(UsageErrorOf([&] { Decided(options, ThickCamera(0.2)); }), HasSubstr("defocus"));
 }
 
 // A uniform field, photographed by a camera and by its thin twin: the mean of cos cos^3 over the
@@ -129,7 +132,7 @@ TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
   EXPECT_NEAR(thin.focal_scale_px(), thick.focal_scale_px(), 1e-9);
   EXPECT_EQ(thin.lens.lens_thickness_mm, 0);
   const model::LightFieldGrid grid = model::DefaultGrid(thick, 5, 5);
-  model::LightField field = model::MakeLightField(kWidth, kHeight, 5, 5, 1);
+  model::LightField field = model::MakeLightField(kSensorWidthPx, kSensorHeightPx, 5, 5, 1);
   std::fill(field.values.begin(), field.values.end(), 0.5F);
   field.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 5, 5);
   field.grid = grid;
@@ -164,7 +167,7 @@ TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
 }
 
 TEST(LightFieldEffectsTest, APhotographTakesWhatMatters) {
-  model::LightField field = model::MakeLightField(kWidth, kHeight, 3, 3, 1);
+  model::LightField field = model::MakeLightField(kSensorWidthPx, kSensorHeightPx, 3, 3, 1);
   const EffectSet kept = {Effect::kDefocus, Effect::kApertureShape};
   EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on, kept);
   field.camera = ThickCamera(0.2);
@@ -175,7 +178,7 @@ TEST(LightFieldEffectsTest, APhotographTakesWhatMatters) {
   EffectOptions vignetting;
   vignetting.effects = "vignetting";
   field.grid = model::DefaultGrid(*field.camera, 3, 3);
-  EXPECT_THAT(ErrorOf([&] { DecidePhotographEffects(vignetting, field); }),
+  EXPECT_THAT(UsageErrorOf([&] { DecidePhotographEffects(vignetting, field); }),
               HasSubstr("vignetting"));
   field.camera = ThickCamera(0.01);
   field.grid = model::GridOnPlanes(*field.camera, {20, 780}, 3, 3);
@@ -187,7 +190,8 @@ TEST(LightFieldEffectsTest, APhotographTakesWhatMatters) {
   EXPECT_TRUE(DecidePhotographEffects(none, field).on.empty());
   EffectOptions noise;
   noise.without = "read-noise";
-  EXPECT_THAT(ErrorOf([&] { DecidePhotographEffects(noise, field); }), HasSubstr("read-noise"));
+  EXPECT_THAT(UsageErrorOf([&] { DecidePhotographEffects(noise, field); }),
+              HasSubstr("read-noise"));
 }
 
 }  // namespace

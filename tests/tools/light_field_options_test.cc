@@ -23,8 +23,8 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using thicklens::testing::ErrorOf;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr int kWidth = 3, kHeight = 2;
+constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
+constexpr int kMapWidth = 3, kMapHeight = 2;
 
 // What a UsageError says; another Error, or none, fails the test.
 template <typename Call>
@@ -44,7 +44,7 @@ model::Camera SmallCamera() {
   model::Camera camera;
   camera.name = "small";
   camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kWidth, kHeight, 0.006, {1, 0.5}, model::TransferCurve::Srgb()};
+  camera.sensor = {kMapWidth, kMapHeight, 0.006, {1, 0.5}, model::TransferCurve::Srgb()};
   camera.calibration = model::CameraCalibration{};
   camera.calibration->image_distance_mm = model::Estimate{15.94, 0};
   camera.calibration->blur_ratio = model::Estimate{0.45, 0};
@@ -52,12 +52,13 @@ model::Camera SmallCamera() {
 }
 
 model::RawDepthMap MapOf(std::vector<float> values) {
-  return {kWidth, kHeight, std::move(values), false};
+  return {kMapWidth, kMapHeight, std::move(values), false};
 }
 
 // Tells nothing about surfaces.
-model::LinearPicture GreyPicture(int width_px = kWidth) {
-  return {width_px, kHeight, 1, std::vector<float>(static_cast<std::size_t>(width_px * kHeight))};
+model::LinearPicture GreyPicture(int width_px = kMapWidth) {
+  return {width_px, kMapHeight, 1,
+          std::vector<float>(static_cast<std::size_t>(width_px * kMapHeight))};
 }
 
 DepthOptions KindAndUnit(const std::string& kind, const std::string& unit) {
@@ -130,7 +131,7 @@ TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
   options.disparity_scale = 2;
   options.disparity_offset_px = -1;
   // Around the hole 1 and 0 on the left, 3, -2 and .25 elsewhere: each a surface of its own.
-  const PreparedDepth prepared = PrepareDepth(MapOf({1, kNan, 3, 0, -2, 0.25F}), "d.pfm", options,
+  const PreparedDepth prepared = PrepareDepth(MapOf({1, kHole, 3, 0, -2, 0.25F}), "d.pfm", options,
                                               GreyPicture(), nullptr, nullptr);
   EXPECT_THAT(prepared.disparity.disparity, ElementsAre(1, -5, 5, -1, -5, -0.5F));
   EXPECT_EQ(prepared.disparity.step, Eigen::Vector2d(1, 1));
@@ -149,7 +150,7 @@ TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
 TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
   const model::Camera camera = SmallCamera();
   const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
-  const model::RawDepthMap holes = MapOf(std::vector<float>(6, kNan));
+  const model::RawDepthMap holes = MapOf(std::vector<float>(6, kHole));
   for (const model::Camera* used : {static_cast<const model::Camera*>(nullptr), &camera}) {
     const auto message = [&](const model::RawDepthMap& map, int width_px) {
       return ErrorOf([&] {
@@ -157,7 +158,7 @@ TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
                      &grid);
       });
     };
-    EXPECT_THAT(message(holes, kWidth), AllOf(StartsWith("d.pfm: "), HasSubstr("hole")));
+    EXPECT_THAT(message(holes, kMapWidth), AllOf(StartsWith("d.pfm: "), HasSubstr("hole")));
     EXPECT_THAT(message(MapOf(std::vector<float>(6, 0)), 7),
                 AllOf(StartsWith("d.pfm: "), HasSubstr("3x2"), HasSubstr("7x2")));
   }

@@ -37,11 +37,11 @@ using ::testing::StartsWith;
 using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 
-constexpr int kS = 40, kT = 24;
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr int kAcrossPx = 40, kDownPx = 24;
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 model::LightField Relative(int u_count, int v_count, unsigned seed = 1) {
-  model::LightField light_field = model::MakeLightField(kS, kT, u_count, v_count, 3);
+  model::LightField light_field = model::MakeLightField(kAcrossPx, kDownPx, u_count, v_count, 3);
   std::mt19937 generator(seed);
   std::uniform_real_distribution<float> any(0, 1);
   for (float& value : light_field.values) value = any(generator);
@@ -52,7 +52,7 @@ model::Camera Calibrated() {
   model::Camera camera;
   camera.name = "bench-camera";
   camera.lens = {12.5, 12.8, 3.0, 4.46};
-  camera.sensor = {kS, kT, 0.006, {19.5, 11.5}, model::TransferCurve::Srgb()};
+  camera.sensor = {kAcrossPx, kDownPx, 0.006, {19.5, 11.5}, model::TransferCurve::Srgb()};
   camera.calibration = model::CameraCalibration{};
   camera.calibration->image_distance_mm = model::Estimate{16.2158, 0.0012};
   camera.calibration->blur_ratio = model::Estimate{0.4512, 0.0021};
@@ -62,7 +62,7 @@ model::Camera Calibrated() {
   return camera;
 }
 
-model::LightField WithCamera(int u_count, int v_count, unsigned seed = 1) {
+model::LightField SeenByCamera(int u_count, int v_count, unsigned seed = 1) {
   model::LightField light_field = Relative(u_count, v_count, seed);
   light_field.camera = Calibrated();
   light_field.grid = model::DefaultGrid(*light_field.camera, u_count, v_count);
@@ -90,8 +90,8 @@ EstimateRecord Estimate() {
   EstimateRecord record;
   record.solver = "blocks";
   record.u_count = record.v_count = 3;
-  record.s_count = kS;
-  record.t_count = kT;
+  record.s_count = kAcrossPx;
+  record.t_count = kDownPx;
   record.block_solver = "umfpack";
   record.stencil = "warp";
   record.gamma = 1.25;
@@ -113,9 +113,9 @@ EstimateRecord Estimate() {
 
 estimator::SceneMaps Maps() {
   estimator::SceneMaps maps;
-  maps.residual.assign(kS * kT, 0.0F);
-  maps.hidden_share.assign(kS * kT, 0.0F);
-  maps.blur_sigma_px.assign(kS * kT, 0.0F);
+  maps.residual.assign(kAcrossPx * kDownPx, 0.0F);
+  maps.hidden_share.assign(kAcrossPx * kDownPx, 0.0F);
+  maps.blur_sigma_px.assign(kAcrossPx * kDownPx, 0.0F);
   return maps;
 }
 
@@ -163,10 +163,11 @@ class LightFieldPageTest : public ::testing::Test {
   }
   // 300 to 600 mm from left to right, one column without depth.
   void GiveDepth() {
-    input_.depth = PageDepth{kS, kT, {}, true};
-    for (int i = 0; i < kS * kT; ++i) {
+    input_.depth = PageDepth{kAcrossPx, kDownPx, {}, true};
+    for (int i = 0; i < kAcrossPx * kDownPx; ++i) {
       input_.depth->values.push_back(
-          i % kS == 7 ? kNan : 300 + 300.0F * static_cast<float>(i % kS) / (kS - 1));
+          i % kAcrossPx == 7 ? kUnknown
+                             : 300 + 300.0F * static_cast<float>(i % kAcrossPx) / (kAcrossPx - 1));
     }
   }
 
@@ -177,8 +178,8 @@ class LightFieldPageTest : public ::testing::Test {
   }
   std::string Html() const { return WithoutPictures(Page().html); }
 
-  model::LightField light_field_ = WithCamera(3, 3, 1);
-  model::LightField truth_ = WithCamera(3, 3, 2);
+  model::LightField light_field_ = SeenByCamera(3, 3, 1);
+  model::LightField truth_ = SeenByCamera(3, 3, 2);
   LightFieldPageInput input_;
 };
 
@@ -447,7 +448,8 @@ TEST_F(LightFieldPageTest, PicturesShowTheLightField) {
   GiveAll();
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
   const auto level = [&](const model::LightField& light_field, int k, int l, int s, int t, int c) {
-    const std::size_t at = light_field.ViewStart(c, k, l) + static_cast<std::size_t>(t * kS + s);
+    const std::size_t at =
+        light_field.ViewStart(c, k, l) + static_cast<std::size_t>(t * kAcrossPx + s);
     return std::lround(255 * srgb.Encode(light_field.values[at]));
   };
   const XmlDocument document = ParseXml(Page().html);
@@ -458,7 +460,7 @@ TEST_F(LightFieldPageTest, PicturesShowTheLightField) {
   ASSERT_NE(times, std::string::npos);
   const int gain = std::stoi(html.substr(times + std::string("difference × ").size()));
   const cv::Mat difference = PictureOf(document, fmt::format("difference × {}, u 2, v 1", gain));
-  ASSERT_EQ(estimate.size(), cv::Size(kS, kT));
+  ASSERT_EQ(estimate.size(), cv::Size(kAcrossPx, kDownPx));
   for (const auto& [s, t] : {std::pair{0, 0}, std::pair{33, 5}, std::pair{7, 23}}) {
     for (int c = 0; c < 3; ++c) {
       const long a = level(light_field_, 2, 1, s, t, c), b = level(truth_, 2, 1, s, t, c);
@@ -493,8 +495,10 @@ TEST_F(LightFieldPageTest, RefocusesFromNearToFar) {
 TEST_F(LightFieldPageTest, RefocusesToDisparitiesWithoutACamera) {
   const model::LightField relative = Relative(3, 3);
   input_.light_field = &relative;
-  input_.depth = PageDepth{kS, kT, std::vector<float>(kS * kT, -1.5F), false};
-  for (int i = 0; i < kS * kT / 2; ++i) input_.depth->values[static_cast<std::size_t>(i)] = 1.5F;
+  input_.depth =
+      PageDepth{kAcrossPx, kDownPx, std::vector<float>(kAcrossPx * kDownPx, -1.5F), false};
+  for (int i = 0; i < kAcrossPx * kDownPx / 2; ++i)
+    input_.depth->values[static_cast<std::size_t>(i)] = 1.5F;
   const std::string html = Html();
   for (const char* label : {"+1.50 px<", "+0.75 px<", "+0.00 px<", "−0.75 px<", "−1.50 px<"})
     EXPECT_THAT(html, HasSubstr(label));
@@ -508,7 +512,7 @@ TEST_F(LightFieldPageTest, RefocusesToDisparitiesWithoutACamera) {
   double light = 0;
   for (int l = 0; l < 3; ++l)
     for (int k = 0; k < 3; ++k)
-      light += relative.values[relative.ViewStart(0, k, l) + 5 * kS + 6] / 9.0;
+      light += relative.values[relative.ViewStart(0, k, l) + 5 * kAcrossPx + 6] / 9.0;
   EXPECT_NEAR(mean.ptr<unsigned char>(5)[3 * 6], 255 * model::TransferCurve::Srgb().Encode(light),
               0.6);
 }
@@ -520,12 +524,12 @@ TEST_F(LightFieldPageTest, DepthsAreColouredAndHolesCounted) {
   EXPECT_THAT(html, HasSubstr("Hatched in grey: 24 px (2.5 %)"));
   const cv::Mat map = PictureOf(ParseXml(Page().html), "Depth map in colours");
   const auto* row = map.ptr<unsigned char>(3);
-  EXPECT_GT(row[1], 200);                 // the nearest is yellow
-  EXPECT_LT(row[3 * (kS - 1) + 1], 20);   // the farthest dark
-  EXPECT_EQ(row[3 * 7], row[3 * 7 + 2]);  // the hole grey
-  input_.depth->values.assign(kS * kT, 400.0F);
+  EXPECT_GT(row[1], 200);                       // the nearest is yellow
+  EXPECT_LT(row[3 * (kAcrossPx - 1) + 1], 20);  // the farthest dark
+  EXPECT_EQ(row[3 * 7], row[3 * 7 + 2]);        // the hole grey
+  input_.depth->values.assign(kAcrossPx * kDownPx, 400.0F);
   EXPECT_THAT(Html(), AllOf(HasSubstr("Refocused to 400 mm"), Not(HasSubstr("Hatched"))));
-  input_.depth->values.assign(kS * kT, kNan);
+  input_.depth->values.assign(kAcrossPx * kDownPx, kUnknown);
   EXPECT_THAT(Html(), AllOf(HasSubstr("100.0 %"), Not(HasSubstr("Refocused"))));
 }
 
@@ -540,7 +544,7 @@ TEST_F(LightFieldPageTest, TheResidualIsSigned) {
   maps.residual[1] = -1;
   maps.residual[2] = -5.0F / 255;
   const cv::Mat map = PictureOf(ParseXml(Page().html), "Residual of the photograph");
-  ASSERT_EQ(map.size(), cv::Size(kS, kT));
+  ASSERT_EQ(map.size(), cv::Size(kAcrossPx, kDownPx));
   const auto* row = map.ptr<unsigned char>(0);
   const int step = map.channels();
   EXPECT_EQ(row[0], 255);
@@ -562,7 +566,7 @@ TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
   input_.maps = &maps;
   // Rows: 12 of 24 seen, 6 blurred, 3 partly seen, 3 filled in (of these one blurred as well).
   for (std::size_t i = 0; i < maps.hidden_share.size(); ++i) {
-    const std::size_t y = i / kS;
+    const std::size_t y = i / kAcrossPx;
     maps.blur_sigma_px[i] = y < 6 || y == 23 ? 3.5F : 2.5F;
     maps.hidden_share[i] = y >= 21 ? 0.75F : y >= 18 ? 0.25F : 0.005F;
   }
@@ -572,7 +576,7 @@ TEST_F(LightFieldPageTest, TheConfidenceHasItsShares) {
                           HasSubstr("for fine detail (25.0 %)"),
                           HasSubstr("most rays come past an edge or the border (12.5 %)")));
   const cv::Mat map = PictureOf(ParseXml(Page().html), "Confidence of the estimate");
-  ASSERT_EQ(map.size(), cv::Size(kS, kT));
+  ASSERT_EQ(map.size(), cv::Size(kAcrossPx, kDownPx));
   const auto at = [&](int y, int c) {
     return static_cast<int>(map.ptr<unsigned char>(y)[3 * 5 + c]);
   };
@@ -589,12 +593,12 @@ TEST_F(LightFieldPageTest, TheMosaicHasEachViewInItsPlace) {
   const XmlDocument document = ParseXml(Page().html);
   const cv::Mat mosaic = PictureOf(document, "Mosaic of the views");
   constexpr int kGap = 2;
-  ASSERT_EQ(mosaic.size(), cv::Size(3 * kS + 2 * kGap, 3 * kT + 2 * kGap));
+  ASSERT_EQ(mosaic.size(), cv::Size(3 * kAcrossPx + 2 * kGap, 3 * kDownPx + 2 * kGap));
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
-  const std::size_t sample = light_field_.ViewStart(1, 2, 1) + 7 * kS + 9;
-  EXPECT_EQ(mosaic.ptr<unsigned char>(kT + kGap + 7)[3 * (2 * (kS + kGap) + 9) + 1],
+  const std::size_t sample = light_field_.ViewStart(1, 2, 1) + 7 * kAcrossPx + 9;
+  EXPECT_EQ(mosaic.ptr<unsigned char>(kDownPx + kGap + 7)[3 * (2 * (kAcrossPx + kGap) + 9) + 1],
             std::lround(255 * srgb.Encode(light_field_.values[sample])));
-  EXPECT_EQ(mosaic.ptr<unsigned char>(kT)[3 * 9 + 1], 0);  // between the views
+  EXPECT_EQ(mosaic.ptr<unsigned char>(kDownPx)[3 * 9 + 1], 0);  // between the views
   EXPECT_THAT(Html(), Not(HasSubstr("alt=\"View u")));
   light_field_.present.assign(9, true);
   light_field_.present[0] = false;
@@ -676,7 +680,7 @@ class ReportProgram : public ::testing::Test {
     cv::imencode(".png", cv::Mat(height_px, width_px, CV_8UC(channels), cv::Scalar::all(100)), png);
     return folder_.Put("photo.png", {png.begin(), png.end()});
   }
-  std::string PutDepth(float value, int width_px = kS, int height_px = kT) {
+  std::string PutDepth(float value, int width_px = kAcrossPx, int height_px = kDownPx) {
     model::RawDepthMap map{width_px, height_px, {}, false};
     map.values.assign(static_cast<std::size_t>(width_px * height_px), value);
     for (int i = 0; i < width_px; ++i) map.values[static_cast<std::size_t>(i)] = value * 1.1F;
@@ -703,11 +707,11 @@ class ReportProgram : public ::testing::Test {
 };
 
 TEST_F(ReportProgram, WritesThePageAndItsSections) {
-  const std::string estimate = Write(WithCamera(3, 3, 1), "est");
-  const std::string truth = Write(WithCamera(3, 3, 2), "true");
+  const std::string estimate = Write(SeenByCamera(3, 3, 1), "est");
+  const std::string truth = Write(SeenByCamera(3, 3, 2), "true");
   const ProgramResult result =
-      Run({estimate, "--truth", truth, "--photo", PutPhoto(kS, kT, 4), "--depth", PutDepth(400),
-           "--depth-kind", "z", "--depth-unit", "mm", "--json", folder_ / "r.json"});
+      Run({estimate, "--truth", truth, "--photo", PutPhoto(kAcrossPx, kDownPx, 4), "--depth",
+           PutDepth(400), "--depth-kind", "z", "--depth-unit", "mm", "--json", folder_ / "r.json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.out, "");
   const nlohmann::json json = nlohmann::json::parse(ContentOf(folder_ / "r.json"));
@@ -725,11 +729,11 @@ TEST_F(ReportProgram, WritesThePageAndItsSections) {
 }
 
 TEST_F(ReportProgram, CropsAllAlikeButNotWhatIsCropped) {
-  const model::LightField whole = WithCamera(3, 3, 1);
+  const model::LightField whole = SeenByCamera(3, 3, 1);
   const std::string estimate = Write(model::CropViews(whole, {4, 2, 30, 20}), "est");
   const std::string truth = Write(whole, "true");
-  const ProgramResult result =
-      Run({estimate, "--truth", truth, "--photo", PutPhoto(kS, kT, 3), "--crop", "4,2,30,20"});
+  const ProgramResult result = Run({estimate, "--truth", truth, "--photo",
+                                    PutPhoto(kAcrossPx, kDownPx, 3), "--crop", "4,2,30,20"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   // The same views: the differences are grey everywhere.
   const XmlDocument document = ParseXml(ContentOf(page_));
@@ -747,7 +751,7 @@ TEST_F(ReportProgram, TakesTheInnerViewsOfALargerTruth) {
 }
 
 TEST_F(ReportProgram, ShowsTheSweepAroundTheFocus) {
-  const model::LightField light_field = WithCamera(3, 3);
+  const model::LightField light_field = SeenByCamera(3, 3);
   const double focus_mm = light_field.camera->focus_depth_mm();
   std::string rows;
   for (int i = 0; i < 21; ++i) {
@@ -779,20 +783,21 @@ TEST_F(ReportProgram, ShowsTheSweepAroundTheFocus) {
 }
 
 TEST_F(ReportProgram, RefusesFilesThatDoNotFit) {
-  const std::string estimate = Write(WithCamera(3, 3), "est");
+  const std::string estimate = Write(SeenByCamera(3, 3), "est");
   ExpectRefused({folder_ / "missing"}, {folder_ / "missing"});
-  ExpectRefused({estimate, "--photo", PutPhoto(kS, kT - 1, 3)},
+  ExpectRefused({estimate, "--photo", PutPhoto(kAcrossPx, kDownPx - 1, 3)},
                 {"photo.png: it is 40x23 px, the views are 40x24 px"});
   ExpectRefused({estimate, "--photo", folder_.Put("p.png", "no picture")}, {"p.png: cannot be"});
-  ExpectRefused({estimate, "--photo", PutPhoto(kS, kT, 3), "--crop", "30,0,20,20"}, {"30"});
-  ExpectRefused(
-      {estimate, "--depth", PutDepth(400, kS + 1, kT), "--depth-kind", "z", "--depth-unit", "mm"},
-      {"depth.pfm: it is 41x24 px"});
+  ExpectRefused({estimate, "--photo", PutPhoto(kAcrossPx, kDownPx, 3), "--crop", "30,0,20,20"},
+                {"30"});
+  ExpectRefused({estimate, "--depth", PutDepth(400, kAcrossPx + 1, kDownPx), "--depth-kind", "z",
+                 "--depth-unit", "mm"},
+                {"depth.pfm: it is 41x24 px"});
   ExpectRefused({estimate, "--depth", PutDepth(0), "--depth-kind", "z", "--depth-unit", "mm"},
                 {"depth.pfm"});
   ExpectRefused({estimate, "--depth", PutDepth(400), "--depth-kind", "z", "--depth-unit", "m"},
                 {"depth.pfm"});
-  ExpectRefused({estimate, "--truth", Write(WithCamera(5, 5), "true")},
+  ExpectRefused({estimate, "--truth", Write(SeenByCamera(5, 5), "true")},
                 {"true: its views are", "mm apart"});
   ExpectRefused({estimate, "--truth", Write(Relative(2, 3), "true")}, {"true: "});
   ExpectRefused({estimate, "--sweep", folder_ / "nowhere"}, {"nowhere"});

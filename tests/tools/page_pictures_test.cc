@@ -19,7 +19,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 
 std::vector<int> Pixel(const cv::Mat& picture, int x, int y) {
   std::vector<int> values;
@@ -65,7 +65,7 @@ TEST(PagePictures, TheMapBecomesLighterEvenly) {
 }
 
 TEST(PagePictures, MapsValuesAndHatchesHoles) {
-  const std::vector<float> values = {1, 2, 3, kNan, kNan, kNan};
+  const std::vector<float> values = {1, 2, 3, kMissing, kMissing, kMissing};
   const cv::Mat near_dark = ColourMapped(values, 3, 2, {1, 3, false}, 100);
   EXPECT_THAT(Pixel(near_dark, 0, 0), ElementsAre(68, 1, 84));
   EXPECT_THAT(Pixel(near_dark, 1, 0), ElementsAre(33, 144, 141));
@@ -101,7 +101,7 @@ TEST(PagePictures, ShrinksInLinearLight) {
 }
 
 TEST(PagePictures, KeepsWhatLeavesTheRangeInside) {
-  const cv::Mat shown = ShownPicture({4, 1, 1, {-0.5F, 1.5F, kNan, 0.5F}}, 10);
+  const cv::Mat shown = ShownPicture({4, 1, 1, {-0.5F, 1.5F, kMissing, 0.5F}}, 10);
   EXPECT_THAT(Pixel(shown, 0, 0), ElementsAre(0));
   EXPECT_THAT(Pixel(shown, 1, 0), ElementsAre(255));
   EXPECT_THAT(Pixel(shown, 3, 0), ElementsAre(188));

@@ -5,10 +5,12 @@
 
 #include <cmath>
 
+#include "support/special_numbers.h"
+
 namespace thicklens::tools {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+using thicklens::testing::kPi;
 
 // A product of waves with a period of 16 px, moved to the right and down.
 estimator::StoredValues Waves(double right_px, double down_px) {

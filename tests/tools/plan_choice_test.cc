@@ -30,7 +30,7 @@ using ::testing::Not;
 using ::testing::StartsWith;
 using thicklens::testing::TemporaryFolder;
 
-constexpr PictureLoad kLoad{1, 1, 25, 1};
+constexpr PictureLoad kLoad{1, 1, 25, 1, 0};
 
 PlanProfile ProfileOf(const std::string& prior, double seconds, double psnr_db) {
   PlanProfile plan;
@@ -52,7 +52,7 @@ EstimateProfile SomeProfile() {
   profile.build = "a build";
   profile.probe_seconds = 0.1;
   profile.warping_psnr_db = 30;
-  profile.largest = {1, 3, 81, 3};
+  profile.largest = {1, 3, 81, 3, 0};
   profile.plans = {ProfileOf("ridge", 1, 34.9), ProfileOf("gradient", 2, 35.5),
                    ProfileOf("tv", 4, 39.2), ProfileOf("patches", 8, 40)};
   return profile;
@@ -185,6 +185,20 @@ TEST(Profile, IsLookedForWhereAPersonsSettingsAre) {
   EXPECT_FALSE(ProfileFor("").is_own);
 }
 
+// Files are timed here, all else there.
+TEST(ChoosePlan, TakesTheTimeOfFilesAsItIsHere) {
+  EstimateProfile profile = SomeProfile();
+  for (PlanProfile& plan : profile.plans) {
+    TimeLaw::Terms terms = plan.law.coefficients();
+    terms[7] = 0.5;
+    plan.law = TimeLaw(terms);
+  }
+  PictureLoad load = kLoad;
+  load.file_seconds = 6;
+  EXPECT_DOUBLE_EQ(ChoosePlan(profile, Quality("best"), load, 1).expected_seconds, 8 + 3);
+  EXPECT_DOUBLE_EQ(ChoosePlan(profile, Quality("best"), load, 4).expected_seconds, 32 + 3);
+}
+
 TEST(Profile, IsOfThisMachineIfAllOfItIs) {
   EstimateProfile profile = SomeProfile();
   profile.processor = ProcessorName();
@@ -286,7 +300,7 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
     return refusal(changed);
   };
   EXPECT_THAT(refusal("text"), HasSubstr("profile.json: is no JSON object"));
-  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/1'"));
+  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/2'"));
   EXPECT_THAT(with("/threads", 0), HasSubstr("threads: a number of at least 1"));
   EXPECT_THAT(with("/plans", json::array()), HasSubstr("at least one plan"));
   EXPECT_THAT(with("/plans/1/seconds", {1, 2}), HasSubstr("plans[1]: seconds: "));

@@ -39,14 +39,14 @@ using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
-constexpr int kS = 40, kT = 30;
+constexpr int kRenderedS = 40, kRenderedT = 30;
 
 // A wide-angle camera, so that fall-off shows.
 model::Camera WideCamera() {
   model::Camera camera;
   camera.name = "wide";
   camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kS, kT, 0.3, {19.5, 14.5}, model::TransferCurve::Srgb()};
+  camera.sensor = {kRenderedS, kRenderedT, 0.3, {19.5, 14.5}, model::TransferCurve::Srgb()};
   camera.calibration = model::CameraCalibration{};
   camera.calibration->image_distance_mm = model::Estimate{15.94, 0};
   camera.calibration->blur_ratio = model::Estimate{0.45, 0};
@@ -55,7 +55,8 @@ model::Camera WideCamera() {
 }
 
 model::LightField AtRandom(int u_count, int v_count, unsigned seed) {
-  model::LightField light_field = model::MakeLightField(kS, kT, u_count, v_count, 3);
+  model::LightField light_field =
+      model::MakeLightField(kRenderedS, kRenderedT, u_count, v_count, 3);
   std::mt19937 generator(seed);
   std::uniform_real_distribution<float> any(0, 1);
   for (float& value : light_field.values) value = any(generator);
@@ -104,7 +105,7 @@ class RenderTest : public ::testing::Test {
 // The plain formula: the weighted mean of the views in linear light, stored and rounded.
 model::StoredPicture MeanOfViews(const model::LightField& light_field,
                                  const Eigen::ArrayXXd& weights, int bits) {
-  model::StoredPicture stored{kS, kT, 3, bits, {}};
+  model::StoredPicture stored{kRenderedS, kRenderedT, 3, bits, {}};
   for (std::size_t pixel = 0; pixel < light_field.view_size(); ++pixel) {
     for (int channel = 0; channel < 3; ++channel) {
       double light = 0;
@@ -222,7 +223,7 @@ TEST_F(RenderTest, TellsWhatItRendersAndWhatIsClipped) {
   EXPECT_EQ(json["status"], "ok");
   EXPECT_EQ(json["rendered"], "view");
   EXPECT_DOUBLE_EQ(json["clipped_fraction"], 0.025);
-  EXPECT_EQ(json["width_px"], kS);
+  EXPECT_EQ(json["width_px"], kRenderedS);
   EXPECT_EQ(json["bits"], 8);
   EXPECT_EQ(json["views"], (std::vector<int>{1, 1}));
   EXPECT_THAT(Run({folder, "--view", "0,0", "-o", folder_ / "v.png", "--quiet"}).out, IsEmpty());
@@ -243,7 +244,7 @@ TEST_F(RenderTest, AViewIsThatView) {
 
 // Views of a flat scene of disparity 2: refocused there it is sharp, elsewhere it is not.
 model::LightField FlatScene(int disparity_px) {
-  model::LightField light_field = model::MakeLightField(kS, kT, 3, 3, 3);
+  model::LightField light_field = model::MakeLightField(kRenderedS, kRenderedT, 3, 3, 3);
   std::mt19937 generator(5);
   std::uniform_real_distribution<float> any(0, 1);
   std::vector<float> texture(100 * 100);
@@ -251,12 +252,12 @@ model::LightField FlatScene(int disparity_px) {
   for (int c = 0; c < 3; ++c) {
     for (int l = 0; l < 3; ++l) {
       for (int k = 0; k < 3; ++k) {
-        for (int t = 0; t < kT; ++t) {
-          for (int s = 0; s < kS; ++s) {
+        for (int t = 0; t < kRenderedT; ++t) {
+          for (int s = 0; s < kRenderedS; ++s) {
             const int x = s + (k - 1) * disparity_px + 20;
             const int y = t + (l - 1) * disparity_px + 20;
-            light_field
-                .values[light_field.ViewStart(c, k, l) + static_cast<std::size_t>(t * kS + s)] =
+            light_field.values[light_field.ViewStart(c, k, l) +
+                               static_cast<std::size_t>(t * kRenderedS + s)] =
                 texture[static_cast<std::size_t>(y * 100 + x)];
           }
         }
@@ -269,9 +270,9 @@ model::LightField FlatScene(int disparity_px) {
 double RmsInside(const model::StoredPicture& a, const model::StoredPicture& b) {
   double squares = 0;
   int count = 0;
-  for (int y = 6; y < kT - 6; ++y) {
-    for (int x = 6; x < kS - 6; ++x) {
-      const auto i = static_cast<std::size_t>((y * kS + x) * 3);
+  for (int y = 6; y < kRenderedT - 6; ++y) {
+    for (int x = 6; x < kRenderedS - 6; ++x) {
+      const auto i = static_cast<std::size_t>((y * kRenderedS + x) * 3);
       squares += std::pow(a.values[i] - b.values[i], 2);
       ++count;
     }
@@ -327,7 +328,7 @@ TEST_F(RenderTest, BothWaysToFocusAgreeWhereTheStepsDiffer) {
 }
 
 TEST_F(RenderTest, FallOffIsOnWithACameraAndCanBeLeftOut) {
-  model::LightField light_field = model::MakeLightField(kS, kT, 3, 3, 3);
+  model::LightField light_field = model::MakeLightField(kRenderedS, kRenderedT, 3, 3, 3);
   std::fill(light_field.values.begin(), light_field.values.end(), 0.5F);
   light_field.camera = WideCamera();
   light_field.grid = model::DefaultGrid(*light_field.camera, 3, 3);
@@ -340,7 +341,7 @@ TEST_F(RenderTest, FallOffIsOnWithACameraAndCanBeLeftOut) {
   const auto with = stored({});
   const auto without = stored({"--without", "falloff"});
   ASSERT_EQ(with.size(), without.size());
-  const std::size_t centre = (15 * kS + 20) * 3;
+  const std::size_t centre = (15 * kRenderedS + 20) * 3;
   EXPECT_EQ(*std::min_element(without.begin(), without.end()),
             *std::max_element(without.begin(), without.end()));
   EXPECT_NEAR(with[centre], without[centre], 0.02 * without[centre]);
@@ -380,12 +381,12 @@ TEST_F(RenderTest, VignettingIsOnWithUvOffTheAperture) {
 TEST_F(RenderTest, TheMosaicAndTheEpipolarPicturesHaveTheirSizes) {
   const std::string folder = Write("lf", AtRandom(3, 5, 6));
   const model::StoredPicture mosaic = Rendered({folder, "--mosaic"});
-  EXPECT_GE(mosaic.width_px, 3 * kS);
-  EXPECT_LT(mosaic.width_px, 4 * kS);
-  EXPECT_GE(mosaic.height_px, 5 * kT);
-  EXPECT_LT(mosaic.height_px, 6 * kT);
-  EXPECT_EQ(Rendered({folder, "--epi"}).width_px, kS);
-  EXPECT_EQ(Rendered({folder, "--epi", "column=39"}).height_px, kT);
+  EXPECT_GE(mosaic.width_px, 3 * kRenderedS);
+  EXPECT_LT(mosaic.width_px, 4 * kRenderedS);
+  EXPECT_GE(mosaic.height_px, 5 * kRenderedT);
+  EXPECT_LT(mosaic.height_px, 6 * kRenderedT);
+  EXPECT_EQ(Rendered({folder, "--epi"}).width_px, kRenderedS);
+  EXPECT_EQ(Rendered({folder, "--epi", "column=39"}).height_px, kRenderedT);
   EXPECT_EQ(Rendered({folder, "--epi"}).values, Rendered({folder, "--epi", "row=15,v=2"}).values);
   EXPECT_NE(Rendered({folder, "--epi"}).values, Rendered({folder, "--epi", "row=15,v=4"}).values);
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "support/special_numbers.h"
 #include "xml_elements.h"
 
 namespace thicklens::tools {
@@ -17,7 +18,7 @@ using ::testing::DoubleNear;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using thicklens::testing::kNan;
 
 Plot PlotOf(std::vector<double> x, std::vector<double> y) {
   Plot plot;

@@ -16,6 +16,7 @@
 #include "child_process.h"
 #include "image_io.h"
 #include "png_check.h"
+#include "support/special_numbers.h"
 #include "support/temporary_folder.h"
 #include "target_drawing.h"
 #include "target_page.h"
@@ -34,8 +35,8 @@ using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
 
 constexpr double kMmPerInch = 25.4;
-constexpr double kPi = 3.14159265358979323846;
-constexpr SheetSize kA4 = {210, 297, true};
+using thicklens::testing::kPi;
+constexpr SheetSize kSheet = {210, 297, true};
 
 // Half an A4 sheet: quick, and with all that a whole one has.
 TargetRequest SmallRequest() {
@@ -328,7 +329,7 @@ Peaks PeaksBeyond(const cv::Mat& correlation, int from_px, int reach_px) {
 
 TEST(TargetPng, RepeatsNothing) {
   TargetRequest request;
-  request.sheet = kA4;
+  request.sheet = kSheet;
   const Drawn drawn = Draw(request, 127);  // 5 px a mm
   Rectangle above = drawn.page.pattern;    // of the patch
   above.height = drawn.page.patch.y - above.y - 1;

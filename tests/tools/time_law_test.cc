@@ -18,22 +18,24 @@ namespace {
 
 using ::testing::DoubleNear;
 using ::testing::Each;
+using ::testing::ElementsAre;
 
 std::vector<PictureLoad> Loads(int count, unsigned seed) {
   std::mt19937 engine(seed);
-  std::uniform_real_distribution<double> megapixels(0.01, 0.3), blur(0.3, 3);
+  std::uniform_real_distribution<double> megapixels(0.01, 0.3), blur(0.3, 3), files(0, 1);
   std::uniform_int_distribution<int> across(1, 4), colour(0, 1);
   std::vector<PictureLoad> loads;
   for (int i = 0; i < count; ++i) {
     const int views = 2 * across(engine) + 1;
-    loads.push_back({megapixels(engine), colour(engine) == 1 ? 3 : 1, views * views, blur(engine)});
+    loads.push_back({megapixels(engine), colour(engine) == 1 ? 3 : 1, views * views, blur(engine),
+                     files(engine)});
   }
   return loads;
 }
 
 std::vector<TimedLoad> Timed(const TimeLaw& law, const std::vector<PictureLoad>& loads) {
   std::vector<TimedLoad> timed;
-  for (const PictureLoad& load : loads) timed.push_back({load, law.Seconds(load)});
+  for (const PictureLoad& load : loads) timed.push_back({load, law.Seconds(load), 0});
   return timed;
 }
 
@@ -47,9 +49,9 @@ TimeLaw SomeLaw() {
 
 TEST(TimeLaw, IsFoundAgainFromExactTimes) {
   const TimeLaw law = SomeLaw();
-  const TimeLaw found = FitTimeLaw(Timed(law, Loads(30, 1)));
+  const TimeLaw found = FitTimeLaws({Timed(law, Loads(30, 1))}).front();
   EXPECT_LT((found.coefficients() - law.coefficients()).cwiseAbs().maxCoeff(), 1e-6);
-  EXPECT_THAT(LeftOutRatios(Timed(law, Loads(20, 2))), Each(DoubleNear(1, 1e-6)));
+  EXPECT_THAT(LeftOutRatios({Timed(law, Loads(20, 2))}), ElementsAre(Each(DoubleNear(1, 1e-6))));
 }
 
 // The oracle: no law without negative terms near it has a smaller error.
@@ -65,7 +67,7 @@ TEST(TimeLaw, IsTheBestWithoutNegativeTerms) {
     }
     return sum;
   };
-  const TimeLaw found = FitTimeLaw(timed);
+  const TimeLaw found = FitTimeLaws({timed}).front();
   EXPECT_GE(found.coefficients().minCoeff(), 0);
   EXPECT_EQ(found.coefficients().minCoeff(), 0);  // a plain fit would go below
   std::normal_distribution<double> step(0, 1);
@@ -79,11 +81,42 @@ TEST(TimeLaw, IsTheBestWithoutNegativeTerms) {
   }
 }
 
+// What plans have in common does not tell them apart, however noisy it is.
+TEST(TimeLaw, PlansDifferByWhatTheySolveAlone) {
+  const std::vector<PictureLoad> loads = Loads(15, 6);
+  const TimeLaw common = SomeLaw();
+  TimeLaw::Terms solve = TimeLaw::Terms::Zero();
+  solve[2] = 0.2;
+  std::mt19937 engine(7);
+  std::lognormal_distribution<double> noise(0, 0.3);
+  TimesOfPlans plans(2);
+  for (const PictureLoad& load : loads) {
+    for (const double factor : {1.0, 1.1}) {
+      const double own = factor * TimeLaw(solve).Seconds(load);
+      plans[factor == 1 ? 0 : 1].push_back({load, own + common.Seconds(load) * noise(engine), own});
+    }
+  }
+  const std::vector<TimeLaw> laws = FitTimeLaws(plans);
+  for (const PictureLoad& load : Loads(20, 8)) {
+    EXPECT_NEAR(laws[1].Seconds(load) - laws[0].Seconds(load), 0.1 * TimeLaw(solve).Seconds(load),
+                1e-9);
+  }
+  EXPECT_EQ(LeftOutRatios(plans).size(), 2U);
+  EXPECT_EQ(LeftOutRatios(plans)[1].size(), loads.size());
+}
+
 TEST(TimeLaw, RefusesWhatNoLawCanBeMadeFrom) {
-  EXPECT_THROW(FitTimeLaw({}), Error);
-  std::vector<TimedLoad> timed = Timed(SomeLaw(), Loads(3, 5));
+  EXPECT_THROW(FitTimeLaws({{}}), Error);
+  const std::vector<TimedLoad> good = Timed(SomeLaw(), Loads(3, 5));
+  EXPECT_THROW(FitTimeLaws({good, {good[0], good[1]}}), Error);
+  std::vector<TimedLoad> timed = good;
   timed[1].seconds = 0;
-  EXPECT_THROW(FitTimeLaw(timed), Error);
+  EXPECT_THROW(FitTimeLaws({timed}), Error);
+  timed = good;
+  timed[1].solve_seconds = 2 * timed[1].seconds;
+  EXPECT_THROW(FitTimeLaws({timed}), Error);
+  timed[1].solve_seconds = -1;
+  EXPECT_THROW(FitTimeLaws({good, timed}), Error);
 }
 
 // A picture of which each point is seen at the same disparity.
@@ -104,6 +137,8 @@ TEST(PictureLoad, HasTheBlurOfEqualViews) {
   EXPECT_EQ(load.views, 25);
   // The variance of five equal places is two.
   EXPECT_NEAR(load.blur_sigma_px, 0.8 * std::sqrt(2.0), 1e-6);
+  // Made of 40 x 30 x 3 x 25 values.
+  EXPECT_GT(load.file_seconds, 1e-9 * 40 * 30 * 3 * 25);
   // Along one axis alone, half of it in the mean of both.
   EXPECT_NEAR(PictureLoadOf(Flat(5, 1, 0.8F)).blur_sigma_px, 0.8, 1e-6);
 }

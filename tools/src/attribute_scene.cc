@@ -1,10 +1,10 @@
 #include <algorithm>
-#include <chrono>
 #include <optional>
 #include <utility>
 
 #include "attribution.h"
 #include "memory_available.h"
+#include "stopwatch.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field_grid.h"
@@ -12,13 +12,8 @@
 namespace thicklens::tools {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using model::Effect;
 using model::EffectSet;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // A step of the run, which long computations keep telling.
 struct Step {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <opencv2/core/mat.hpp>
@@ -10,6 +9,7 @@
 
 #include "attribution.h"
 #include "simulated_sweep.h"
+#include "stopwatch.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
@@ -17,14 +17,8 @@
 namespace thicklens::tools {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Frames below that are held, larger sweeps are simulated again where they are looked at.
 constexpr double kMostHeldBytes = 1 << 30;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // What is made of each frame, held or made when it is asked for.
 template <typename Frame>

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "bench_accuracy.h"
 #include "bench_calibration.h"
+#include "bench_conditioning.h"
 #include "bench_gamma.h"
 #include "bench_inpainting.h"
 #include "bench_machine.h"
@@ -23,6 +23,7 @@
 #include "light_field_options.h"
 #include "option_values.h"
 #include "progress_line.h"
+#include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate.h"
@@ -31,8 +32,6 @@
 
 namespace thicklens::tools {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr int kSamplePx = 64;  // edge of the part that blocks are measured on
 
@@ -92,7 +91,7 @@ void Measure(const BenchOptions& options, int threads, std::vector<Contender>* c
       ThrowIfInterrupted();
       const Clock::time_point start = Clock::now();
       const model::LightField estimate = contender.way.estimate(contender.scene->input);
-      contender.seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
+      contender.seconds.push_back(SecondsSince(start));
       if (round == 0) contender.psnr_db = PsnrDb(*contender.scene, estimate, threads);
       progress.Show(++done, total);
     }
@@ -177,6 +176,7 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
   AddBenchAccuracyCommand(bench, action);
   AddBenchSourceCommand(bench, action);
   AddBenchGammaCommand(bench, action);
+  AddBenchConditioningCommand(bench, action);
   AddBenchInpaintingCommand(bench, action);
   AddBenchCalibrationCommand(bench, action);
   CLI::App* command = bench->add_subcommand(

@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -34,6 +33,7 @@
 #include "profile_measurement.h"
 #include "progress_line.h"
 #include "simulate_scene.h"
+#include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/kernels/device.h"
@@ -42,8 +42,6 @@
 
 namespace thicklens::tools {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct BenchAccuracyOptions {
   CommonOptions common;
@@ -212,7 +210,7 @@ void Measure(const BenchAccuracyOptions& options, const SampledPicture& picture,
       if (row.failure.empty() && spent[i] < kEnoughSeconds) {
         const Clock::time_point start = Clock::now();
         RunRow(picture, backends, &row);
-        spent[i] += std::chrono::duration<double>(Clock::now() - start).count();
+        spent[i] += SecondsSince(start);
       }
       progress.Show(++done, options.repeat * static_cast<int>(rows->size()));
     }
@@ -317,7 +315,9 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
                          {"channels", timed.load.channels},
                          {"views", timed.load.views},
                          {"blur_sigma_px", timed.load.blur_sigma_px},
+                         {"file_seconds", timed.load.file_seconds},
                          {"seconds", timed.seconds},
+                         {"solve_seconds", timed.solve_seconds},
                          {"expected_seconds", plan.law.Seconds(timed.load)}});
       }
     }

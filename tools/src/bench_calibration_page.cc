@@ -29,11 +29,11 @@ std::string NameOf(const CalibrationRow& row) {
   return fmt::format("{}, {} frames of {} px", row.method, row.frames, row.field_px);
 }
 
-std::string ErrorCell(const CalibrationErrors& errors) {
+std::string ErrorHtml(const CalibrationErrors& errors) {
   return errors.count == 0 ? "–" : fmt::format("{:.3g}", errors.median_absolute);
 }
 
-std::string CoverageCell(const IntervalCoverage& coverage) {
+std::string CoverageHtml(const IntervalCoverage& coverage) {
   return coverage.trials == 0 ? "–"
                               : fmt::format("{:.0f}, {:.0f}", 100 * coverage.fraction_68(),
                                             100 * coverage.fraction_95());
@@ -52,10 +52,10 @@ std::string TableHtml(const std::vector<CalibrationRow>& rows) {
                         EscapeXml(NameOf(row)));
     for (const std::string& cell :
          {fmt::format("{:.3g}", Median(row.seconds)), fmt::format("{:.3g}–{:.3g}", *least, *most),
-          ErrorCell(row.focus_depth_mm), ErrorCell(row.image_distance_um),
-          ErrorCell(row.blur_ratio_percent), CoverageCell(row.focus_depth_mm.coverage),
-          CoverageCell(row.image_distance_um.coverage),
-          CoverageCell(row.blur_ratio_percent.coverage), fmt::format("{}", row.refused),
+          ErrorHtml(row.focus_depth_mm), ErrorHtml(row.image_distance_um),
+          ErrorHtml(row.blur_ratio_percent), CoverageHtml(row.focus_depth_mm.coverage),
+          CoverageHtml(row.image_distance_um.coverage),
+          CoverageHtml(row.blur_ratio_percent.coverage), fmt::format("{}", row.refused),
           fmt::format("{}", row.partial)}) {
       html += TableCell(EscapeXml(cell));
     }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +19,7 @@
 #include "bench_solvers.h"
 #include "interrupt.h"
 #include "progress_line.h"
+#include "stopwatch.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/kernels/device.h"
@@ -29,7 +29,6 @@ namespace thicklens::tools {
 namespace {
 
 using nlohmann::json;
-using Clock = std::chrono::steady_clock;
 
 struct BenchInpaintingOptions {
   CommonOptions common;
@@ -120,7 +119,7 @@ void Run(const LightFieldSolver& solver, const BenchScene& scene, const Regions&
          int threads, InpaintingRow* own, InpaintingRow* telea) {
   const Clock::time_point start = Clock::now();
   model::LightField estimate = solver.estimate(scene.input);
-  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  const double seconds = SecondsSince(start);
   const bool is_first = own->seconds.empty();
   own->seconds.push_back(seconds);
   if (is_first) Judge(scene, regions, estimate, threads, own);

@@ -1,7 +1,6 @@
 #include "bench_machine.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <fstream>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "build_info.h"
 #include "commands.h"
+#include "stopwatch.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/model/parallel.h"
 
@@ -43,7 +43,6 @@ nlohmann::json BenchSummary(nlohmann::json fields) {
 }
 
 double TriadBytesPerSecond(int threads) {
-  using Clock = std::chrono::steady_clock;
   constexpr std::size_t kCount = std::size_t{1} << 25U;
   constexpr int kParts = 64, kRuns = 5;
   std::vector<float> a(kCount), b(kCount, 1.0F), c(kCount, 2.0F);
@@ -55,7 +54,7 @@ double TriadBytesPerSecond(int threads) {
       const std::size_t first = static_cast<std::size_t>(part) * kOfPart;
       TriadOf(b.data() + first, c.data() + first, kOfPart, a.data() + first);
     });
-    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const double seconds = SecondsSince(start);
     best = std::max(best, 3.0 * sizeof(float) * kCount / seconds);
   }
   return best;

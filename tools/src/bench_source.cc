@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -25,6 +24,7 @@
 #include "light_field_options.h"
 #include "option_values.h"
 #include "progress_line.h"
+#include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/parallel.h"
@@ -32,8 +32,6 @@
 
 namespace thicklens::tools {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct BenchSourceOptions {
   CommonOptions common;
@@ -50,10 +48,6 @@ struct BenchSourceOptions {
 // The source does not say how many views its table 4 had.
 constexpr int kViewsOfTable4 = 5;
 constexpr std::uint64_t kUsualSeed = 1;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // The bench's lens with 3 mm of thickness and another rear focal length, focused where it was.
 model::Camera ThickBenchCamera(int width_px, int height_px) {

@@ -3,10 +3,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "bench_solvers.h"
+#include "stopwatch.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/thick_lens.h"
@@ -14,12 +14,7 @@
 namespace thicklens::tools {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using estimator::BlockSolver;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // 'K' or 'L' of a picture of the source's sizes, else a blank.
 char SizeNameOf(int width_px, int height_px) {

@@ -14,7 +14,7 @@ using calib::FrameMeasurement;
 
 namespace {
 
-std::vector<double> Column(const CurvePoints& points, bool first) {
+std::vector<double> Coordinates(const CurvePoints& points, bool first) {
   std::vector<double> column;
   column.reserve(points.size());
   for (const std::pair<double, double>& point : points)
@@ -30,8 +30,8 @@ PlotSeries Curve(std::string label, Ink ink, Stroke stroke, const CurvePoints& p
   series.ink = ink;
   series.mark = Mark::kNone;
   series.stroke = stroke;
-  series.x = Column(points, true);
-  series.y = Column(points, false);
+  series.x = Coordinates(points, true);
+  series.y = Coordinates(points, false);
   return series;
 }
 

@@ -17,18 +17,18 @@ using calib::Calibration;
 using calib::FocusSweep;
 
 constexpr char kNone[] = "–";
-constexpr char kNotRun[] = "not run";
+constexpr char kWasNotRun[] = "not run";
 constexpr char kTableEnd[] = "</tbody></table></div>\n";
 
 // A column's head; a number's stands to the right.
-struct Column {
+struct TableColumn {
   const char* name;
   bool is_number = true;
 };
 
-std::string TableBegin(const std::vector<Column>& columns) {
+std::string TableBegin(const std::vector<TableColumn>& columns) {
   std::string html = "<div class=\"wide\"><table>\n<thead><tr>";
-  for (const Column& column : columns)
+  for (const TableColumn& column : columns)
     html += fmt::format("<th{}>{}</th>", column.is_number ? " class=\"number\"" : "",
                         EscapeXml(column.name));
   return html + "</tr></thead>\n<tbody>\n";
@@ -242,7 +242,7 @@ std::string OtherWaysSection(const Calibration& calibration, const std::vector<R
   }
   std::string table, missing;
   const auto say = [&](const std::string& what, bool done, const std::string& message) {
-    if (!done && message != kNotRun)
+    if (!done && message != kWasNotRun)
       missing += fmt::format("<li>{}: {}</li>\n", EscapeXml(what), EscapeXml(Typeset(message)));
   };
   for (const Way& way : OtherWays(calibration)) {
@@ -281,7 +281,7 @@ std::string CorrelationSection(const Calibration& calibration) {
   const Eigen::MatrixXd& covariance = calibration.covariance;
   const auto count = static_cast<Eigen::Index>(calibration.covariance_order.size());
   if (count == 0 || covariance.rows() != count || covariance.cols() != count) return "";
-  std::vector<Column> columns = {{"correlation", false}};
+  std::vector<TableColumn> columns = {{"correlation", false}};
   for (const std::string& name : calibration.covariance_order) columns.push_back({name.c_str()});
   columns.push_back({"standard deviation"});
   std::string html = "<h2>Covariance of the fit</h2>\n" + TableBegin(columns);

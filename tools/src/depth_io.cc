@@ -2,15 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
 
+#include "picture_kind.h"
 #include "png_check.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
@@ -93,16 +95,6 @@ model::RawDepthMap DecodePfm(const std::string& bytes, const std::string& name) 
   return map;
 }
 
-enum class FileKind { kPng, kTiff, kExr };
-
-std::optional<FileKind> KindOf(const std::string& bytes) {
-  using namespace std::string_literals;
-  if (StartsWith(bytes, "\x89PNG\r\n\x1A\n")) return FileKind::kPng;
-  if (StartsWith(bytes, "II*\0"s) || StartsWith(bytes, "MM\0*"s)) return FileKind::kTiff;
-  if (StartsWith(bytes, "\x76\x2F\x31\x01")) return FileKind::kExr;
-  return std::nullopt;
-}
-
 std::string TypeName(const cv::Mat& picture) {
   static const char* const kNames[] = {"8-bit",         "signed 8-bit",  "16-bit",
                                        "signed 16-bit", "signed 32-bit", "32-bit float",
@@ -110,43 +102,28 @@ std::string TypeName(const cv::Mat& picture) {
   return fmt::format("{} values in {} channel(s)", kNames[picture.depth()], picture.channels());
 }
 
+const std::vector<PictureKind> kDepthKinds = {PictureKind::kPng, PictureKind::kTiff,
+                                              PictureKind::kExr};
+
 // A PNG of fewer bits would be spread over 8 when decoded.
-bool IsAsExpected(const cv::Mat& picture, FileKind kind, const std::string& bytes) {
-  switch (kind) {
-    case FileKind::kPng:
-      return PngBits(bytes) >= 8 && (picture.type() == CV_8UC1 || picture.type() == CV_16UC1);
-    case FileKind::kTiff:
-      return picture.type() == CV_16UC1 || picture.type() == CV_32FC1;
-    case FileKind::kExr:
-      break;
-  }
-  return picture.type() == CV_32FC1;
+bool IsAsExpected(const cv::Mat& picture, PictureKind kind, const std::string& bytes) {
+  if (kind == PictureKind::kPng)
+    return PngBits(bytes) >= 8 && (picture.type() == CV_8UC1 || picture.type() == CV_16UC1);
+  return picture.type() == CV_32FC1 || (kind == PictureKind::kTiff && picture.type() == CV_16UC1);
 }
 
-std::string ExpectedOf(FileKind kind) {
-  switch (kind) {
-    case FileKind::kPng:
-      return "a PNG depth map has 8- or 16-bit values";
-    case FileKind::kTiff:
-      return "a TIFF depth map has 16-bit or 32-bit float values";
-    case FileKind::kExr:
-      break;
-  }
+std::string ExpectedOf(PictureKind kind) {
+  if (kind == PictureKind::kPng) return "a PNG depth map has 8- or 16-bit values";
+  if (kind == PictureKind::kTiff) return "a TIFF depth map has 16-bit or 32-bit float values";
   return "an EXR depth map has float values";
 }
 
 cv::Mat Decode(const std::string& bytes, const std::string& name) {
   std::string why;
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
-                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
-    const cv::Mat picture = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-    if (!picture.empty()) return picture;
-  } catch (const cv::Exception& error) {
-    why = ": " + error.err;  // e.g. that OpenCV was built, or started, without EXR
-  }
-  throw Error(
-      fmt::format("{}: cannot be decoded as a depth map ({} bytes){}", name, bytes.size(), why));
+  cv::Mat picture = DecodeUnchanged(bytes, name, kDepthKinds, &why);
+  if (!picture.empty()) return picture;
+  throw Error(fmt::format("{}: cannot be decoded as a depth map ({} bytes){}", name, bytes.size(),
+                          why.empty() ? "" : ": " + why));
 }
 
 }  // namespace
@@ -156,16 +133,15 @@ model::RawDepthMap ReadDepthMap(const std::string& path) {
   if (StartsWith(bytes, "PF") && bytes.size() > 2 && IsSpace(bytes[2]))
     throw Error(fmt::format("{}: a PFM of three channels; a depth map has one", path));
   if (StartsWith(bytes, "Pf")) return DecodePfm(bytes, path);
-  const std::optional<FileKind> kind = KindOf(bytes);
-  if (!kind) {
+  const std::optional<PictureKind> kind = KindOfPicture(bytes);
+  if (!kind || std::find(kDepthKinds.begin(), kDepthKinds.end(), *kind) == kDepthKinds.end()) {
     throw Error(fmt::format("{}: no depth map: a PFM, PNG, TIFF or EXR file is expected", path));
   }
-  RequireWholePng(bytes, path);
   const cv::Mat picture = Decode(bytes, path);
   if (!IsAsExpected(picture, *kind, bytes)) {
     throw Error(fmt::format(
         "{}: {} in one channel, found {}{}", path, ExpectedOf(*kind), TypeName(picture),
-        *kind == FileKind::kPng ? fmt::format(" ({} bits in the file)", PngBits(bytes)) : ""));
+        *kind == PictureKind::kPng ? fmt::format(" ({} bits in the file)", PngBits(bytes)) : ""));
   }
   model::RawDepthMap map{picture.cols, picture.rows, {}, picture.depth() != CV_32F};
   cv::Mat values;

@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -34,6 +33,7 @@
 #include "printable_text.h"
 #include "progress_line.h"
 #include "report_folder.h"
+#include "stopwatch.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/inpaint.h"
@@ -44,12 +44,6 @@
 
 namespace thicklens::tools {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Claimed before anything is computed, so that an output that cannot be is told at once.
 struct Outputs {
@@ -162,8 +156,10 @@ PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::Estim
   const auto start = Clock::now();
   const double speed_ratio =
       profile.IsFromHere(threads) ? 1 : ProbeSeconds(threads) / profile.probe_seconds;
-  PlanChoice choice =
-      ChoosePlan(profile, options.wish, PictureLoadOf(input), speed_ratio, SecondsSince(start));
+  PictureLoad load = PictureLoadOf(input);
+  // The law knows how the profile's threads share the files.
+  load.file_seconds *= static_cast<double>(profile.threads) / threads;
+  PlanChoice choice = ChoosePlan(profile, options.wish, load, speed_ratio, SecondsSince(start));
   // What the law does not know.
   std::vector<std::string> besides;
   if (!options.report_folder.empty()) besides.emplace_back("--report");

@@ -89,10 +89,14 @@ model::LightFieldGrid GridFor(const EstimateOptions& options, const model::Camer
                               const Eigen::ArrayXXd& weights) {
   const model::ApertureSamples samples =
       model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
-  model::LightFieldPlanes planes =
-      model::DefaultGrid(camera, samples.u_count, samples.v_count).planes;
-  if (options.st_depth_mm) planes.plane_spacing_mm = *options.st_depth_mm;
-  return model::GridOnPlanes(camera, planes, samples);
+  const double st_depth_mm = options.st_depth_mm.value_or(camera.focus_depth_mm());
+  if (std::isinf(st_depth_mm)) {
+    throw Error(fmt::format(
+        "{}: the camera is focused at infinity, where no ST plane can lie: --st-depth-mm must say "
+        "where it lies",
+        options.camera_path));
+  }
+  return model::GridOnPlanes(camera, {0, st_depth_mm}, samples);
 }
 
 // Picture and depth are cut alike. Where only one of them has the crop's size, it was cut before.
@@ -116,6 +120,7 @@ void TellUnlikelyDepth(const EstimateOptions& options, const model::Camera& came
                        const model::DepthStatistics& depth) {
   constexpr double kUsual = 4;
   const double focus_depth_mm = camera.focus_depth_mm();
+  if (std::isinf(focus_depth_mm)) return;  // any depth is far from it
   if (depth.median_mm <= kUsual * focus_depth_mm && depth.median_mm >= focus_depth_mm / kUsual) {
     return;
   }

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <utility>
 
 #include "interrupt.h"
+#include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
@@ -72,8 +72,10 @@ std::string PlanArguments(const EstimatePlan& plan) {
   if (plan.tolerance) text += fmt::format(" --tolerance {:g}", *plan.tolerance);
   if (plan.double_precision) text += " --double";
   if (plan.on_opencl) text += " --device opencl";
-  if (!plan.on_opencl && plan.solver == "blocks")
-    text += " --device cpu";  // else the best there is
+  // Else the best there is; ViennaCL takes one for itself.
+  if (!plan.on_opencl && plan.solver == "blocks" && plan.block_solver != "viennacl") {
+    text += " --device cpu";
+  }
   return text;
 }
 
@@ -182,10 +184,9 @@ PlanRun RunPlan(const EstimatePlan& plan, const estimator::EstimateInput& input,
 
 PlanRun RunWarping(const estimator::EstimateInput& input, int threads) {
   PlanRun run;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   run.light_field = estimator::WarpedLightField(input, true, threads);
-  run.views_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  run.views_seconds = SecondsSince(start);
   return run;
 }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -12,6 +11,7 @@
 
 #include "bench_machine.h"
 #include "build_info.h"
+#include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
 
@@ -24,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr char kSchema[] = "thicklens/estimate-profile/1";
+constexpr char kSchema[] = "thicklens/estimate-profile/2";
 
 const json& Field(const json& fields, const char* name, const std::string& where) {
   const auto found = fields.find(name);
@@ -199,10 +199,9 @@ double ProbeSeconds(int threads) {
   constexpr double kEnoughSeconds = 0.4;
   double best = 0, spent = 0;
   for (int run = 0; run < kRuns && spent < kEnoughSeconds; ++run) {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     RunPlan({}, input, threads, nullptr);
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = SecondsSince(start);
     best = run == 0 ? seconds : std::min(best, seconds);
     spent += seconds;
   }

@@ -155,6 +155,13 @@ std::optional<Iterations> IterationsOf(const EstimateOutcome& outcome) {
   return std::nullopt;
 }
 
+std::string NotConverged(const Iterations& iterations) {
+  return fmt::format(
+      "not converged: the relative residual is {:.1e} after {} iterations; allow more "
+      "(--max-iterations), or ask for less (--tolerance)",
+      iterations.relative_residual, iterations.count);
+}
+
 double HoleShare(const PreparedEstimate& prepared) {
   return static_cast<double>(prepared.depth.holes) /
          static_cast<double>(prepared.input.disparity.disparity.size());
@@ -256,12 +263,7 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
                                     : "without --keep-depth-noise it is smoothed"));
   }
   const auto iterations = IterationsOf(outcome);
-  if (iterations && !iterations->converged) {
-    warnings.push_back(fmt::format(
-        "not converged: the relative residual is {:.1e} after {} iterations; allow more "
-        "(--max-iterations), or ask for less (--tolerance)",
-        iterations->relative_residual, iterations->count));
-  }
+  if (iterations && !iterations->converged) warnings.push_back(NotConverged(*iterations));
   if (!outcome.patches.empty()) {
     const estimator::ResidualPatch& worst = outcome.patches.front();
     warnings.push_back(fmt::format(
@@ -290,8 +292,10 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
   const model::LightField& light_field = outcome.light_field;
   const EstimateSeconds& seconds = outcome.seconds;
   const auto [least_px, most_px] = DisparityRangePx(prepared.input.disparity);
-  json out = {{"status", "ok"},
-              {"reason", ""},
+  const std::optional<Iterations> iterations = IterationsOf(outcome);
+  const bool is_done = !iterations || iterations->converged;
+  json out = {{"status", is_done ? "ok" : "partial"},
+              {"reason", is_done ? "" : NotConverged(*iterations)},
               {"output", options.output_folder},
               {"solver", options.solver},
               {"views", {light_field.u_count, light_field.v_count}},

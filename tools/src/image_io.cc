@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "png_check.h"
+#include "picture_kind.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
 
@@ -43,19 +43,17 @@ std::string PngFile(const cv::Mat& values, const std::vector<int>& settings) {
 }  // namespace
 
 cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
-  RequireWholePng(bytes, name);
-  cv::Mat picture;
-  try {
-    // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
-    // pixels as the sensor gave them.
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
-                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
-    if (!bytes.empty()) picture = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    picture.release();
-  }
+  std::string why;
+  const cv::Mat picture =
+      DecodeUnchanged(bytes, name,
+                      {PictureKind::kPng, PictureKind::kJpeg, PictureKind::kTiff, PictureKind::kBmp,
+                       PictureKind::kPnm},
+                      &why);
   if (picture.empty()) {
-    throw Error(fmt::format("{}: cannot be decoded as a picture ({} bytes)", name, bytes.size()));
+    throw Error(
+        fmt::format("{}: cannot be decoded as a picture ({} bytes): a PNG, TIFF, JPEG, BMP "
+                    "or PNM file is expected",
+                    name, bytes.size()));
   }
   if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
     throw Error(

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -12,7 +11,6 @@
 #include <functional>
 #include <map>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <system_error>
@@ -21,6 +19,8 @@
 #include "float_tiff.h"
 #include "image_io.h"
 #include "interrupt.h"
+#include "picture_kind.h"
+#include "stopwatch.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
 #include "thicklens/model/camera_file.h"
@@ -72,14 +72,8 @@ void SwapRedAndBlue(cv::Mat* picture) {
 
 model::LinearPicture ReadTiffView(const std::string& path) {
   const std::string bytes = model::ReadWholeFile(path);
-  cv::Mat picture;
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
-                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
-    if (!bytes.empty()) picture = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    picture.release();
-  }
+  std::string why;
+  cv::Mat picture = DecodeUnchanged(bytes, path, {PictureKind::kTiff}, &why);
   if (picture.empty()) {
     throw Error(fmt::format("{}: cannot be decoded as a TIFF file ({} bytes)", path, bytes.size()));
   }
@@ -437,7 +431,7 @@ double LightFieldWriter::BytesForView(double values) const {
 
 void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view) {
   RequireStorable(view.channels);
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const std::string name = ViewFile(k, l, NameOf(format_));
   std::size_t clipped = 0;
   if (format_ == ViewFormat::kTiff) {
@@ -451,12 +445,12 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view)
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   clipped_ += clipped;
-  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  seconds_ += SecondsSince(start);
 }
 
 void LightFieldWriter::WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
                                        int width_px) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   folder_->Write(fmt::format("{}/{}.png", kConfidenceFolder, model::ViewFileStem(k, l)),
                  EncodeBytesPng(confidence, width_px));
   std::array<std::size_t, 256> counts{};
@@ -464,7 +458,7 @@ void LightFieldWriter::WriteConfidence(int k, int l, const std::vector<std::uint
   const std::lock_guard<std::mutex> lock(mutex_);
   has_confidence_ = true;
   for (std::size_t i = 0; i < counts.size(); ++i) confidence_counts_[i] += counts[i];
-  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  seconds_ += SecondsSince(start);
 }
 
 std::size_t LightFieldWriter::Finish(const model::LightField& light_field) {

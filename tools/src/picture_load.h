@@ -6,7 +6,8 @@
 
 namespace thicklens::tools {
 
-// What of a picture, its depth and its views decides how long an estimate takes.
+// What of a picture, its depth and its views decides how long an estimate takes. Makes the file of
+// something like a part of a view, to measure what that takes.
 PictureLoad PictureLoadOf(const estimator::EstimateInput& input);
 
 }  // namespace thicklens::tools

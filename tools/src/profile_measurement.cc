@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <system_error>
 #include <tuple>
@@ -24,6 +24,7 @@
 #include "interrupt.h"
 #include "light_field_io.h"
 #include "picture_load.h"
+#include "temporary_folder.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/model/camera_file.h"
@@ -35,37 +36,6 @@ namespace thicklens::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string ValueOf(const char* variable) {
-  const char* value = std::getenv(variable);  // NOLINT: nothing sets it meanwhile
-  return value == nullptr ? "" : value;
-}
-
-// Gone with all that is in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::error_code failure;
-    const fs::path parent = fs::temp_directory_path(failure);
-    std::string name = (parent / "thicklens-profile-XXXXXX").string();
-    if (failure || mkdtemp(name.data()) == nullptr) {
-      throw Error(fmt::format(
-          "TMPDIR: no folder for temporary files can be made in '{}'; it must say where one can be",
-          failure ? ValueOf("TMPDIR") : parent.string()));
-    }
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 // Warnings about made-up pictures are nobody's concern.
 class OnlyErrors {
@@ -147,6 +117,24 @@ std::pair<double, double> ErrorsOf(std::vector<double> ratios) {
   return {Median(ratios), *std::max_element(ratios.begin(), ratios.end())};
 }
 
+// Plans of one solver differ in what they solve alone.
+void FitLaws(MeasuredProfile* measured) {
+  std::vector<PlanProfile>& plans = measured->profile.plans;
+  std::map<std::string, std::vector<std::size_t>> of_solver;
+  for (std::size_t i = 0; i < plans.size(); ++i) of_solver[plans[i].plan.solver].push_back(i);
+  for (const auto& [solver, members] : of_solver) {
+    TimesOfPlans times;
+    for (const std::size_t i : members) times.push_back(measured->loads[i]);
+    const std::vector<TimeLaw> laws = FitTimeLaws(times);
+    const std::vector<std::vector<double>> ratios = LeftOutRatios(times);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      PlanProfile& plan = plans[members[k]];
+      plan.law = laws[k];
+      std::tie(plan.median_error, plan.largest_error) = ErrorsOf(ratios[k]);
+    }
+  }
+}
+
 void TakeLarger(const PictureLoad& load, PictureLoad* largest) {
   largest->megapixels = std::max(largest->megapixels, load.megapixels);
   largest->channels = std::max(largest->channels, load.channels);
@@ -167,7 +155,9 @@ const std::vector<ProfileCase>& UsualProfileCases() {
       {320, 3, true, true, 1, Use::kTime},          {352, 7, true, false, 1, Use::kTime},
       {384, 5, false, true, 2, Use::kTime},         {416, 5, true, true, 0.5, Use::kTime},
       {448, 3, false, false, 0.7, Use::kTime},      {448, 7, true, false, 1, Use::kTime},
-      {480, 3, true, false, 1, Use::kTime},         {600, 5, true, true, 1, Use::kCheck},
+      {480, 3, true, false, 1, Use::kTime},         {256, 3, true, true, 0.05, Use::kTime},
+      {400, 5, true, false, 0.02, Use::kTime},      {320, 7, false, true, 0.15, Use::kTime},
+      {560, 3, true, true, 0.05, Use::kCheck},      {600, 5, true, true, 1, Use::kCheck},
       {640, 7, false, true, 0.8, Use::kCheck},      {720, 3, true, false, 1, Use::kCheck}};
   return cases;
 }
@@ -186,7 +176,7 @@ std::vector<EstimatePlan> PlansOfProfile() {
 
 MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const ProfileRun& run) {
   const OnlyErrors silence;
-  const TemporaryFolder folder;
+  const TemporaryFolder folder("profile");
   MeasuredProfile measured;
   EstimateProfile& profile = measured.profile;
   profile.processor = ProcessorName();
@@ -217,13 +207,14 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
           prepared, RunWarping(PrepareEstimate(prepared.options).input, run.threads).light_field,
           run.threads);
     }
-    std::vector<std::vector<double>> seconds(plans.size());
+    std::vector<std::vector<double>> seconds(plans.size()), solve_seconds(plans.size());
     for (int round = 0; round < run.repeat; ++round) {
       for (std::size_t i = 0; i < plans.size(); ++i) {
         if (run.progress) run.progress(done++, total);
         ApplyPlan(plans[i], &prepared.options);
         const nlohmann::json summary = RunEstimate(prepared.options).summary;
         seconds[i].push_back(summary["seconds"]["total"].get<double>());
+        solve_seconds[i].push_back(summary["seconds"]["solve"].get<double>());
         if (!prepared.truth || round > 0) continue;
         profile.plans[i].psnr_db +=
             PsnrDb(prepared, ReadLightField(prepared.options.output_folder, {}), run.threads);
@@ -231,33 +222,37 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
     }
     for (std::size_t i = 0; i < plans.size(); ++i) {
       (is_check ? measured.checks : measured.loads)[i].push_back(
-          {prepared.load, Median(seconds[i])});
+          {prepared.load, Median(seconds[i]),
+           std::min(Median(solve_seconds[i]), Median(seconds[i]))});
     }
     std::error_code ignored;
     fs::remove_all(of_case, ignored);
   }
   if (judged == 0) throw Error("a profile needs a case that is judged by its true views");
   profile.warping_psnr_db /= judged;
-  for (std::size_t i = 0; i < plans.size(); ++i) {
-    PlanProfile& plan = profile.plans[i];
-    plan.psnr_db /= judged;
-    plan.law = FitTimeLaw(measured.loads[i]);
-    std::tie(plan.median_error, plan.largest_error) = ErrorsOf(LeftOutRatios(measured.loads[i]));
-  }
+  for (PlanProfile& plan : profile.plans) plan.psnr_db /= judged;
+  FitLaws(&measured);
   return measured;
 }
 
 std::string ProfileTable(const MeasuredProfile& measured) {
   const EstimateProfile& profile = measured.profile;
-  // For people to compare: a picture of a common size.
-  constexpr PictureLoad kUsualLoad{0.64 * 0.48, 3, 49, 2};
+  // For people to compare: a picture of a common size, that takes to encode what these do.
+  const auto millions = [](const PictureLoad& load) {
+    return load.megapixels * load.channels * load.views;
+  };
+  PictureLoad usual{0.64 * 0.48, 3, 49, 2, 0};
+  std::vector<double> encode_seconds;
+  for (const TimedLoad& timed : measured.loads.front()) {
+    encode_seconds.push_back(timed.load.file_seconds / millions(timed.load));
+  }
+  usual.file_seconds = Median(encode_seconds) * millions(usual);
   std::string text = fmt::format("{:<32}{:>10}{:>10}{:>14}{:>18}{:>16}\n", "", "PSNR dB", "loss dB",
                                  "seconds at K", "law's error: mid", "largest");
   for (const PlanProfile& plan : profile.plans) {
     text += fmt::format("{:<32}{:>10.2f}{:>10.2f}{:>14.3g}{:>16.0f} %{:>14.0f} %\n",
                         PlanName(plan.plan), plan.psnr_db, profile.LossDb(plan),
-                        plan.law.Seconds(kUsualLoad), 100 * plan.median_error,
-                        100 * plan.largest_error);
+                        plan.law.Seconds(usual), 100 * plan.median_error, 100 * plan.largest_error);
   }
   text += fmt::format(
       "{:<32}{:>10.2f}{:>10.2f}\n\n"

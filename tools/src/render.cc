@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -23,6 +22,7 @@
 #include "light_field_options.h"
 #include "option_values.h"
 #include "picture_description.h"
+#include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/output_file.h"
@@ -163,10 +163,6 @@ struct Rendering {
   nlohmann::json details;
   std::string effects{};  // for people, a line of its own; empty: nothing to tell
 };
-
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 Eigen::ArrayXXd WeightsOf(const RenderOptions& options, const model::LightField& light_field,
                           nlohmann::json* details) {
@@ -407,7 +403,7 @@ std::string Description(const Rendering& rendering) {
 }
 
 CommandResult RenderPicture(const RenderOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   model::OutputFile output(options.output);
   const model::LightField light_field =
       ReadLightField(options.light_field, ReadingOf(options.reading));
@@ -446,7 +442,7 @@ CommandResult RenderPicture(const RenderOptions& options) {
 }
 
 CommandResult Convert(const RenderOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const bool is_hci = options.convert == "hci";
   model::OutputFolder folder =
       is_hci ? ClaimHciFolder(options.output)

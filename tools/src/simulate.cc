@@ -20,6 +20,7 @@
 #include "progress_line.h"
 #include "simulate_scene.h"
 #include "simulated_sweep.h"
+#include "stopwatch.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/parallel.h"
@@ -84,7 +85,7 @@ nlohmann::json Summary(const SimulateOptions& options,
 }
 
 CommandResult SimulateSweep(const SimulateOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
   CheckEffectNames(options.effects, model::SweepEffects());
@@ -112,7 +113,7 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   ThrowIfInterrupted();
   folder.Commit();
 
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  const std::chrono::duration<double> seconds = Clock::now() - start;
   CommandResult result;
   result.summary = Summary(options, simulation, simulator.truth(), seconds.count());
   result.summary["bits"] = bits;

@@ -25,14 +25,13 @@
 #include "picture_description.h"
 #include "progress_line.h"
 #include "simulated_sweep.h"
+#include "stopwatch.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::tools {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // Sign of a folder that this program wrote and may replace.
 constexpr char kPictureMarker[] = "truth.yaml";

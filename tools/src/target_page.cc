@@ -34,7 +34,7 @@ constexpr double kOverfill = 1.15;
 constexpr double kPatchPart = 0.28;
 constexpr double kLongestPatch = 1.5;
 // Smaller features than these are lost in the pixels; with larger ones the texture gets scarce.
-constexpr double kFewestFeaturePx = 2;
+constexpr double kFinestFeaturePx = 2;
 constexpr double kFeaturePx = 3;
 constexpr double kMostFeaturePx = 6;
 constexpr double kFeaturesAcross = 360;
@@ -129,7 +129,7 @@ Feature GivenFeature(double feature_mm, const TargetRequest& request) {
   if (!request.view) return {feature_mm, "as given"};
   const double feature_px = feature_mm / request.view->px_mm;
   std::string why = "as given, " + InPixels(feature_mm, *request.view);
-  if (feature_px < kFewestFeaturePx) why += ", finer than the 2 to 6 px that are best";
+  if (feature_px < kFinestFeaturePx) why += ", finer than the 2 to 6 px that are best";
   if (feature_px > kMostFeaturePx) why += ", coarser than the 2 to 6 px that are best";
   return {feature_mm, why};
 }
@@ -152,7 +152,7 @@ Feature FeatureForCamera(const CameraView& view, double finest_mm) {
       fmt::format("features of 2 to 6 px at {:g} mm measure {:.2g} to {:.2g} mm on the target, "
                   "below the {:g} mm that the print method resolves: take a larger distance "
                   "({:.0f} mm or more) or a finer print method (--finest-mm)",
-                  view.distance_mm, kFewestFeaturePx * view.px_mm, kMostFeaturePx * view.px_mm,
+                  view.distance_mm, kFinestFeaturePx * view.px_mm, kMostFeaturePx * view.px_mm,
                   finest_mm, std::ceil(farther_mm)));
 }
 

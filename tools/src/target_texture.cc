@@ -16,7 +16,7 @@ constexpr double kSamplesPerFeature = 6;
 constexpr double kOpenAtEnd = 1e-3;
 constexpr int kDarkestGrey = 51;     // 0.2 of full scale
 constexpr int kBrightestGrey = 230;  // 0.9
-constexpr int kLeavesPerLook = 4096;
+constexpr int kTriesPerLook = 4096;
 
 // Uniform in [0, 1), from the upper 53 bits; the standard fixes the engine's numbers but not those
 // of its distributions.
@@ -116,7 +116,7 @@ std::vector<Leaf> DeadLeaves(const TargetPage& page) {
   Draws draws(page.seed);
   std::vector<Leaf> leaves;
   for (int count = 0; openings.OpenPart() > kOpenAtEnd; ++count) {
-    if (count % kLeavesPerLook == 0) ThrowIfInterrupted();
+    if (count % kTriesPerLook == 0) ThrowIfInterrupted();
     // r = (rmin^-2 - q (rmin^-2 - rmax^-2))^(-1/2), q uniform: the inverse of the distribution
     // function of the density ~ r^-3 between rmin and rmax, derived here.
     Leaf leaf;

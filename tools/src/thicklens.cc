@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -21,6 +22,14 @@
 #include "interrupt.h"
 #include "option_values.h"
 #include "thicklens/error.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define THICKLENS_IS_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define THICKLENS_IS_SANITIZED 1
+#endif
+#endif
 
 namespace {
 
@@ -96,9 +105,22 @@ int Main(int argc, char** argv) {
   return ParseAndRun(&program, &action, argc, argv);
 }
 
-}  // namespace
+// However the program ends, by main's return or by a library that calls exit(), nothing is left to
+// the ends of libraries: where memory is short the threads that OpenBLAS starts with the program
+// ask for some again and again, and its end would wait for theirs forever. Sanitizers tell at the
+// end what they found.
+void EndWithoutLibraries() {
+#if defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
+  ::on_exit(
+      [](int status, void*) {
+        std::fflush(nullptr);
+        std::_Exit(status);
+      },
+      nullptr);
+#endif
+}
 
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   try {
     return Main(argc, argv);
   } catch (const tools::UsageError& error) {
@@ -111,4 +133,11 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     return Fail(error.what(), kFailed);
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  EndWithoutLibraries();
+  return Run(argc, argv);
 }
