@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -15,6 +16,7 @@
 #include "run_cost.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
+#include "thicklens/estimator/block_store.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/model/parallel.h"
 
@@ -262,41 +264,101 @@ std::string NameOf(const model::PixelRect& rect) {
   return fmt::format("block of {}x{} px at ({}, {})", rect.width, rect.height, rect.x, rect.y);
 }
 
+// Written so that NaN is refused, too.
+bool IsSolvable(double rcond, const BlockOptions& options) {
+  return rcond >= options.rcond_min && rcond > 0 && std::isfinite(rcond);
+}
+
 // Solves one block for all channels and judges the answer.
-std::vector<std::vector<double>> SolveBlock(const BlockSystem& system, const BlockOptions& options,
-                                            const model::PixelRect& rect, Worker* worker,
-                                            BlockReport* report) {
+SolvedBlock SolveBlock(const BlockSystem& system, const BlockOptions& options,
+                       const model::PixelRect& rect, Worker* worker) {
   worker->solver->Factorize(system.matrix);
-  *report = {rect.x,
-             rect.y,
-             rect.width,
-             rect.height,
-             system.matrix.rows,
-             system.matrix.entries(),
-             worker->solver->rcond(),
-             0,
-             0};
-  // Written so that NaN is refused, too.
-  if (report->rcond && (!(*report->rcond >= options.rcond_min) || !(*report->rcond > 0))) {
+  SolvedBlock solved;
+  BlockReport& report = solved.report;
+  report = {rect.x,
+            rect.y,
+            rect.width,
+            rect.height,
+            system.matrix.rows,
+            system.matrix.entries(),
+            worker->solver->rcond(),
+            0,
+            0};
+  if (report.rcond && !IsSolvable(*report.rcond, options)) {
     throw Error(fmt::format(
         "{}: its system is singular, or so nearly that the light field would be noise however "
         "small "
         "the residual: rcond is {:.2g}, and must be at least {:.2g}; a larger ridge (now {:.3g}) "
         "helps",
-        NameOf(rect), *report->rcond, options.rcond_min, options.ridge.value_or(0)));
+        NameOf(rect), *report.rcond, options.rcond_min, options.ridge.value_or(0)));
   }
-  std::vector<std::vector<double>> channels;
   for (std::size_t channel = 0; channel < system.right_sides.size(); ++channel) {
     const std::vector<double>& right = system.right_sides[channel];
-    channels.push_back(worker->solver->SolveFrom(system.starts[channel], right));
-    report->iterations = std::max(report->iterations, worker->solver->iterations());
-    const double residual = RelativeResidual(system.matrix, channels.back(), right);
+    solved.channels.push_back(worker->solver->SolveFrom(system.starts[channel], right));
+    report.iterations = std::max(report.iterations, worker->solver->iterations());
+    const double residual = RelativeResidual(system.matrix, solved.channels.back(), right);
     if (!std::isfinite(residual)) {
       throw Error(fmt::format("{}: the solution is not finite", NameOf(rect)));
     }
-    report->relative_residual = LargerResidual(report->relative_residual, residual);
+    report.relative_residual = LargerResidual(report.relative_residual, residual);
   }
-  return channels;
+  return solved;
+}
+
+// What is told of a run, so that its blocks are not taken for those of another.
+BlockRun RunOf(const RayField& rays, const BlockOptions& options, const EstimateSummary& summary,
+               const std::string& driver, int blocks) {
+  const model::LinearPicture& picture = rays.input().picture;
+  const auto exact = [](double number) { return fmt::format("{:.17g}", number); };
+  BlockRun run;
+  run.blocks = blocks;
+  run.settings = {{"size_px", fmt::format("{}x{}", picture.width_px, picture.height_px)},
+                  {"channels", fmt::format("{}", picture.channels)},
+                  {"views", fmt::format("{}x{}", rays.u_count(), rays.v_count())},
+                  {"block_px", fmt::format("{}", summary.block_px)},
+                  {"block_solver", BlockSolverName(options.solver)},
+                  {"stencil", StencilName(options.stencil)},
+                  {"splat", options.splat == kernels::Splat::kNearest ? "nearest" : "bilinear"},
+                  {"gamma", exact(summary.gamma)},
+                  {"ridge", exact(summary.ridge)},
+                  {"device", summary.device},
+                  {"driver", driver}};
+  if (IsIterative(options.solver)) {
+    run.settings.emplace_back("tolerance", exact(options.tolerance));
+    run.settings.emplace_back("max_iterations", fmt::format("{}", options.max_iterations));
+  } else {
+    run.settings.emplace_back("rcond_min", exact(options.rcond_min));
+  }
+  run.data = rays.Data();
+  return run;
+}
+
+// Whether a block from a store is what it is taken for. Whoever keeps blocks may have damaged them.
+bool Fits(const SolvedBlock& solved, const BlockGeometry& block, std::size_t channels,
+          const BlockOptions& options) {
+  const BlockReport& report = solved.report;
+  const bool is_judged = IsIterative(options.solver)
+                             ? !report.rcond
+                             : report.rcond && IsSolvable(*report.rcond, options);
+  return report.x == block.first_x && report.y == block.first_y &&
+         report.width_px == block.width_px && report.height_px == block.height_px &&
+         report.unknowns == block.rays() && report.iterations >= 0 &&
+         std::isfinite(report.relative_residual) && is_judged &&
+         solved.channels.size() == channels &&
+         std::all_of(solved.channels.begin(), solved.channels.end(), [&](const auto& channel) {
+           return channel.size() == Index(block.rays()) &&
+                  std::all_of(channel.begin(), channel.end(),
+                              [](double value) { return std::isfinite(value); });
+         });
+}
+
+// A block as the store has it, or nothing.
+std::optional<SolvedBlock> FromStore(const BlockOptions& options, int number,
+                                     const BlockGeometry& block, int channels) {
+  if (options.store == nullptr) return std::nullopt;
+  std::optional<SolvedBlock> found = options.store->Find(number);
+  if (found && !Fits(*found, block, Index(channels), options)) return std::nullopt;
+  return found;
 }
 
 // Rays that land outside of the picture are in no block: nothing but the prior is known of them.
@@ -378,20 +440,30 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   Workers workers([&] {
     return Worker{pattern_of_workers->Clone(), NewLinearSolver(options.solver, symmetric, limits)};
   });
+  if (options.store != nullptr) {
+    options.store->Begin(RunOf(rays, options, *summary, backend->description(), count));
+  }
   std::mutex merge_mutex;
   int done = 0;
   model::ParallelFor(count, threads, [&](int i) {
-    Worker worker = workers.Take();
     const model::PixelRect& rect = rects[Index(i)];
-    const BlockSystem system =
-        MakeBlockSystem(rays, rays.Block(rect.x, rect.y, rect.width, rect.height), options,
-                        *options.ridge, worker.kernels.get());
-    const auto channels = SolveBlock(system, options, rect, &worker, &summary->blocks[Index(i)]);
-    workers.GiveBack(std::move(worker));
-    const std::lock_guard<std::mutex> lock(merge_mutex);
-    for (std::size_t channel = 0; channel < channels.size(); ++channel) {
-      merging->AddBlock(system.block, static_cast<int>(channel), channels[channel]);
+    const BlockGeometry block = rays.Block(rect.x, rect.y, rect.width, rect.height);
+    std::optional<SolvedBlock> solved = FromStore(options, i, block, input.picture.channels);
+    const bool is_found = solved.has_value();
+    if (!is_found) {
+      Worker worker = workers.Take();
+      const BlockSystem system =
+          MakeBlockSystem(rays, block, options, *options.ridge, worker.kernels.get());
+      solved = SolveBlock(system, options, rect, &worker);
+      workers.GiveBack(std::move(worker));
+      if (options.store != nullptr) options.store->Keep(i, *solved);
     }
+    summary->blocks[Index(i)] = solved->report;
+    const std::lock_guard<std::mutex> lock(merge_mutex);
+    for (std::size_t channel = 0; channel < solved->channels.size(); ++channel) {
+      merging->AddBlock(block, static_cast<int>(channel), solved->channels[channel]);
+    }
+    summary->blocks_from_store += is_found ? 1 : 0;
     ++done;
     if (options.progress) options.progress(done, count);
   });

@@ -67,6 +67,15 @@ std::vector<double> PixelsOf(const model::LinearPicture& picture, const BlockGeo
   return pixels;
 }
 
+template <typename Number>
+std::string_view BytesOf(const Number* numbers, std::size_t count) {
+  return {reinterpret_cast<const char*>(numbers), count * sizeof(Number)};
+}
+template <typename Number>
+std::string_view BytesOf(const std::vector<Number>& numbers) {
+  return BytesOf(numbers.data(), numbers.size());
+}
+
 }  // namespace
 
 RayField::RayField(const EstimateInput& input, bool falloff, int threads)
@@ -115,6 +124,23 @@ std::vector<double> RayField::IrradianceOf(const BlockGeometry& block) const {
     irradiance[ray] = irradiance_[Index(l * block.u_count + k)][Index(t) * Index(width) + Index(s)];
   });
   return irradiance;
+}
+
+std::vector<BlockRun::Data> RayField::Data() const {
+  const Eigen::ArrayXXd& weights = input_.weights;
+  BlockRun::Data depth{"depth map", {BytesOf(input_.disparity.disparity)}};
+  depth.bytes.push_back(BytesOf(input_.disparity.step.data(), 2));
+  for (const auto& view : disparity_) depth.bytes.push_back(BytesOf(view));
+  BlockRun::Data falloff{"fall-off", {}};
+  for (const auto& view : irradiance_) falloff.bytes.push_back(BytesOf(view));
+  // Where rays land goes by the step from view to view, which the prior has.
+  return {{"picture", {BytesOf(input_.picture.values)}},
+          {"aperture",
+           {BytesOf(weights.data(), static_cast<std::size_t>(weights.size())),
+            BytesOf(prior_.landing_step_px.data(), 2)}},
+          std::move(depth),
+          std::move(falloff),
+          {"warped picture", {BytesOf(prior_.values)}}};
 }
 
 BlockSystem MakeBlockSystem(const RayField& rays, const BlockGeometry& block,

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "thicklens/estimator/block_store.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field.h"
@@ -36,6 +37,9 @@ class RayField {
 
   // Relative irradiance of each ray of the block; empty without fall-off.
   std::vector<double> IrradianceOf(const kernels::BlockGeometry& block) const;
+
+  // All of the above and the input, for who tells runs apart; valid as long as this is.
+  std::vector<BlockRun::Data> Data() const;
 
  private:
   const EstimateInput& input_;

@@ -6,14 +6,20 @@
 #include <Eigen/Dense>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <random>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/error_message.h"
+#include "thicklens/estimator/block_store.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
@@ -524,6 +530,183 @@ TEST(BlockSolver, ProgressCountsBlocksAndMayStop) {
   EXPECT_THAT(summary.message, HasSubstr("9 blocks of 16 px"));
   options.progress = [](int, int) { throw Interrupted(); };
   EXPECT_THROW(EstimateByBlocks(input, options, Twin().get(), &summary), Interrupted);
+}
+
+// Keeps blocks as floats, as a file does, and counts.
+class StoreInMemory : public BlockStore {
+ public:
+  void Begin(const BlockRun& run) override {
+    settings = run.settings;
+    data_bytes.clear();
+    for (const BlockRun::Data& data : run.data) {
+      for (const std::string_view bytes : data.bytes) data_bytes[data.name] += bytes;
+    }
+  }
+  std::optional<SolvedBlock> Find(int block) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = blocks.find(block);
+    return found == blocks.end() ? std::nullopt : std::make_optional(found->second);
+  }
+  void Keep(int block, const SolvedBlock& solved) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++kept;
+    SolvedBlock& place = blocks[block] = solved;
+    for (std::vector<double>& channel : place.channels) {
+      for (double& value : channel) value = static_cast<float>(value);
+    }
+  }
+
+  std::vector<std::pair<std::string, std::string>> settings;
+  std::map<std::string, std::string> data_bytes;
+  std::map<int, SolvedBlock> blocks;
+  int kept = 0;
+
+ private:
+  std::mutex mutex_;
+};
+
+TEST(BlockSolver, GoesOnFromTheBlocksOfAStoreToTheSameBits) {
+  MadeUp made_up;
+  made_up.width_px = 20;
+  made_up.channels = 3;
+  const EstimateInput input = MakeInput(made_up);
+  for (const BlockSolver solver : {DefaultBlockSolver(), BlockSolver::kCg}) {
+    BlockOptions options;
+    options.solver = solver;
+    options.block_px = 5;
+    options.threads = 2;
+    EstimateSummary whole;
+    const model::LightField expected = EstimateByBlocks(input, options, Twin().get(), &whole);
+    ASSERT_EQ(whole.blocks.size(), 8U);
+    EXPECT_EQ(whole.blocks_from_store, 0);
+
+    StoreInMemory store;
+    options.store = &store;
+    options.progress = [](int done, int) {
+      if (done >= 3) throw std::runtime_error("stop");
+    };
+    EstimateSummary cut;
+    EXPECT_THROW(EstimateByBlocks(input, options, Twin().get(), &cut), std::runtime_error);
+    const int kept = store.kept;
+    ASSERT_GE(kept, 3);
+    ASSERT_LT(kept, 8);
+
+    options.progress = {};
+    EstimateSummary resumed;
+    const model::LightField found = EstimateByBlocks(input, options, Twin().get(), &resumed);
+    EXPECT_EQ(found.values, expected.values);
+    EXPECT_EQ(resumed.blocks_from_store, kept);
+    EXPECT_EQ(store.kept, 8);
+    EXPECT_EQ(resumed.relative_residual, whole.relative_residual);
+    EXPECT_EQ(resumed.rcond_min, whole.rcond_min);
+    EXPECT_EQ(resumed.iterations, whole.iterations);
+    for (std::size_t i = 0; i < whole.blocks.size(); ++i) {
+      EXPECT_EQ(resumed.blocks[i].entries, whole.blocks[i].entries);
+      EXPECT_EQ(resumed.blocks[i].unknowns, whole.blocks[i].unknowns);
+    }
+  }
+}
+
+TEST(BlockSolver, BlocksOfAStoreThatCannotBeAreSolvedAgain) {
+  const EstimateInput input = MakeInput({});
+  BlockOptions options;
+  options.block_px = 6;
+  EstimateSummary summary;
+  const model::LightField expected = EstimateByBlocks(input, options, Twin().get(), &summary);
+  StoreInMemory right;
+  options.store = &right;
+  EstimateByBlocks(input, options, Twin().get(), &summary);
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::function<void(SolvedBlock*)>> damages = {
+      [](SolvedBlock* block) { block->report.x += 6; },
+      [](SolvedBlock* block) { block->report.height_px -= 1; },
+      [](SolvedBlock* block) { block->report.unknowns -= 1; },
+      [](SolvedBlock* block) { block->report.iterations = -1; },
+      [](SolvedBlock* block) { block->report.rcond.reset(); },
+      [](SolvedBlock* block) { block->report.rcond = 1e-14; },
+      [](SolvedBlock* block) { block->report.rcond = std::numeric_limits<double>::infinity(); },
+      [=](SolvedBlock* block) { block->report.rcond = kNone; },
+      [=](SolvedBlock* block) { block->report.relative_residual = kNone; },
+      [](SolvedBlock* block) { block->channels.clear(); },
+      [](SolvedBlock* block) { block->channels.push_back(block->channels[0]); },
+      [](SolvedBlock* block) { block->channels[0].pop_back(); },
+      [=](SolvedBlock* block) { block->channels[0][7] = kNone; },
+  };
+  for (std::size_t i = 0; i < damages.size(); ++i) {
+    SCOPED_TRACE(i);
+    StoreInMemory store;
+    store.blocks = right.blocks;
+    damages[i](&store.blocks.at(1));
+    options.store = &store;
+    const model::LightField found = EstimateByBlocks(input, options, Twin().get(), &summary);
+    EXPECT_EQ(found.values, expected.values);
+    EXPECT_EQ(store.kept, 1);
+    EXPECT_EQ(summary.blocks_from_store, static_cast<int>(right.blocks.size()) - 1);
+  }
+}
+
+// Whatever changes the blocks changes what a store is told of the run.
+TEST(BlockSolver, AStoreIsToldOfAllThatBlocksDependOn) {
+  MadeUp made_up;
+  made_up.width_px = made_up.height_px = 8;
+  const model::LightFieldPlanes planes{0, 780};
+  const auto told = [](const EstimateInput& input, BlockOptions options) {
+    StoreInMemory store;
+    options.store = &store;
+    EstimateSummary summary;
+    EstimateByBlocks(input, options, Twin().get(), &summary);
+    return std::make_pair(store.settings, store.data_bytes);
+  };
+  const EstimateInput usual = MakeCameraInput(made_up, planes, 800, 1);
+  const auto of_usual = told(usual, {});
+  BlockOptions threads;
+  threads.threads = 2;
+  EXPECT_EQ(told(usual, threads), of_usual) << "the result does not depend on them";
+
+  const std::vector<std::function<void(BlockOptions*)>> settings = {
+      [](BlockOptions* o) { o->gamma = 2; },
+      [](BlockOptions* o) { o->ridge = 0.1; },
+      [](BlockOptions* o) { o->block_px = 4; },
+      [](BlockOptions* o) { o->splat = kernels::Splat::kNearest; },
+      [](BlockOptions* o) { o->solver = BlockSolver::kBicgstab; },
+      [](BlockOptions* o) { o->rcond_min = 1e-13; },
+      [](BlockOptions* o) { o->falloff = false; },
+  };
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    BlockOptions options;
+    settings[i](&options);
+    EXPECT_NE(told(usual, options), of_usual) << i;
+  }
+  BlockOptions iterative;
+  iterative.solver = BlockSolver::kCg;
+  const auto of_iterative = told(usual, iterative);
+  BlockOptions other = iterative;
+  other.tolerance = 1e-5;
+  EXPECT_NE(told(usual, other), of_iterative);
+  other = iterative;
+  other.max_iterations = 999;
+  EXPECT_NE(told(usual, other), of_iterative);
+  BlockOptions stencil;
+  stencil.solver = BlockSolver::kEigen;
+  const auto of_warp = told(usual, stencil);
+  stencil.stencil = Stencil::kSource;
+  EXPECT_NE(told(usual, stencil), of_warp);
+
+  const std::vector<std::function<void(EstimateInput*)>> inputs = {
+      [](EstimateInput* input) { input->picture.values[5] += 1e-6F; },
+      [](EstimateInput* input) { input->disparity.disparity[5] *= 1.000001F; },
+      [](EstimateInput* input) { input->disparity.step.x() *= 1 + 1e-9; },
+      [](EstimateInput* input) {
+        input->weights(0, 0) += 0.01;
+        input->weights(1, 1) -= 0.01;
+      },
+  };
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    EstimateInput input = usual;
+    inputs[i](&input);
+    EXPECT_NE(told(input, {}), of_usual) << i;
+  }
+  EXPECT_NE(told(MakeCameraInput(made_up, {0, 781}, 800, 1), {}), of_usual);
 }
 
 // Rays that land beside the picture are in no block.

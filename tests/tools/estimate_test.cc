@@ -23,6 +23,7 @@
 #include "depth_io.h"
 #include "image_io.h"
 #include "light_field_io.h"
+#include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
@@ -345,9 +346,7 @@ TEST_F(EstimateTest, AFailingRunLeavesTheOlderLightField) {
 }
 
 TEST_F(EstimateTest, TheMemoryLimitHolds) {
-#ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "the sanitizer needs memory of its own";
-#endif
+  if (thicklens::testing::kIsSanitized) GTEST_SKIP() << "the sanitizer needs memory of its own";
   // The middle is flat and in focus: only the sides tell how much memory blocks need.
   constexpr int kWide = 144;
   constexpr int kHigh = 96;

@@ -18,6 +18,7 @@
 
 #include "child_process.h"
 #include "program_run.h"
+#include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 #include "thicklens/model/output_file.h"
 
@@ -26,14 +27,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using Arguments = std::vector<std::string>;
+using ::testing::AllOf;
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kIsSanitized = true;
-#else
-constexpr bool kIsSanitized = false;
-#endif
 
 constexpr char kScene[] = R"(schema: thicklens/simulate-scene/1
 camera: camera.yaml
@@ -250,7 +246,7 @@ TEST_F(Faults, AnOutputFolderThatVanishesIsTold) {
 }
 
 TEST_F(Faults, TooLittleMemoryIsToldAndTakesNothingAway) {
-  if (kIsSanitized) GTEST_SKIP() << "a sanitizer takes memory by the terabyte";
+  if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer takes memory by the terabyte";
   const Job job = EstimateJob();
   ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
   // From what does not even hold the libraries to what does; whether the program gets as far as its
@@ -279,6 +275,72 @@ TEST_F(Faults, TooLittleMemoryIsToldAndTakesNothingAway) {
   }
   EXPECT_TRUE(was_told);
 }
+
+// ---- OpenCL drivers that fail ----
+
+#ifdef THICKLENS_OPENCL_FAULTS
+
+class OpenClFaults : public Faults {
+ protected:
+  // CALL:N:ERROR, see faults/opencl_faults.cc.
+  ProgramRun RunWith(const std::string& fault, const Arguments& arguments) {
+    Arguments words = {std::string("LD_PRELOAD=") + THICKLENS_OPENCL_FAULTS,
+                       "THICKLENS_FAULT=" + fault, THICKLENS_PROGRAM};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return RunProgram("/usr/bin/env", words, folder_.path(), 120);
+  }
+};
+
+// Calls that fail from one on, at any stage of the work, on each way that has a device.
+TEST_F(OpenClFaults, ADeviceThatIsLostHalfwayIsToldAndTakesNothingAway) {
+  const Job job = EstimateJob();
+  ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
+  const Contents before = ContentsOf(job.output);
+  const std::vector<Arguments> commands = {
+      Estimate({"--views", "3x3", "--solver", "blocks", "--device", "opencl", "-o", job.output}),
+      Estimate({"--views", "3x3", "--solver", "scene", "--device", "opencl", "-o", job.output}),
+      {"render", job.output, "--focus", "300", "--device", "opencl", "-o", folder_ / "new.png"}};
+  int lost = 0;
+  for (const Arguments& command : commands) {
+    // The first two run in the trial, which has its own count; an estimate needs some hundred.
+    for (const std::string fault : {"clEnqueueNDRangeKernel:3:-5", "clEnqueueNDRangeKernel:20:-5",
+                                    "clFinish:5:-36", "clCreateBuffer:9:-4"}) {
+      SCOPED_TRACE(command[0] + " " + command[command.size() - 4] + " " + fault);
+      const ProgramRun run = RunWith(fault, command);
+      if (run.exit_code == 0 && command[0] == "render") continue;  // fewer calls than that
+      EXPECT_EQ(run.exit_code, 1) << run.err;
+      EXPECT_FALSE(run.timed_out);
+      EXPECT_THAT(run.err, HasSubstr("error: device opencl:0:0"));
+      EXPECT_EQ(ContentsOf(job.output), before);
+      EXPECT_FALSE(fs::exists(folder_ / "new.png"));
+      ++lost;
+    }
+  }
+  EXPECT_GE(lost, 8);  // all of the estimates
+}
+
+TEST_F(OpenClFaults, ACompilerThatFailsLeavesTheWorkToTheProcessor) {
+  const Job job = EstimateJob();
+  const std::string fault = "clBuildProgram:1:-11";
+  const Arguments blocks = {"--views", "3x3", "--solver", "blocks", "-o", job.output};
+  Arguments processor = Estimate(blocks);
+  processor.insert(processor.end(), {"--device", "cpu"});
+  ASSERT_EQ(Run(processor).exit_code, 0);
+  const Contents expected = WithoutTimes(ContentsOf(job.output));
+  const ProgramRun chosen = RunWith(fault, Estimate(blocks));
+  ASSERT_EQ(chosen.exit_code, 0) << chosen.err;
+  EXPECT_THAT(chosen.err, AllOf(HasSubstr("device opencl:0:0"), HasSubstr("build")));
+  EXPECT_EQ(WithoutTimes(ContentsOf(job.output)), expected);
+
+  Arguments asked = Estimate(blocks);
+  asked.insert(asked.end(), {"--device", "opencl"});
+  const ProgramRun refused = RunWith(fault, asked);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("device opencl:0:0"), HasSubstr("build")));
+  EXPECT_EQ(WithoutTimes(ContentsOf(job.output)), expected);
+}
+
+#endif  // THICKLENS_OPENCL_FAULTS
 
 }  // namespace
 }  // namespace thicklens::tools

@@ -17,6 +17,8 @@
 
 namespace thicklens::estimator {
 
+class BlockStore;
+
 // What solves the linear system of one block.
 enum class BlockSolver {
   kUmfpack,  // unsymmetric multifrontal LU (the source's choice); GPL
@@ -61,6 +63,7 @@ struct BlockOptions {
   int threads = 0;      // 0: one per core
   // Called from any thread, one at a time, as blocks are finished. May throw to stop.
   std::function<void(int done, int total)> progress;
+  BlockStore* store = nullptr;  // where blocks are looked for and kept; none: they are not
 
   bool IsValid(std::string* why) const;
 };
@@ -96,6 +99,7 @@ struct EstimateSummary {
   std::string message = "not run";
   int block_px = 0;
   std::vector<BlockReport> blocks;
+  int blocks_from_store = 0;  // of these; the others were solved
   double gamma = 0, ridge = 0;
   std::optional<double> rcond_min;  // over the blocks; absent: the solver is iterative
   double relative_residual = 0;     // the largest
