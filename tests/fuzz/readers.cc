@@ -4,11 +4,13 @@
 #include <opencv2/core/mat.hpp>
 #include <stdexcept>
 
+#include "block_checkpoint.h"
 #include "depth_io.h"
 #include "estimate_profile.h"
 #include "estimate_records.h"
 #include "exif.h"
 #include "image_io.h"
+#include "journal_file.h"
 #include "light_field_io.h"
 #include "thicklens/error.h"
 #include "thicklens/model/camera_file.h"
@@ -50,6 +52,25 @@ lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0
 sensor: {width_px: 512, height_px: 512, pixel_pitch_mm: 0.0045, principal_point_px: [255.5, 255.5], transfer: linear}
 psf: gaussian
 )";
+
+// The file, and the same bytes as the content of records whose hashes are right.
+void ReadCheckpoint(const std::string& bytes, const TemporaryFolder& folder) {
+  const std::string records = folder / "records.blocks";
+  fs::remove(records);
+  {
+    tools::JournalFile journal(records, "thicklens-blocks/1");
+    const std::size_t half = bytes.find('\n');
+    journal.Append(bytes.substr(0, half));
+    journal.Append(half == std::string::npos ? "" : bytes.substr(half + 1));
+  }
+  for (const std::string& path : {records, folder.Put("estimate.blocks", bytes)}) {
+    tools::BlockCheckpoint checkpoint(path);
+    checkpoint.device();
+    // What is left out of a file is no error to the reader; here it is.
+    const bool is_whole = checkpoint.block_px() && checkpoint.Find(0) && checkpoint.Find(1);
+    if (path != records && !is_whole) throw Error(path + ": a block is missing");
+  }
+}
 
 }  // namespace
 
@@ -94,6 +115,7 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
        }},
       OfFile("photo-exif", "photo.jpg",
              [](const std::string& path) { tools::ReadPhotoExif(path, 640, 480); }),
+      {"block-checkpoint", ReadCheckpoint},
       OfFile("profile-json", "profile.json",
              [](const std::string& path) { tools::ReadProfile(path); }),
       OfFile("estimate-json", "estimate.json",

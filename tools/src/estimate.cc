@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "block_checkpoint.h"
 #include "build_info.h"
 #include "commands.h"
 #include "confidence_files.h"
@@ -51,11 +52,27 @@ struct Outputs {
       : light_field(options.output_folder, kLightFieldMarker, LightFieldEntries()),
         report_folder(options.report_folder) {
     if (!options.report_folder.empty()) report.emplace(options.report_path());
+    if (!options.checkpoint_path.empty()) {
+      checkpoint = std::make_unique<BlockCheckpoint>(options.checkpoint_path);
+    }
   }
+  // However a run ends whose light field is not there.
+  ~Outputs() {
+    const int kept = checkpoint ? checkpoint->kept() : 0;
+    if (kept == 0) return;
+    spdlog::warn(
+        "{} block(s) that were solved are kept in {}: the same command goes on from there; for "
+        "other "
+        "settings remove it or name another",
+        kept, checkpoint->path());
+  }
+  Outputs(const Outputs&) = delete;
+  Outputs& operator=(const Outputs&) = delete;
 
   model::OutputFolder light_field;
   ReportFolder report_folder;
   std::optional<model::OutputFile> report;
+  std::unique_ptr<BlockCheckpoint> checkpoint;  // none: it was not asked for
 };
 
 // No part of a picture that is solved for as a whole is larger: what that would take grows, and
@@ -121,15 +138,29 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
 }
 
 void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput& input,
-                 const model::EffectSet& on, const Progress& progress, EstimateOutcome* outcome) {
+                 const model::EffectSet& on, const Progress& progress, BlockCheckpoint* checkpoint,
+                 EstimateOutcome* outcome) {
   std::string notice;
-  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
-                                            ThrowIfInterrupted);
+  // What auto finds may depend on how busy the machine is.
+  const std::string device = options.device == "auto" && checkpoint != nullptr
+                                 ? checkpoint->device().value_or(options.device)
+                                 : options.device;
+  const auto backend =
+      kernels::OpenBackend(kernels::ParseDeviceRequest(device), &notice, ThrowIfInterrupted);
   if (!notice.empty()) spdlog::warn("{}", notice);
   spdlog::debug("device: {}", backend->description());
+  estimator::BlockOptions settings = BlockOptionsOf(options, on, progress);
+  settings.store = checkpoint;
+  // Which blocks a memory limit allows differs a little from run to run, with what the process
+  // holds besides.
+  constexpr double kLittle = 1.05;
+  if (checkpoint != nullptr && checkpoint->block_px() && settings.memory_limit_mib &&
+      !settings.block_px) {
+    settings.block_px = checkpoint->block_px();
+    *settings.memory_limit_mib *= kLittle;
+  }
   estimator::EstimateSummary blocks;
-  outcome->light_field = estimator::EstimateByBlocks(input, BlockOptionsOf(options, on, progress),
-                                                     backend.get(), &blocks);
+  outcome->light_field = estimator::EstimateByBlocks(input, settings, backend.get(), &blocks);
   outcome->seconds.setup += blocks.setup_seconds;
   outcome->seconds.solve = blocks.solve_seconds;
   outcome->blocks = std::move(blocks);
@@ -184,11 +215,12 @@ void CheckSettings(const EstimateOptions& options) {
 }
 
 void Solve(const EstimateOptions& options, const PreparedEstimate& prepared,
-           const Progress& progress, LightFieldWriter* writer, EstimateOutcome* outcome) {
+           const Progress& progress, LightFieldWriter* writer, BlockCheckpoint* checkpoint,
+           EstimateOutcome* outcome) {
   const estimator::EstimateInput& input = prepared.input;
   const model::EffectSet& on = prepared.effects.on;
   if (options.solver == "scene") return SolveScene(options, input, on, progress, writer, outcome);
-  if (options.by_blocks()) return SolveBlocks(options, input, on, progress, outcome);
+  if (options.by_blocks()) return SolveBlocks(options, input, on, progress, checkpoint, outcome);
   SolveFunctional(options, input, on, progress, outcome);
 }
 
@@ -261,14 +293,14 @@ std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
 CommandResult RunEstimate(const EstimateOptions& given) {
   const auto start = Clock::now();
   EstimateOptions options = given;
+  CheckSettings(options);  // before anything is read
+  if (options.memory_limit_mib) ReturnMemoryAtOnce();
+  Outputs outputs(options);
   ProgressLine line("estimating", options.common.quiet);
   const Progress progress = [&line](int done, int total) {
     ThrowIfInterrupted();
     line.Show(done, total);
   };
-  CheckSettings(options);  // before anything is read
-  if (options.memory_limit_mib) ReturnMemoryAtOnce();
-  Outputs outputs(options);
   PreparedEstimate prepared = PrepareEstimate(options);
   ThrowIfInterrupted();
   std::optional<PlanChoice> choice;
@@ -285,7 +317,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   LightFieldWriter writer(prepared.input.transfer,
                           options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng,
                           &outputs.light_field);
-  Solve(options, prepared, progress, &writer, &outcome);
+  Solve(options, prepared, progress, &writer, outputs.checkpoint.get(), &outcome);
   if (options.fill == "telea") Inpaint(options, prepared.input, &outcome);
   model::LightFieldOrigin& origin = outcome.light_field.origin;
   origin.seconds = outcome.seconds.setup + outcome.seconds.solve + outcome.seconds.views;
@@ -318,6 +350,9 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   ThrowIfInterrupted();
   outputs.light_field.Commit();
   if (outputs.report) outputs.report->Commit(page);
+  if (outputs.checkpoint && !outputs.checkpoint->Remove()) {
+    spdlog::warn("{}: is no longer needed, and could not be removed", outputs.checkpoint->path());
+  }
   for (const std::string& warning : EstimateWarnings(options, outcome)) spdlog::warn("{}", warning);
   PrintResult(options.common, text);
   return result;
@@ -331,10 +366,10 @@ void AddEstimateCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       CheckEstimateUsage(*options);
-      RequireDistinctFiles(
-          {options->common.json_path, options->output_folder, options->report_path()},
-          {options->picture_path, options->depth_path, options->camera_path, options->aperture_of,
-           options->profile_path});
+      RequireDistinctFiles({options->common.json_path, options->output_folder,
+                            options->report_path(), options->checkpoint_path},
+                           {options->picture_path, options->depth_path, options->camera_path,
+                            options->aperture_of, options->profile_path});
       RunCommand(options->common, [&] { return RunEstimate(*options); });
     };
   });

@@ -39,6 +39,14 @@ CLI::Validator IsStrength() {
           ""};
 }
 
+// What a variable of the shell gives that was never set.
+CLI::Validator NotEmpty(const std::string& what) {
+  return {[what](std::string& given) {
+            return given.empty() ? what + " is expected, found ''" : std::string();
+          },
+          ""};
+}
+
 void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   command->add_option("picture", options->picture_path, "The photograph")
       ->required()
@@ -210,6 +218,12 @@ void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
                    "nearest")
       ->check(CLI::IsMember({"nearest", "bilinear"}))
       ->type_name("NAME");
+  command
+      ->add_option("--checkpoint", options->checkpoint_path,
+                   "Of blocks: keep each that is solved in this file, so that the same command "
+                   "goes on where it was interrupted; removed once the light field is there")
+      ->check(NotEmpty("a file's name"))
+      ->type_name("FILE");
 }
 
 // An option that not every solver has.
@@ -239,7 +253,8 @@ std::vector<OptionOfSolvers> OptionsOfSolvers(const EstimateOptions& options) {
           {"--block-solver", options.block_solver.has_value(), blocks},
           {"--block-px", options.block_px.has_value(), blocks},
           {"--stencil", options.stencil.has_value(), blocks},
-          {"--splat", options.splat.has_value(), blocks}};
+          {"--splat", options.splat.has_value(), blocks},
+          {"--checkpoint", !options.checkpoint_path.empty(), blocks}};
 }
 
 // "a", "a or b", "a, b or c".
@@ -248,22 +263,23 @@ std::string Either(const std::vector<std::string>& names) {
   return fmt::format("{} or {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
 }
 
-// The light field's folder is replaced as a whole; a page in it would go with the older one.
-void RequireReportBesideLightField(const EstimateOptions& options) {
-  if (options.report_folder.empty()) return;
-  const auto resolved = [](const std::string& path) {
+// The light field's folder is replaced as a whole; what lies in it would go with the older one.
+void RequireBesideLightField(const char* option, const std::string& path,
+                             const EstimateOptions& options) {
+  if (path.empty()) return;
+  const auto resolved = [](const std::string& given) {
     std::error_code failure;
-    fs::path found = fs::weakly_canonical(fs::absolute(path), failure);
-    if (failure) found = fs::absolute(path).lexically_normal();
+    fs::path found = fs::weakly_canonical(fs::absolute(given), failure);
+    if (failure) found = fs::absolute(given).lexically_normal();
     return found.has_filename() ? found : found.parent_path();
   };
-  const fs::path report = resolved(options.report_folder);
+  const fs::path inner = resolved(path);
   const fs::path output = resolved(options.output_folder);
-  const auto differing = std::mismatch(report.begin(), report.end(), output.begin(), output.end());
+  const auto differing = std::mismatch(inner.begin(), inner.end(), output.begin(), output.end());
   if (differing.second == output.end()) {
     throw UsageError(
-        fmt::format("--report {}: lies in the light field's folder {}; choose a name outside of it",
-                    options.report_folder, options.output_folder));
+        fmt::format("{} {}: lies in the light field's folder {}; choose a name outside of it",
+                    option, path, options.output_folder));
   }
 }
 
@@ -339,7 +355,8 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   CheckSolverUsage(options);
   needs(!options.profile_path.empty(), options.wish.IsMade(),
         "--profile is what --quality, --within or --psnr-loss choose from, and none is given");
-  RequireReportBesideLightField(options);
+  RequireBesideLightField("--report", options.report_folder, options);
+  RequireBesideLightField("--checkpoint", options.checkpoint_path, options);
 }
 
 estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,

@@ -48,6 +48,7 @@ struct EstimateOptions {
   std::optional<std::string> block_solver, stencil, splat;
   std::optional<double> gamma, ridge;
   std::optional<int> block_px;
+  std::string checkpoint_path;
   // In place of these: what it is to be like, chosen from a profile (empty: the person's own, or
   // the one that ships).
   PlanWish wish;

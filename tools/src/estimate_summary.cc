@@ -101,6 +101,7 @@ void AddBlocks(const EstimateOutcome& outcome, json* out) {
                {"threads", blocks.threads},
                {"block_px", blocks.block_px},
                {"blocks", blocks.blocks.size()},
+               {"blocks_from_checkpoint", blocks.blocks_from_store},
                {"predicted_memory_mib", blocks.predicted_memory_mib},
                {"iterations", iterations},
                {"converged", converged},
@@ -169,9 +170,11 @@ double HoleShare(const PreparedEstimate& prepared) {
 
 std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
   if (outcome.blocks) {
+    const int found = outcome.blocks->blocks_from_store;
     return fmt::format(
-        "solver       {} blocks of {} px, {} ({} stencil), gamma {:g}, ridge {:.3g}\n",
+        "solver       {} blocks of {} px{}, {} ({} stencil), gamma {:g}, ridge {:.3g}\n",
         summary["blocks"].get<int>(), summary["block_px"].get<int>(),
+        found > 0 ? fmt::format(" ({} from the checkpoint)", found) : "",
         summary["block_solver"].get<std::string>(), summary["stencil"].get<std::string>(),
         summary["gamma"].get<double>(), summary["ridge"].get<double>());
   }

@@ -68,7 +68,7 @@ void AddPlanWishOptions(CLI::App* command, PlanWish* wish) {
   quality->excludes(within)->excludes(loss);
   for (const char* chosen : {"--solver", "--prior", "--strength", "--check-blur", "--tolerance",
                              "--max-iterations", "--double", "--gamma", "--ridge", "--block-solver",
-                             "--block-px", "--stencil", "--splat", "--device"}) {
+                             "--block-px", "--stencil", "--splat", "--checkpoint", "--device"}) {
     for (CLI::Option* option : {quality, within, loss}) option->excludes(chosen);
   }
 }

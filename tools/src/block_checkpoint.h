@@ -1,0 +1,52 @@
+#ifndef THICKLENS_TOOLS_BLOCK_CHECKPOINT_H_
+#define THICKLENS_TOOLS_BLOCK_CHECKPOINT_H_
+
+#include <cstddef>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "journal_file.h"
+#include "thicklens/estimator/block_store.h"
+
+namespace thicklens::tools {
+
+// The blocks of `estimate --checkpoint FILE`: a journal whose first record says as JSON which
+// estimate they are of, and whose others are a block each.
+class BlockCheckpoint final : public estimator::BlockStore {
+ public:
+  // Throws Error for a file that is none, or is at work.
+  explicit BlockCheckpoint(const std::string& path);
+
+  const std::string& path() const { return journal_.path(); }
+  // What the run that left blocks there said of itself: the edge of its blocks, and the --device
+  // that computes as it did.
+  std::optional<int> block_px() const;
+  std::optional<std::string> device() const;
+  // Blocks that the run which has begun could go on from.
+  int kept() const;
+
+  // Throws Error for a file that is of another estimate, and says what differs.
+  void Begin(const estimator::BlockRun& run) override;
+  std::optional<estimator::SolvedBlock> Find(int block) override;
+  void Keep(int block, const estimator::SolvedBlock& solved) override;
+
+  // The light field is there. Whether the file could be removed.
+  bool Remove();
+
+ private:
+  std::string Setting(const std::string& name) const;  // of the run that left blocks; empty: none
+
+  JournalFile journal_;
+  nlohmann::json there_;      // what that run is of; null: there was none
+  std::string here_;          // what this one is of; empty: its blocks follow
+  mutable std::mutex mutex_;  // of what follows
+  bool is_begun_ = false;
+  std::map<int, std::size_t> record_of_block_;
+};
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_BLOCK_CHECKPOINT_H_
