@@ -1,9 +1,13 @@
 // What happens around the program: it is killed or interrupted at any moment, runs twice at the
 // same time, has too little memory, and loses the folder that it writes to. What was there before
 // stays whole, what comes is whole, and nothing takes forever.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -274,6 +278,37 @@ TEST_F(Faults, TooLittleMemoryIsToldAndTakesNothingAway) {
     }
   }
   EXPECT_TRUE(was_told);
+}
+
+// A pipe in a file's place shows what a reader sees of a file that is cut while it reads.
+TEST_F(Faults, AFileThatEndsWhileItIsReadIsTold) {
+  const Job job = EstimateJob();
+  ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
+  const Contents before = ContentsOf(job.output);
+  for (const std::string name : {"picture.png", "depth.pfm", "camera.yaml"}) {
+    SCOPED_TRACE(name);
+    const std::string whole = folder_ / "pic/" + name;
+    const std::string bytes = model::ReadWholeFile(whole);
+    const std::string pipe = folder_ / "cut-" + name;
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    Arguments arguments = job.ways[0];
+    std::replace(arguments.begin(), arguments.end(), whole, pipe);
+    ChildProgram program(arguments, folder_.path(), 0);
+    int writer = -1;
+    while (writer < 0 && program.Running()) {
+      writer = ::open(pipe.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+      if (writer < 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    if (writer >= 0) {
+      // As much as the pipe takes: what matters is that it is not all.
+      EXPECT_GT(::write(writer, bytes.data(), bytes.size() / 2), 0);
+      ::close(writer);
+    }
+    const ProgramResult result = program.Wait();
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("error: " + pipe));
+    EXPECT_EQ(ContentsOf(job.output), before);
+  }
 }
 
 // ---- OpenCL drivers that fail ----
