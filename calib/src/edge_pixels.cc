@@ -74,9 +74,8 @@ double Quantile(const cv::Mat& values, double fraction) {
       const auto* row = values.ptr<float>(y);
       for (int x = y / 4 % 8; x < values.cols; x += 8) sorted.push_back(row[x]);
     }
-    const double guess =
-        nth(&sorted,
-            static_cast<std::ptrdiff_t>((2 * fraction - 1) * static_cast<double>(sorted.size())));
+    const auto last = static_cast<double>(sorted.size() - 1);
+    const double guess = nth(&sorted, static_cast<std::ptrdiff_t>((2 * fraction - 1) * last));
     sorted.clear();
     for (int y = 0; y < values.rows; ++y) {
       const auto* row = values.ptr<float>(y);

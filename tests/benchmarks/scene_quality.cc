@@ -49,8 +49,10 @@ struct Row {
 void AddNoise(double sigma_px, std::uint64_t seed, estimator::DisparityMap* map) {
   const double step = map->step.cwiseAbs().maxCoeff();
   std::mt19937_64 engine(seed);
-  std::normal_distribution<double> normal(0, sigma_px / step);
-  for (float& disparity : map->disparity) disparity += static_cast<float>(normal(engine));
+  std::normal_distribution<double> normal(0, 1);
+  for (float& disparity : map->disparity) {
+    disparity += static_cast<float>(sigma_px / step * normal(engine));
+  }
 }
 
 // One photograph, through hundreds of rays a pixel, and its true views.

@@ -56,9 +56,11 @@ class KnownTexture {
       const std::complex<double> step = std::polar(1.0, kTurn * in_frame.x());
       const Eigen::Vector2d first = -origin_px - view.shift_px;
       for (int y = 0; y < height_px; ++y) {
-        std::complex<double> value = std::polar(
-            amplitude,
-            kTurn * (in_frame.x() * first.x() + in_frame.y() * (first.y() + y)) + wave.phase);
+        // The amplitude may be negative.
+        std::complex<double> value =
+            amplitude *
+            std::polar(1.0, kTurn * (in_frame.x() * first.x() + in_frame.y() * (first.y() + y)) +
+                                wave.phase);
         for (int x = 0; x < width_px; ++x) {
           sum(y, x) += value.real();
           value = {value.real() * step.real() - value.imag() * step.imag(),
@@ -86,11 +88,11 @@ class KnownTexture {
 
 inline cv::Mat WithWhiteNoise(const cv::Mat& grey, double sigma, unsigned seed) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, sigma);
+  std::normal_distribution<double> normal(0, 1);
   cv::Mat noisy = grey.clone();
   for (int y = 0; y < noisy.rows; ++y) {
     for (int x = 0; x < noisy.cols; ++x)
-      noisy.at<float>(y, x) += static_cast<float>(normal(random));
+      noisy.at<float>(y, x) += static_cast<float>(sigma * normal(random));
   }
   return noisy;
 }

@@ -48,13 +48,14 @@ DisplacementField Truth() {
 
 std::vector<TileShift> Tiles(const DisplacementField& field, double sigma_px, unsigned seed) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> noise(0, sigma_px);
+  std::normal_distribution<double> noise(0, 1);
   std::vector<TileShift> tiles;
   for (int j = 0; j < 4; ++j) {
     for (int i = 0; i < 4; ++i) {
       TileShift tile;
       tile.centre_px << -80 + 55 * i, -85 + 55 * j;
-      tile.shift_px = Seen(tile.centre_px, field) + Eigen::Vector2d(noise(random), noise(random));
+      tile.shift_px =
+          Seen(tile.centre_px, field) + sigma_px * Eigen::Vector2d(noise(random), noise(random));
       tile.information.setIdentity();
       tile.information /= std::pow(std::max(sigma_px, 1e-4), 2);
       tiles.push_back(tile);

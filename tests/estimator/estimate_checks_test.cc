@@ -38,8 +38,8 @@ double WithEdges(int x, int y) { return Slant(x, y) + (x / 25) * 0.9 - (y / 30) 
 
 DisparityMap WithNoise(DisparityMap map, double sigma_px, unsigned seed) {
   std::mt19937 engine(seed);
-  std::normal_distribution<float> noise(0, static_cast<float>(sigma_px));
-  for (float& disparity : map.disparity) disparity += noise(engine);
+  std::normal_distribution<float> noise(0, 1);
+  for (float& disparity : map.disparity) disparity += static_cast<float>(sigma_px) * noise(engine);
   return map;
 }
 

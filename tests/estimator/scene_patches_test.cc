@@ -28,10 +28,10 @@ DataTerm<Real> SharpPhotograph(double noise_sigma, int threads) {
   };
   data.projection.apply_transposed = data.projection.apply;
   std::mt19937 engine(1);
-  std::normal_distribution<double> noise(0, noise_sigma);
+  std::normal_distribution<double> noise(0, 1);
   for (std::size_t i = 0; i < kChannels * kPixels; ++i) {
     const double wave = 0.1 * std::sin(0.9 * static_cast<double>(i % kWidth));
-    data.photograph.push_back(static_cast<Real>(0.5 + wave + noise(engine)));
+    data.photograph.push_back(static_cast<Real>(0.5 + wave + noise_sigma * noise(engine)));
   }
   data.weight.assign(kPixels, Real{1});
   data.squared_row.assign(kPixels, Real{1});

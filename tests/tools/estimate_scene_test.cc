@@ -365,8 +365,8 @@ TEST_F(EstimateSceneTest, WarnsOfStepsThatAreTooLarge) {
 TEST_F(EstimateSceneTest, SmoothsANoisyDepthAndWarnsWhereItStaysNoisy) {
   const auto with_noise = [&](double sigma_px) {
     std::mt19937 engine(11);
-    std::normal_distribution<double> noise(0, sigma_px);
-    return Depth([&](int x, int) { return 0.01 * x - 0.5 + noise(engine); });
+    std::normal_distribution<double> noise(0, 1);
+    return Depth([&](int x, int) { return 0.01 * x - 0.5 + sigma_px * noise(engine); });
   };
   const auto summary_of = [&](double sigma_px, const Arguments& more) {
     return Summary(With(
