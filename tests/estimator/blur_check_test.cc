@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "support/sanitizers.h"
 #include "thicklens/model/light_field_grid.h"
 
 namespace thicklens::estimator {
@@ -209,9 +210,7 @@ TEST(BlurCheck, KeepsToTheMemoryLimitInTheMiddle) {
   CheckBlur(Plane(), options);  // what it takes once is taken
   options.memory_limit_mib = 1;
   EXPECT_THAT(ErrorOf([&] { CheckBlur(Plane(), options); }), HasSubstr("memory_limit_mib is 1"));
-#if defined(__SANITIZE_ADDRESS__)
-  GTEST_SKIP() << "the address sanitizer holds back what was freed";
-#endif
+  if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
   int fewest = kH;
   for (double mib = 4; mib < 4000 && fewest == kH; mib *= 1.05) {
     options.memory_limit_mib = mib;

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "support/sanitizers.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/scene_solver.h"
 
@@ -197,9 +198,7 @@ TEST(SceneBands, ReachAsFarAsTheOutermostView) {
 }
 
 TEST(SceneBands, AreAsManyAsTheMemoryAsksFor) {
-#if defined(__SANITIZE_ADDRESS__)
-  GTEST_SKIP() << "the address sanitizer holds back what was freed";
-#endif
+  if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
   const EstimateInput input = CardBeforeWall(320, 800, 3);
   SceneOptions options;
   options.prior = Prior::kRidge;
