@@ -13,6 +13,7 @@
 
 #include "bench_scene.h"
 #include "bench_source_rows.h"
+#include "bench_source_tables.h"
 #include "child_process.h"
 #include "depth_io.h"
 #include "image_io.h"
@@ -101,7 +102,7 @@ TEST_F(BenchSourceTest, LargePicturesAreSampledAndSaySo) {
     }
     EXPECT_NE(row["implementation"], "opencl");
   }
-  EXPECT_THAT(result_.out, HasSubstr("64 of 100 of 160x160; --full runs all"));
+  EXPECT_THAT(result_.out, HasSubstr("64 of 100 of 160x160 with 2x2 views; --full runs all"));
   EXPECT_THAT(result_.err, HasSubstr("rows of OpenCL are left out"));
 }
 
@@ -153,6 +154,37 @@ TEST_F(BenchSourceTest, RefusesWhatCannotBeMeant) {
 }
 
 // What table 4 takes for granted.
+// What blocks take grows so fast with the views that fewer parts stand for the picture.
+TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
+  SourcePicture picture;
+  picture.whole = MakeBenchScene(160, 192, 2, 2, 1, 1, {});
+  const auto parts_with = [&](int views, bool full) {
+    picture.rects.clear();
+    picture.parts.clear();
+    picture.sample.reset();
+    picture.views = views;  // of what is to be measured; the scene's own are enough for its parts
+    Cut(full, &picture);
+    double pixels = 0;
+    for (const BenchScene& part : picture.parts) {
+      pixels += static_cast<double>(part.input.picture.values.size());
+    }
+    EXPECT_NEAR((full ? 1 : picture.pixels_per_part_pixel) * pixels, 160 * 192, 1e-6);
+    return picture.parts.size();
+  };
+  EXPECT_EQ(parts_with(3, false), 4U);
+  EXPECT_EQ(picture.sample->solved, 64);
+  EXPECT_EQ(parts_with(5, false), 2U);
+  EXPECT_EQ(picture.sample->solved, 32);
+  // They meet in the picture's middle and share no row and no column.
+  EXPECT_LE(picture.rects[0].x + picture.rects[0].width, picture.rects[1].x);
+  EXPECT_LE(picture.rects[0].y + picture.rects[0].height, picture.rects[1].y);
+  EXPECT_EQ(parts_with(7, false), 1U);
+  EXPECT_EQ(picture.sample->solved, 16);
+  EXPECT_EQ(picture.sample->all, 120);
+  EXPECT_EQ(parts_with(7, true), 1U);
+  EXPECT_FALSE(picture.sample);
+}
+
 TEST(BenchSceneTest, ThinTwinHasTheSameGridAndDisparities) {
   model::Camera thick = BenchCamera(64, 64);
   const double focus_depth_mm = thick.focus_depth_mm();

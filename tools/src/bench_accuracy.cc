@@ -221,7 +221,7 @@ std::vector<PriceRow> MeasureScene(const BenchAccuracyOptions& options, const Sc
                                    int views, const PlanGrid& grid, const Backends& backends) {
   SampledPicture picture;
   picture.whole = Simulate(options, scene, views, backends.threads);
-  CutParts(options.full, &picture);
+  CutParts(options.full, PartCount::kFour, &picture);
   std::vector<PriceRow> rows;
   PriceRow row;
   row.scene = scene.name;

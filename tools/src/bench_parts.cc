@@ -1,6 +1,7 @@
 #include "bench_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <utility>
 
@@ -16,7 +17,7 @@ int BlocksOf(const model::LinearPicture& picture) {
 
 }  // namespace
 
-void CutParts(bool full, SampledPicture* picture) {
+void CutParts(bool full, PartCount count, SampledPicture* picture) {
   constexpr int kPartPx = 4 * kSourceBlockPx;
   const int width_px = picture->whole.input.picture.width_px;
   const int height_px = picture->whole.input.picture.height_px;
@@ -28,17 +29,18 @@ void CutParts(bool full, SampledPicture* picture) {
     return;
   }
   BlockSample sample{0, BlocksOf(picture->whole.input.picture)};
-  for (const int quarter_y : {1, 3}) {
-    for (const int quarter_x : {1, 3}) {
-      picture->rects.push_back({quarter_x * width_px / 4 - kPartPx / 2,
-                                quarter_y * height_px / 4 - kPartPx / 2, kPartPx, kPartPx});
-      picture->parts.push_back(PartOf(picture->whole, picture->rects.back()));
-      sample.solved += BlocksOf(picture->parts.back().input.picture);
-    }
+  // In an order in which the first two meet in a corner.
+  constexpr std::array<std::array<int, 2>, 4> kQuarters = {{{1, 1}, {3, 3}, {3, 1}, {1, 3}}};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const auto [quarter_x, quarter_y] = kQuarters[i];
+    picture->rects.push_back({quarter_x * width_px / 4 - kPartPx / 2,
+                              quarter_y * height_px / 4 - kPartPx / 2, kPartPx, kPartPx});
+    picture->parts.push_back(PartOf(picture->whole, picture->rects.back()));
+    sample.solved += BlocksOf(picture->parts.back().input.picture);
   }
   picture->sample = sample;
   picture->pixels_per_part_pixel =
-      static_cast<double>(width_px) * height_px / (4.0 * kPartPx * kPartPx);
+      static_cast<double>(width_px) * height_px / (static_cast<double>(count) * kPartPx * kPartPx);
 }
 
 PartsRun RunParts(const SampledPicture& picture, const EstimatePlan& plan, int threads,

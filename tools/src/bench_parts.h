@@ -28,9 +28,11 @@ struct SampledPicture {
   double pixels_per_part_pixel = 1;
 };
 
-// Four parts of four by four blocks, in the middles of the picture's quarters: near, far and at
-// the plane of focus. Of a picture that is hardly larger, or if it is to be `full`, all of it.
-void CutParts(bool full, SampledPicture* picture);
+// Parts of four by four blocks, in the middles of the picture's quarters: near, far and at the
+// plane of focus. Two of them are of quarters that meet in a corner. Of a picture that is hardly
+// larger than four, or if it is to be `full`, all of it.
+enum class PartCount { kOne = 1, kTwo = 2, kFour = 4 };
+void CutParts(bool full, PartCount count, SampledPicture* picture);
 
 // The parts, estimated one after the other by blocks, and what that says of the whole.
 struct PartsRun {

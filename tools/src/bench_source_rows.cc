@@ -124,7 +124,8 @@ std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
   for (const SourceRow& row : rows) {
     if (row.table != table || !row.extrapolated) continue;
     const std::string sample =
-        fmt::format("{} of {} of {}", row.extrapolated->solved, row.extrapolated->all, row.picture);
+        fmt::format("{} of {} of {} with {}x{} views", row.extrapolated->solved,
+                    row.extrapolated->all, row.picture, row.views, row.views);
     if (std::find(samples.begin(), samples.end(), sample) == samples.end())
       samples.push_back(sample);
   }

@@ -93,7 +93,7 @@ SourceContender OfLens(const std::string& lens, const SourcePicture& picture,
   taken.input.falloff_camera.reset();
   auto parts = std::make_shared<SourcePicture>();
   parts->whole = std::move(taken);
-  CutParts(!picture.sample, parts.get());
+  CutParts(!picture.sample, PartCount::kFour, parts.get());
   row.block_solver = estimator::BlockSolverName(estimator::DefaultBlockSolver());
   return {row, [parts, &bench](SourceRow* out) {
             const PartsRun run = RunParts(*parts, SourcePlan(estimator::DefaultBlockSolver()),
@@ -115,7 +115,11 @@ SourceContender OfLens(const std::string& lens, const SourcePicture& picture,
 void Cut(bool full, SourcePicture* picture) {
   const model::LinearPicture& pixels = picture->whole.input.picture;
   picture->size = SizeNameOf(pixels.width_px, pixels.height_px);
-  CutParts(full, picture);
+  // What blocks take grows with the cube of the views and faster.
+  const PartCount count = picture->views <= 3   ? PartCount::kFour
+                          : picture->views <= 5 ? PartCount::kTwo
+                                                : PartCount::kOne;
+  CutParts(full, count, picture);
 }
 
 void AddTable1(const SourceBench& bench, const SourcePicture& picture,

@@ -19,7 +19,7 @@ struct SourcePicture : SampledPicture {
   int views = 0;
 };
 
-// As CutParts, and the name of the size.
+// As CutParts, fewer of many views, and the name of the size.
 void Cut(bool full, SourcePicture* picture);
 
 // A row to be measured: runs once and says how many seconds that took, or would take for the
