@@ -209,7 +209,7 @@ TEST_P(SceneProjectionBetween, EqualsTheRaysOneByOne) {
           if (!is_linear[i] && !cubic.is_cubic[i]) continue;
           ++compared;
           EXPECT_NEAR(y[i], is_linear[i] ? linear.picture[i] : cubic.picture[i], tolerance)
-              << u << "x" << v << " at " << i;
+              << weights.cols() << "x" << weights.rows() << " at " << i;
         }
         return compared;
       };
