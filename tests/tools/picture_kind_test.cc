@@ -117,6 +117,33 @@ TEST(PictureKind, SizesThatCannotBeAreRefused) {
   EXPECT_THAT(refusal(exr + "\xFF\xFF\xFF\x7F\xFF\xFF\xFF\x7F"s), cannot_be);
 }
 
+// OpenEXR takes the memory for a value before it finds that the file has none.
+TEST(PictureKind, AttributesLargerThanTheFileAreRefused) {
+  using namespace std::string_literals;
+  const auto refusal = [](const std::string& bytes) {
+    return ErrorOf([&] { RequirePossibleSize(bytes, PictureKind::kExr, "f"); });
+  };
+  const std::string owner = "owner\0string\0\x02\0\0\0me"s;
+  const std::string large = "x\0blob\0\0\0\0\x63"s;  // 1.6 GB
+  const std::string one = "\x76\x2F\x31\x01\x02\0\0\0"s + owner;
+  EXPECT_EQ(refusal(one), "(no error)");
+  EXPECT_EQ(refusal(one + "\0"s), "(no error)");
+  EXPECT_EQ(refusal(one + large),
+            "f: a broken picture: 1660944384 bytes of 'x' cannot be in 39 bytes");
+  EXPECT_THAT(refusal(one + "x\0blob\0\xFF\xFF\xFF\xFF"s), HasSubstr("-1 bytes of 'x'"));
+  EXPECT_EQ(refusal(one + "\0"s + large), "(no error)");  // pixels
+  // Several parts: their headers follow one another, and an empty one ends them.
+  const std::string several = "\x76\x2F\x31\x01\x02\x10\0\0"s + owner + "\0"s + owner;
+  EXPECT_EQ(refusal(several + "\0\0"s + large), "(no error)");
+  EXPECT_THAT(refusal(several + large), HasSubstr("1660944384 bytes of 'x'"));
+  EXPECT_THAT(refusal(several + "\0"s + large), HasSubstr("1660944384 bytes of 'x'"));
+  // Cut off anywhere, and at every place another byte.
+  for (std::size_t i = 0; i < several.size(); ++i) {
+    refusal(several.substr(0, i));
+    refusal(With(several, i, "\x7F"s));
+  }
+}
+
 TEST(PictureKind, OtherKindsAreNotDecoded) {
   std::string why;
   const std::string bmp = EncodedAs(Cases()[7], cv::Mat(4, 4, CV_8U, cv::Scalar(1)));

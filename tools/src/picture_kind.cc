@@ -16,6 +16,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "png_check.h"
+#include "printable_text.h"
 #include "thicklens/error.h"
 
 namespace thicklens::tools {
@@ -156,27 +157,65 @@ std::optional<StatedSize> SizeOfTiff(const std::string& bytes) {
                     MostOfAByte(compression)};
 }
 
-// From attribute to attribute (name, type, size, value), up to the window of the data.
+struct ExrAttribute {
+  std::string name;
+  double size = 0;  // of its value, as it is stated: it may be negative, or end beyond the file
+  std::size_t value_at = 0;
+
+  std::size_t end() const { return value_at + static_cast<std::size_t>(std::max(size, 0.0)); }
+};
+
+// Name, type, size, value: of the attribute that begins there. None at the end of a header, or
+// where the file ends before a value.
+std::optional<ExrAttribute> ExrAttributeAt(const std::string& bytes, std::size_t at) {
+  if (at >= bytes.size() || bytes[at] == '\0') return std::nullopt;
+  ExrAttribute attribute;
+  attribute.name = bytes.c_str() + at;
+  const std::size_t type_at = at + attribute.name.size() + 1;
+  if (type_at >= bytes.size()) return std::nullopt;
+  const std::size_t size_at = type_at + std::strlen(bytes.c_str() + type_at) + 1;
+  attribute.value_at = size_at + 4;
+  if (attribute.value_at > bytes.size()) return std::nullopt;
+  attribute.size = LittleEndian(bytes, size_at);
+  return attribute;
+}
+
+constexpr std::size_t kExrHeaderAt = 8;
+
 std::optional<StatedSize> SizeOfExr(const std::string& bytes) {
-  std::size_t at = 8;
-  while (at < bytes.size() && bytes[at] != '\0') {
-    const std::string name = bytes.c_str() + at;
-    const std::size_t type_at = at + name.size() + 1;
-    if (type_at >= bytes.size()) break;
-    const std::size_t size_at = type_at + std::strlen(bytes.c_str() + type_at) + 1;
-    const double size = LittleEndian(bytes, size_at);
-    if (size < 0) break;
-    const std::size_t value_at = size_at + 4;
-    if (name == "dataWindow") {
+  std::size_t at = kExrHeaderAt;
+  while (const std::optional<ExrAttribute> attribute = ExrAttributeAt(bytes, at)) {
+    if (attribute->size < 0) break;
+    if (attribute->name == "dataWindow") {
       const auto side = [&](std::size_t low, std::size_t high) {
-        return LittleEndian(bytes, value_at + high) + 1 - LittleEndian(bytes, value_at + low);
+        return LittleEndian(bytes, attribute->value_at + high) + 1 -
+               LittleEndian(bytes, attribute->value_at + low);
       };
       constexpr double kHalfFloat = 2, kMost = 1 << 16;
       return StatedSize{side(0, 8), side(4, 12), kHalfFloat, kMost};
     }
-    at = value_at + static_cast<std::size_t>(size);
+    at = attribute->end();
   }
   return std::nullopt;
+}
+
+// OpenEXR takes the memory for an attribute before it reads it. A file of several parts has a
+// header for each, one after the other.
+void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name) {
+  std::size_t at = kExrHeaderAt;
+  while (at < bytes.size()) {
+    const std::optional<ExrAttribute> attribute = ExrAttributeAt(bytes, at);
+    if (attribute && (attribute->size < 0 || attribute->end() > bytes.size())) {
+      throw Error(fmt::format("{}: a broken picture: {:.0f} bytes of '{}' cannot be in {} bytes",
+                              name, attribute->size, PrintableUtf8(attribute->name), bytes.size()));
+    }
+    constexpr char kSeveralParts = 0x10;
+    const bool is_end = bytes[at] == '\0';
+    if (!attribute && !(is_end && (bytes[9] & kSeveralParts) != 0)) return;
+    at = attribute ? attribute->end() : at + 1;
+    // An empty header ends the headers.
+    if (is_end && at < bytes.size() && bytes[at] == '\0') return;
+  }
 }
 
 std::optional<StatedSize> SizeOfBmp(const std::string& bytes) {
@@ -244,6 +283,7 @@ std::optional<PictureKind> KindOfPicture(const std::string& bytes) {
 }
 
 void RequirePossibleSize(const std::string& bytes, PictureKind kind, const std::string& name) {
+  if (kind == PictureKind::kExr) RequirePossibleExrHeaders(bytes, name);
   const std::optional<StatedSize> size = SizeOf(bytes, kind);
   if (!size) return;
   // Small pictures in a container of their own may be larger than they need to be.
