@@ -28,7 +28,7 @@ const FuzzedReader* TheReader() {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const FuzzedReader* const reader = TheReader();
-  static const TemporaryFolder folder;  // gone at the end, where there is one
+  static const TemporaryFolder folder;  // the caller removes it: libFuzzer need not come to an end
   static const bool is_prepared = (thicklens::testing::PrepareFuzzFolder(folder), true);
   static_cast<void>(is_prepared);
   const std::string bytes(reinterpret_cast<const char*>(data), size);
