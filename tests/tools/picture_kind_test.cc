@@ -129,7 +129,7 @@ TEST(PictureKind, AttributesLargerThanTheFileAreRefused) {
   EXPECT_EQ(refusal(one), "(no error)");
   EXPECT_EQ(refusal(one + "\0"s), "(no error)");
   EXPECT_EQ(refusal(one + large),
-            "f: a broken picture: 1660944384 bytes of 'x' cannot be in 39 bytes");
+            "f: a broken picture: 1660944384 bytes of 'x' cannot be in 38 bytes");
   EXPECT_THAT(refusal(one + "x\0blob\0\xFF\xFF\xFF\xFF"s), HasSubstr("-1 bytes of 'x'"));
   EXPECT_EQ(refusal(one + "\0"s + large), "(no error)");  // pixels
   // Several parts: their headers follow one another, and an empty one ends them.

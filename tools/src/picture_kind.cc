@@ -209,9 +209,10 @@ void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name
       throw Error(fmt::format("{}: a broken picture: {:.0f} bytes of '{}' cannot be in {} bytes",
                               name, attribute->size, PrintableUtf8(attribute->name), bytes.size()));
     }
+    constexpr std::size_t kFlagsAt = 5;  // the second byte of the version
     constexpr char kSeveralParts = 0x10;
     const bool is_end = bytes[at] == '\0';
-    if (!attribute && !(is_end && (bytes[9] & kSeveralParts) != 0)) return;
+    if (!attribute && !(is_end && (bytes[kFlagsAt] & kSeveralParts) != 0)) return;
     at = attribute ? attribute->end() : at + 1;
     // An empty header ends the headers.
     if (is_end && at < bytes.size() && bytes[at] == '\0') return;
