@@ -153,7 +153,6 @@ TEST_F(BenchSourceTest, RefusesWhatCannotBeMeant) {
   EXPECT_THAT(refusal({"--depth-kind", "z"}), HasSubstr("--depth-kind"));
 }
 
-// What table 4 takes for granted.
 // What blocks take grows so fast with the views that fewer parts stand for the picture.
 TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
   SourcePicture picture;
@@ -175,7 +174,7 @@ TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
   EXPECT_EQ(picture.sample->solved, 64);
   EXPECT_EQ(parts_with(5, false), 2U);
   EXPECT_EQ(picture.sample->solved, 32);
-  // They meet in the picture's middle and share no row and no column.
+  // Of opposite quarters: they share no row and no column.
   EXPECT_LE(picture.rects[0].x + picture.rects[0].width, picture.rects[1].x);
   EXPECT_LE(picture.rects[0].y + picture.rects[0].height, picture.rects[1].y);
   EXPECT_EQ(parts_with(7, false), 1U);
@@ -185,6 +184,7 @@ TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
   EXPECT_FALSE(picture.sample);
 }
 
+// What table 4 takes for granted.
 TEST(BenchSceneTest, ThinTwinHasTheSameGridAndDisparities) {
   model::Camera thick = BenchCamera(64, 64);
   const double focus_depth_mm = thick.focus_depth_mm();

@@ -29,7 +29,6 @@ void CutParts(bool full, PartCount count, SampledPicture* picture) {
     return;
   }
   BlockSample sample{0, BlocksOf(picture->whole.input.picture)};
-  // In an order in which the first two meet in a corner.
   constexpr std::array<std::array<int, 2>, 4> kQuarters = {{{1, 1}, {3, 3}, {3, 1}, {1, 3}}};
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const auto [quarter_x, quarter_y] = kQuarters[i];

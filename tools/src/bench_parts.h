@@ -28,10 +28,11 @@ struct SampledPicture {
   double pixels_per_part_pixel = 1;
 };
 
-// Parts of four by four blocks, in the middles of the picture's quarters: near, far and at the
-// plane of focus. Two of them are of quarters that meet in a corner. Of a picture that is hardly
-// larger than four, or if it is to be `full`, all of it.
+// Of the picture's quarters: the top left one, it and the opposite one, or all.
 enum class PartCount { kOne = 1, kTwo = 2, kFour = 4 };
+
+// Parts of four by four blocks in the middles of these quarters. Of a picture that is hardly larger
+// than four parts, or if it is to be `full`, all of it.
 void CutParts(bool full, PartCount count, SampledPicture* picture);
 
 // The parts, estimated one after the other by blocks, and what that says of the whole.
