@@ -36,7 +36,7 @@ PlanProfile ProfileOf(const std::string& prior, double seconds, double psnr_db) 
   PlanProfile plan;
   plan.plan.prior = prior;
   TimeLaw::Terms terms = TimeLaw::Terms::Zero();
-  terms[1] = seconds;  // of a megapixel
+  terms[TimeLaw::kPixels] = seconds;
   plan.law = TimeLaw(terms);
   plan.psnr_db = psnr_db;
   plan.median_error = 0.1;
@@ -50,6 +50,8 @@ EstimateProfile SomeProfile() {
   profile.processor = "a machine";
   profile.date = "2026-01-01T00:00:00Z";
   profile.build = "a build";
+  profile.threads = 4;
+  profile.runs = 3;
   profile.probe_seconds = 0.1;
   profile.warping_psnr_db = 30;
   profile.largest = {1, 3, 81, 3, 0};
@@ -190,7 +192,7 @@ TEST(ChoosePlan, TakesTheTimeOfFilesAsItIsHere) {
   EstimateProfile profile = SomeProfile();
   for (PlanProfile& plan : profile.plans) {
     TimeLaw::Terms terms = plan.law.coefficients();
-    terms[7] = 0.5;
+    terms[TimeLaw::kFileSeconds] = 0.5;
     plan.law = TimeLaw(terms);
   }
   PictureLoad load = kLoad;
@@ -221,7 +223,7 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
                {96, 2, true, false, 1, Use::kTime},
                {112, 2, false, false, 1, Use::kCheck}};
   run.threads = 1;
-  run.repeat = 1;
+  run.repeat = 2;
   int told = 0;
   run.progress = [&](int done, int total) {
     EXPECT_LT(done, total);
@@ -231,8 +233,15 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
   ridge.prior = "ridge";
   tv.prior = "tv";
   const MeasuredProfile measured = MeasureProfile({ridge, tv}, run);
-  EXPECT_EQ(told, 8);
+  EXPECT_EQ(told, 16);
   EXPECT_EQ(measured.judged, 2);
+  EXPECT_EQ(measured.profile.runs, 2);
+  for (const TimedLoad& timed : measured.loads[0]) {
+    EXPECT_GT(timed.parts.setup, 0);
+    EXPECT_GT(timed.parts.solve, 0);
+    EXPECT_GT(timed.parts.files, 0);
+    EXPECT_GE(timed.seconds - timed.parts.setup - timed.parts.solve - timed.parts.files, 0);
+  }
   ASSERT_EQ(measured.loads.size(), 2U);
   EXPECT_EQ(measured.loads[0].size(), 3U);
   EXPECT_EQ(measured.checks[1].size(), 1U);
@@ -300,15 +309,17 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
     return refusal(changed);
   };
   EXPECT_THAT(refusal("text"), HasSubstr("profile.json: is no JSON object"));
-  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/2'"));
-  EXPECT_THAT(with("/threads", 0), HasSubstr("threads: a number of at least 1"));
+  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/3'"));
+  EXPECT_THAT(with("/threads", 0), HasSubstr("threads: a whole number from 1 to"));
+  EXPECT_THAT(with("/threads", 10'000'000'000), HasSubstr("threads: a whole number from 1 to"));
+  EXPECT_THAT(with("/runs", 2.5), HasSubstr("runs: a whole number from 1 to"));
   EXPECT_THAT(with("/plans", json::array()), HasSubstr("at least one plan"));
   EXPECT_THAT(with("/plans/1/seconds", {1, 2}), HasSubstr("plans[1]: seconds: "));
   EXPECT_THAT(with("/plans/1/seconds/0", -1), HasSubstr("plans[1]: seconds: "));
   EXPECT_THAT(with("/plans/0/plan/solver", "magic"), HasSubstr("plans[0]: solver: scene, blocks"));
   EXPECT_THAT(with("/plans/0/plan/prior", "magic"), HasSubstr("plans[0]: "));
   EXPECT_THAT(with("/plans/0/plan/device", "gpu"), HasSubstr("device: cpu or opencl"));
-  EXPECT_THAT(with("/largest/views", "many"), HasSubstr("largest: views: a number"));
+  EXPECT_THAT(with("/largest/views", "many"), HasSubstr("largest: views: a whole number"));
   EXPECT_THAT(with("/plans/0/plan/tolerance", 7), HasSubstr("plans[0]: "));
   EXPECT_THAT(with("/plans/0/plan/block_px", 7), HasSubstr("--block-px is of --solver blocks"));
   json lacking = good;

@@ -317,7 +317,10 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
                          {"blur_sigma_px", timed.load.blur_sigma_px},
                          {"file_seconds", timed.load.file_seconds},
                          {"seconds", timed.seconds},
-                         {"solve_seconds", timed.solve_seconds},
+                         {"parts",
+                          {{"setup", timed.parts.setup},
+                           {"solve", timed.parts.solve},
+                           {"files", timed.parts.files}}},
                          {"expected_seconds", plan.law.Seconds(timed.load)}});
       }
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <system_error>
 
@@ -24,7 +25,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr char kSchema[] = "thicklens/estimate-profile/2";
+constexpr char kSchema[] = "thicklens/estimate-profile/3";
 
 const json& Field(const json& fields, const char* name, const std::string& where) {
   const auto found = fields.find(name);
@@ -39,6 +40,16 @@ double NumberOf(const json& fields, const char* name, double least, const std::s
                             least, found.dump()));
   }
   return found.get<double>();
+}
+
+int WholeNumberOf(const json& fields, const char* name, int least, const std::string& where) {
+  const json& found = Field(fields, name, where);
+  if (!found.is_number_integer() || !(found.get<double>() >= least) ||
+      !(found.get<double>() <= std::numeric_limits<int>::max())) {
+    throw Error(fmt::format("{}: {}: a whole number from {} to {} is expected, found {}", where,
+                            name, least, std::numeric_limits<int>::max(), found.dump()));
+  }
+  return found.get<int>();
 }
 
 std::string TextOf(const json& fields, const char* name, const std::string& where) {
@@ -81,7 +92,8 @@ EstimateProfile Parse(const std::string& text, const std::string& where) {
   profile.processor = TextOf(fields, "processor", where);
   profile.date = TextOf(fields, "date", where);
   profile.build = TextOf(fields, "build", where);
-  profile.threads = static_cast<int>(NumberOf(fields, "threads", 1, where));
+  profile.threads = WholeNumberOf(fields, "threads", 1, where);
+  profile.runs = WholeNumberOf(fields, "runs", 1, where);
   profile.probe_seconds = NumberOf(fields, "probe_seconds", 1e-9, where);
   profile.warping_psnr_db = NumberOf(fields, "warping_psnr_db", 0, where);
   const json& largest = Field(fields, "largest", where);
@@ -89,9 +101,8 @@ EstimateProfile Parse(const std::string& text, const std::string& where) {
     throw Error(fmt::format("{}: largest: a map is expected, found {}", where, largest.dump()));
   }
   profile.largest.megapixels = NumberOf(largest, "megapixels", 0, where + ": largest");
-  profile.largest.channels =
-      static_cast<int>(NumberOf(largest, "channels", 1, where + ": largest"));
-  profile.largest.views = static_cast<int>(NumberOf(largest, "views", 2, where + ": largest"));
+  profile.largest.channels = WholeNumberOf(largest, "channels", 1, where + ": largest");
+  profile.largest.views = WholeNumberOf(largest, "views", 2, where + ": largest");
   profile.largest.blur_sigma_px = NumberOf(largest, "blur_sigma_px", 0, where + ": largest");
   const json& plans = Field(fields, "plans", where);
   if (!plans.is_array() || plans.empty()) {
@@ -139,6 +150,7 @@ json ProfileJson(const EstimateProfile& profile) {
           {"date", profile.date},
           {"build", profile.build},
           {"threads", profile.threads},
+          {"runs", profile.runs},
           {"probe_seconds", profile.probe_seconds},
           {"warping_psnr_db", profile.warping_psnr_db},
           {"largest",

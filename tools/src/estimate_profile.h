@@ -26,6 +26,7 @@ struct PlanProfile {
 struct EstimateProfile {
   std::string processor, build, date;  // build: as of `thicklens --version`
   int threads = 1;
+  int runs = 1;              // of each plan and picture: the middle one is in the laws
   double probe_seconds = 0;  // of ProbeSeconds() there
   double warping_psnr_db = 0;
   // Of the pictures that were measured, the most of each.

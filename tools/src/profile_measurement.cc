@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -111,6 +112,22 @@ double PsnrDb(const Prepared& prepared, const model::LightField& estimate, int t
       .mean.psnr_db;
 }
 
+TimedLoad Timed(const PictureLoad& load, const nlohmann::json& seconds) {
+  const auto of = [&](const char* part) { return seconds.at(part).get<double>(); };
+  // Parts are measured one by one: rounding may put them above the whole.
+  const double setup = std::min(of("setup"), of("total"));
+  const double solve = std::min(of("solve"), of("total") - setup);
+  return {load, of("total"), {setup, solve, std::min(of("files"), of("total") - setup - solve)}};
+}
+
+// By the whole time, and of two the slower. One run, so that its parts are of that time.
+TimedLoad MiddleRun(std::vector<TimedLoad> runs) {
+  const auto middle = runs.begin() + static_cast<std::ptrdiff_t>(runs.size() / 2);
+  std::nth_element(runs.begin(), middle, runs.end(),
+                   [](const TimedLoad& a, const TimedLoad& b) { return a.seconds < b.seconds; });
+  return *middle;
+}
+
 // The middle and the largest of |ratio - 1|.
 std::pair<double, double> ErrorsOf(std::vector<double> ratios) {
   for (double& ratio : ratios) ratio = std::abs(ratio - 1);
@@ -184,6 +201,7 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
   profile.build = BuildInfo();
   profile.threads = model::ResolveThreads(run.threads);
   profile.probe_seconds = ProbeSeconds(profile.threads);
+  profile.runs = run.repeat;
   profile.from = "this run";
   measured.loads.resize(plans.size());
   measured.checks.resize(plans.size());
@@ -207,23 +225,20 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
           prepared, RunWarping(PrepareEstimate(prepared.options).input, run.threads).light_field,
           run.threads);
     }
-    std::vector<std::vector<double>> seconds(plans.size()), solve_seconds(plans.size());
+    std::vector<std::vector<TimedLoad>> runs(plans.size());
     for (int round = 0; round < run.repeat; ++round) {
       for (std::size_t i = 0; i < plans.size(); ++i) {
         if (run.progress) run.progress(done++, total);
         ApplyPlan(plans[i], &prepared.options);
         const nlohmann::json summary = RunEstimate(prepared.options).summary;
-        seconds[i].push_back(summary["seconds"]["total"].get<double>());
-        solve_seconds[i].push_back(summary["seconds"]["solve"].get<double>());
+        runs[i].push_back(Timed(prepared.load, summary["seconds"]));
         if (!prepared.truth || round > 0) continue;
         profile.plans[i].psnr_db +=
             PsnrDb(prepared, ReadLightField(prepared.options.output_folder, {}), run.threads);
       }
     }
     for (std::size_t i = 0; i < plans.size(); ++i) {
-      (is_check ? measured.checks : measured.loads)[i].push_back(
-          {prepared.load, Median(seconds[i]),
-           std::min(Median(solve_seconds[i]), Median(seconds[i]))});
+      (is_check ? measured.checks : measured.loads)[i].push_back(MiddleRun(std::move(runs[i])));
     }
     std::error_code ignored;
     fs::remove_all(of_case, ignored);

@@ -4,6 +4,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <iterator>
 
@@ -12,12 +13,38 @@
 namespace thicklens::tools {
 namespace {
 
+// What the parts of a run can depend on.
+constexpr std::array kSetupTerms = {TimeLaw::kStart,       TimeLaw::kViews,
+                                    TimeLaw::kPixels,      TimeLaw::kPixelsChannels,
+                                    TimeLaw::kPixelsViews, TimeLaw::kPixelsViewsBlur};
+constexpr std::array kSolveTerms = {TimeLaw::kStart,
+                                    TimeLaw::kPixels,
+                                    TimeLaw::kPixelsChannels,
+                                    TimeLaw::kPixelsViews,
+                                    TimeLaw::kPixelsChannelsBlur,
+                                    TimeLaw::kPixelsViewsBlur,
+                                    TimeLaw::kPixelsViewsChannelsIterations};
+constexpr std::array kFilesTerms = {TimeLaw::kStart, TimeLaw::kViews, TimeLaw::kPixelsViews,
+                                    TimeLaw::kFileSeconds};
+constexpr std::array kRestTerms = {TimeLaw::kStart,       TimeLaw::kViews,
+                                   TimeLaw::kPixels,      TimeLaw::kPixelsChannels,
+                                   TimeLaw::kPixelsViews, TimeLaw::kPixelsViewsChannels};
+
 TimeLaw::Terms TermsOf(const PictureLoad& load) {
   const double pixels = load.megapixels;
+  const double blur = load.blur_sigma_px;
   TimeLaw::Terms terms;
-  terms << 1, pixels, pixels * load.channels, pixels * load.views,
-      pixels * load.views * load.channels, pixels * load.channels * load.blur_sigma_px,
-      pixels * load.views * load.blur_sigma_px, load.file_seconds;
+  terms[TimeLaw::kStart] = 1;
+  terms[TimeLaw::kPixels] = pixels;
+  terms[TimeLaw::kPixelsChannels] = pixels * load.channels;
+  terms[TimeLaw::kPixelsViews] = pixels * load.views;
+  terms[TimeLaw::kPixelsViewsChannels] = pixels * load.views * load.channels;
+  terms[TimeLaw::kPixelsChannelsBlur] = pixels * load.channels * blur;
+  terms[TimeLaw::kPixelsViewsBlur] = pixels * load.views * blur;
+  terms[TimeLaw::kFileSeconds] = load.file_seconds;
+  terms[TimeLaw::kViews] = load.views;
+  terms[TimeLaw::kPixelsViewsChannelsIterations] =
+      pixels * load.views * load.channels * blur / (1 + blur);
   return terms;
 }
 
@@ -35,7 +62,8 @@ struct PartOfTime {
 
 // The best that is nowhere negative is the plain best of the terms that it uses: few terms, so all
 // choices of them are tried.
-TimeLaw::Terms FitPart(const PartOfTime& time) {
+template <std::size_t N>
+TimeLaw::Terms FitPart(const PartOfTime& time, const std::array<TimeLaw::Term, N>& allowed) {
   const auto count = static_cast<Eigen::Index>(time.loads.size());
   Eigen::MatrixXd terms(count, TimeLaw::kTerms);
   Eigen::VectorXd shares(count);
@@ -46,14 +74,14 @@ TimeLaw::Terms FitPart(const PartOfTime& time) {
   }
   TimeLaw::Terms best = TimeLaw::Terms::Zero();
   double least = shares.squaredNorm();
-  for (unsigned choice = 1; choice < 1U << TimeLaw::kTerms; ++choice) {
+  for (unsigned choice = 1; choice < 1U << N; ++choice) {
     Eigen::MatrixXd of_choice(count, 0);
-    std::vector<int> used;
-    for (int i = 0; i < TimeLaw::kTerms; ++i) {
-      if ((choice >> static_cast<unsigned>(i) & 1U) == 0) continue;
+    std::vector<TimeLaw::Term> used;
+    for (unsigned i = 0; i < N; ++i) {
+      if ((choice >> i & 1U) == 0) continue;
       of_choice.conservativeResize(Eigen::NoChange, of_choice.cols() + 1);
-      of_choice.col(of_choice.cols() - 1) = terms.col(i);
-      used.push_back(i);
+      of_choice.col(of_choice.cols() - 1) = terms.col(allowed[i]);
+      used.push_back(allowed[i]);
     }
     const Eigen::VectorXd found = of_choice.colPivHouseholderQr().solve(shares);
     if (!found.allFinite() || !(found.array() >= 0).all()) continue;
@@ -68,6 +96,10 @@ TimeLaw::Terms FitPart(const PartOfTime& time) {
   return best;
 }
 
+double RestSeconds(const TimedLoad& load) {
+  return load.seconds - load.parts.setup - load.parts.solve - load.parts.files;
+}
+
 void CheckTimes(const TimesOfPlans& plans) {
   for (const std::vector<TimedLoad>& plan : plans) {
     if (plan.size() < 2 || plan.size() != plans.front().size()) {
@@ -77,12 +109,13 @@ void CheckTimes(const TimesOfPlans& plans) {
           plans.front().size(), plan.size()));
     }
     for (const TimedLoad& load : plan) {
-      if (!(load.seconds > 0) || !(load.solve_seconds >= 0) ||
-          !(load.solve_seconds <= load.seconds)) {
-        throw Error(
-            fmt::format("a law of the time needs times above 0, and parts of them, found {} s of "
-                        "{} s",
-                        load.solve_seconds, load.seconds));
+      const auto [setup, solve, files] = load.parts;
+      if (!(load.seconds > 0) || !(setup >= 0) || !(solve >= 0) || !(files >= 0) ||
+          !(RestSeconds(load) >= 0)) {
+        throw Error(fmt::format(
+            "a law of the time needs times above 0, and parts of them, found {} s (setup), {} s "
+            "(solve) and {} s (files) of {} s",
+            setup, solve, files, load.seconds));
       }
     }
   }
@@ -96,21 +129,28 @@ std::vector<TimeLaw> FitTimeLaws(const TimesOfPlans& plans) {
   if (plans.empty()) return {};
   CheckTimes(plans);
   const auto plan_count = static_cast<double>(plans.size());
-  PartOfTime common;
+  PartOfTime setup, files, rest;
   for (std::size_t i = 0; i < plans.front().size(); ++i) {
-    double rest = 0, whole = 0;
+    PartSeconds mean;
+    double mean_rest = 0, whole = 0;
     for (const std::vector<TimedLoad>& plan : plans) {
-      rest += plan[i].seconds - plan[i].solve_seconds;
-      whole += plan[i].seconds;
+      mean.setup += plan[i].parts.setup / plan_count;
+      mean.files += plan[i].parts.files / plan_count;
+      mean_rest += RestSeconds(plan[i]) / plan_count;
+      whole += plan[i].seconds / plan_count;
     }
-    common.Add(plans.front()[i].load, rest / plan_count, whole / plan_count);
+    const PictureLoad& load = plans.front()[i].load;
+    setup.Add(load, mean.setup, whole);
+    files.Add(load, mean.files, whole);
+    rest.Add(load, mean_rest, whole);
   }
-  const TimeLaw::Terms shared = FitPart(common);
+  const TimeLaw::Terms shared =
+      FitPart(setup, kSetupTerms) + FitPart(files, kFilesTerms) + FitPart(rest, kRestTerms);
   std::vector<TimeLaw> laws;
   for (const std::vector<TimedLoad>& plan : plans) {
     PartOfTime own;
-    for (const TimedLoad& load : plan) own.Add(load.load, load.solve_seconds, load.seconds);
-    laws.emplace_back(shared + FitPart(own));
+    for (const TimedLoad& load : plan) own.Add(load.load, load.parts.solve, load.seconds);
+    laws.emplace_back(shared + FitPart(own, kSolveTerms));
   }
   return laws;
 }

@@ -16,22 +16,37 @@ struct PictureLoad {
   double file_seconds = 0;
 };
 
-struct TimedLoad {
-  PictureLoad load;
-  double seconds = 0;  // > 0
-  // Of these, what the plan alone decides, from 0 to `seconds`; the rest (reading, geometry, files)
-  // is the same for others of its kind.
-  double solve_seconds = 0;
+// Of the seconds of a run: what is left of the whole is making the views, and the end.
+struct PartSeconds {
+  double setup = 0;  // reading and geometry
+  double solve = 0;  // what the plan alone decides; all else is the same for others of its kind
+  double files = 0;  // writing the views
 };
 
-// Seconds as a sum of terms, none of them negative:
-//   start + pixels (c1 + c2 channels + c3 views + c4 views channels + c5 channels sigma
-//                   + c6 views sigma) + c7 file seconds
-// reading and depth, the picture, the geometry of the views, the views, what iterations and
-// geometry do for a pixel's blur, and the views' files.
+struct TimedLoad {
+  PictureLoad load;
+  double seconds = 0;  // > 0, of the whole run
+  PartSeconds parts;   // none below 0, together no more than the whole
+};
+
+// Seconds as a sum of terms, none of them negative. Pixels are in millions.
 class TimeLaw {
  public:
-  static constexpr int kTerms = 8;
+  // In the order of the profile's file, whose schema changes with it. s: the blur's sigma in px.
+  enum Term {
+    kStart,                          // seconds, whatever the picture
+    kPixels,                         // reading, depth
+    kPixelsChannels,                 // reading, and what iterations do for a pixel
+    kPixelsViews,                    // the geometry of the views
+    kPixelsViewsChannels,            // making them
+    kPixelsChannelsBlur,             // times s: what iterations do for a blur
+    kPixelsViewsBlur,                // times s: what geometry does for it
+    kFileSeconds,                    // the share of the threads in encoding
+    kViews,                          // a view's files and threads, whatever their size
+    kPixelsViewsChannelsIterations,  // times s / (1 + s): a blur of many pixels takes no more
+                                     // iterations than one of a few, and none at all takes few
+  };
+  static constexpr int kTerms = kPixelsViewsChannelsIterations + 1;
   using Terms = Eigen::Matrix<double, kTerms, 1>;
 
   TimeLaw() : coefficients_(Terms::Zero()) {}
@@ -47,10 +62,12 @@ class TimeLaw {
 // Plans that took the same pictures, in one order, and do the same but for what they solve.
 using TimesOfPlans = std::vector<std::vector<TimedLoad>>;
 
-// A law for each plan: what they have in common is found from the mean of them all, so that noise
-// does not tell them apart where the pictures do not; each has the least sum of squared errors,
-// relative to the whole time, with no coefficient below 0. Throws Error for fewer than two
-// pictures, times that are not above 0, or plans of different pictures.
+// A law for each plan, the sum of a law for each part of a run, of the terms that such work has:
+// few pictures cannot tell all of them apart. What the plans have in common is found from the mean
+// of them all, so that noise does not tell them apart where the pictures do not; each law has the
+// least sum of squared errors, relative to the whole time, with no coefficient below 0. Throws
+// Error for fewer than two pictures, times that are not above 0, parts that are not of them, or
+// plans of different pictures.
 std::vector<TimeLaw> FitTimeLaws(const TimesOfPlans& plans);
 
 // Of each plan and picture the law's prediction from the pictures of all other sizes, over what was
