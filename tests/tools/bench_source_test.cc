@@ -177,6 +177,11 @@ TEST(BenchPartsTest, FewerPartsAreOfManyViewsAndStandForAsMuch) {
   // Of opposite quarters: they share no row and no column.
   EXPECT_LE(picture.rects[0].x + picture.rects[0].width, picture.rects[1].x);
   EXPECT_LE(picture.rects[0].y + picture.rects[0].height, picture.rects[1].y);
+  // What compares lenses cuts parts of its own, and as many.
+  std::vector<SourceContender> lenses;
+  AddTable4(SourceBench(), picture, &lenses);
+  ASSERT_EQ(lenses.size(), 2U);
+  EXPECT_EQ(lenses[1].row.extrapolated->solved, 32);
   EXPECT_EQ(parts_with(7, false), 1U);
   EXPECT_EQ(picture.sample->solved, 16);
   EXPECT_EQ(picture.sample->all, 120);
