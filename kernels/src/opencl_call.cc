@@ -47,6 +47,13 @@ std::unique_ptr<OpenClQueue> OpenClQueue::Clone() const {
   return std::make_unique<OpenClQueue>(device_, program_, memory_);
 }
 
+void OpenClQueue::Settle() noexcept {
+  try {
+    queue_.finish();
+  } catch (...) {  // the error that led here is the one to tell
+  }
+}
+
 OpenClQueue::Entry& OpenClQueue::EntryOf(const std::string& kernel) {
   const auto found = entries_.find(kernel);
   if (found != entries_.end()) return found->second;
@@ -179,9 +186,14 @@ void OpenClCall::Enqueue(std::size_t items) {
 }
 
 void OpenClCall::Run(std::size_t items) {
-  Enqueue(items);
-  // What goes wrong while the kernel runs is then said with its name.
-  Guarded(*queue_->device_, name_, [&] { queue_->queue_.finish(); });
+  try {
+    Enqueue(items);
+    // What goes wrong while the kernel runs is then said with its name.
+    Guarded(*queue_->device_, name_, [&] { queue_->queue_.finish(); });
+  } catch (...) {
+    queue_->Settle();  // the arrays may go with the error
+    throw;
+  }
   for (const Array& array : arrays_) {
     if (array.is_written) queue_->BringHome(array.what, array.buffer, array.data, array.bytes);
   }

@@ -28,6 +28,8 @@ class OpenClQueue {
   // Another queue on the same device and program, with its own kernels.
   std::unique_ptr<OpenClQueue> Clone() const;
 
+  // Waits until nothing works in memory that is lent, whatever became of it.
+  void Settle() noexcept;
   // Whether the device can have that much in one piece.
   void CheckAllocation(const std::string& what, std::size_t bytes) const;
 
@@ -58,6 +60,10 @@ class OpenClQueue {
 class DeviceArray {
  public:
   DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes);
+  // Waits for calls that still work in it: an error may have come between.
+  ~DeviceArray() { queue_->Settle(); }
+  DeviceArray(const DeviceArray&) = default;
+  DeviceArray& operator=(const DeviceArray&) = default;
   void BringHome();
 
  private:

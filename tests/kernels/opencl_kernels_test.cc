@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -378,6 +379,27 @@ TYPED_TEST(OpenClKernelsTest, TheSameBitsEveryTime) {
   const auto once = this->device_->FormPicture(block, Splat::kBilinear, views);
   EXPECT_EQ(this->device_->FormPicture(block, Splat::kBilinear, views), once);
   EXPECT_EQ(this->device_->Clone()->FormPicture(block, Splat::kBilinear, views), once);
+}
+
+// Memory that is lent goes when an error, or somebody who stops the run, unwinds its owner.
+TEST(DeviceArray, WaitsForCallsThatWorkInItBeforeItGoes) {
+  const DeviceRequest place = ParseDeviceRequest(OpenClBackend()->name());
+  const auto device = OpenOpenClDevice(place.platform, place.device);
+  cl::Program program(device->context, std::string(R"(
+      kernel void CountUp(global volatile int* values) {
+        for (int i = 0; i < 20000000; ++i) ++values[get_global_id(0)];
+      })"));
+  program.build();
+  OpenClQueue queue(device, program, HostMemory::kShared);
+  std::vector<std::int32_t> values(4096, 0);
+  {
+    DeviceArray array(&queue, "values", values.data(), values.size() * sizeof(std::int32_t));
+    OpenClCall call(&queue, "CountUp");
+    call.OnDevice(array).Enqueue(1);
+  }
+  const std::vector<std::int32_t> after = values;
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(values, after);
 }
 
 }  // namespace
