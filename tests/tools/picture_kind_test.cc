@@ -97,6 +97,9 @@ TEST(PictureKind, SizesThatCannotBeAreRefused) {
   const std::string bmp = EncodedAs(Cases()[7], small);
   EXPECT_EQ(refusal(bmp), "(no error)");
   EXPECT_THAT(refusal(With(bmp, 18, "\x01\x00\x00\x40\x00\x00\x00\x80"s)), cannot_be);
+  // A header of a size that no kind has is read as the usual one.
+  EXPECT_THAT(refusal(With(With(bmp, 14, "\x18\x18\x18\x18"s), 18, "\x01\x00\x00\x40"s)),
+              cannot_be);
 
   EXPECT_EQ(refusal("P5 # a\n# b\n 16 16 255\n" + std::string(256, 'x')), "(no error)");
   EXPECT_THAT(refusal("P5 # a\n# b\n 16000 16000 255\n" + std::string(256, 'x')), cannot_be);
