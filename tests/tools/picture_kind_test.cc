@@ -97,6 +97,10 @@ TEST(PictureKind, SizesThatCannotBeAreRefused) {
   const std::string bmp = EncodedAs(Cases()[7], small);
   EXPECT_EQ(refusal(bmp), "(no error)");
   EXPECT_THAT(refusal(With(bmp, 18, "\x01\x00\x00\x40\x00\x00\x00\x80"s)), cannot_be);
+  // The oldest kind: 12 bytes, sides of 16 bits, one plane, 24 bits.
+  const std::string oldest = With(bmp, 14, "\x0C\0\0\0\x10\0\x10\0\x01\0\x18\0"s);
+  EXPECT_EQ(refusal(oldest), "(no error)");
+  EXPECT_THAT(refusal(With(oldest, 18, "\xFF\xFF\xFF\xFF"s)), cannot_be);
   // A header of a size that no kind has is read as the usual one.
   EXPECT_THAT(refusal(With(With(bmp, 14, "\x18\x18\x18\x18"s), 18, "\x01\x00\x00\x40"s)),
               cannot_be);

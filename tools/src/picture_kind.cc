@@ -221,15 +221,15 @@ void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name
 
 std::optional<StatedSize> SizeOfBmp(const std::string& bytes) {
   constexpr double kRunLength = 1 << 16;
-  // The oldest header has sides of 16 bits and is never compressed; between it and the usual ones
-  // there is none that OpenCV reads.
+  // The oldest header has sides of 16 bits and no compression; between it and the usual ones there
+  // is none that OpenCV reads.
   constexpr double kOldest = 12, kLeastUsual = 36;
   const double header = LittleEndian(bytes, 14);
   if (header == kOldest) {
     const auto word = [&](std::size_t at) {
       return static_cast<double>(BigEndian(bytes, at + 1, 1) << 8 | BigEndian(bytes, at, 1));
     };
-    return StatedSize{word(18), word(20), word(24) / 8, kRunLength};
+    return StatedSize{word(18), word(20), word(24) / 8, 1};
   }
   if (header < kLeastUsual) return std::nullopt;
   const double bits = BigEndian(bytes, 28, 1);
