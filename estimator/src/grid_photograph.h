@@ -28,7 +28,7 @@ class GridPhotograph {
   GridPhotograph(const kernels::BlockGeometry& picture, std::vector<std::vector<float>> irradiance,
                  int threads);
 
-  std::size_t pixels() const { return inverse_sums_.size(); }
+  std::size_t pixels() const { return static_cast<std::size_t>(picture_.pixels()); }
 
   // photograph = H L.
   void Apply(const Real* rays, Real* photograph) const;
@@ -50,10 +50,25 @@ class GridPhotograph {
   void ForRow(int k, int l, const Tap& in_y, int y, const Visit& visit) const;
   const float* IrradianceFrom(int view, std::size_t sample) const;
 
+  // Neighbouring columns (or rows) of the picture that the views reach alike.
+  struct Run {
+    int begin = 0, end = 0;
+    std::vector<double> shares;  // of a pixel in the rays of each column (row) of views
+  };
+  std::vector<Run> Columns() const;
+  std::vector<Run> Rows() const;
+  void SetInverseSums();
+  // Multiplies by 1/(sum of w g), 0 where that is 0.
+  void Normalise(int y, const Real* from, Real* to) const;
+
   kernels::BlockGeometry picture_;
   std::vector<std::vector<float>> irradiance_;
   int threads_;
-  std::vector<Real> inverse_sums_;  // 1/(sum of w g) of each pixel, 0 where that is 0
+  // 1/(sum of w g), which borders of views alone change: of each run of columns, for every run of
+  // rows.
+  std::vector<int> column_ends_;
+  std::vector<std::vector<Real>> inverse_sums_;
+  std::vector<std::size_t> run_of_row_;
 };
 
 }  // namespace thicklens::estimator

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "grid_photograph.h"
@@ -163,12 +164,17 @@ model::LinearPicture Photograph(const model::LightField& light_field,
   }
 
   const PictureFormer form = NewFormer(whole, splat, share_of_rays, kernels, threads);
-  model::LinearPicture photograph =
-      BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
+  model::LinearPicture photograph{
+      light_field.s_count, light_field.t_count, light_field.channels, {}};
   for (int channel = 0; channel < light_field.channels; ++channel) {
     std::vector<float> pixels =
         form(light_field.values.data() + light_field.ViewStart(channel, 0, 0));
     for (std::size_t i = 0; i < bundle.size(); ++i) pixels[i] /= bundle[i];
+    if (light_field.channels == 1) {
+      photograph.values = std::move(pixels);
+      break;
+    }
+    photograph.values.resize(pixels.size() * Index(light_field.channels));
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       photograph.values[i * Index(light_field.channels) + Index(channel)] = pixels[i];
     }
