@@ -163,10 +163,16 @@ void AddTable2(const SourceBench& bench, const SourcePicture& picture,
     row.published = PublishedSeconds(2, name, picture.size, picture.views);
     row.triad_seconds = triad_seconds;
     contenders->push_back({std::move(row), [light_field, kernels, threads](SourceRow*) {
-                             const Clock::time_point start = Clock::now();
-                             estimator::Photograph(*light_field, light_field->weights, nullptr,
-                                                   nullptr, kernels.get(), threads);
-                             return SecondsSince(start);
+                             const auto form = [&] {
+                               const Clock::time_point start = Clock::now();
+                               estimator::Photograph(*light_field, light_field->weights, nullptr,
+                                                     nullptr, kernels.get(), threads);
+                               return SecondsSince(start);
+                             };
+                             // What ran before may have given back the memory, which a first
+                             // picture would take again for much longer than it is formed.
+                             form();
+                             return form();
                            }});
   };
   if (bench.device) add("opencl", 1, bench.device->NewFloat());
