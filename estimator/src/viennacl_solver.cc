@@ -16,6 +16,7 @@
 #include "iterative_solver.h"
 #include "linear_solver_kinds.h"
 #include "thicklens/error.h"
+#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -104,9 +105,19 @@ class ViennaClMethod : public IterativeMethod {
   std::unique_ptr<viennacl::compressed_matrix<double>> matrix_;
 };
 
+// ViennaCL opens a device whether its driver works or not. Before it does, devices are tried in
+// child processes; later that would be too late for all of this process: a child of one that uses
+// OpenCL waits for threads that it does not have.
+void RequireDevice() {
+  static std::once_flag once;
+  std::call_once(once,
+                 [] { kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr); });
+}
+
 }  // namespace
 
 std::unique_ptr<LinearSolver> NewViennaClSolver(const IterationLimits& limits) {
+  RequireDevice();
   return std::make_unique<IterativeSolver>(std::make_unique<ViennaClMethod>(), limits);
 }
 

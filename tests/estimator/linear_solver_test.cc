@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -206,6 +207,15 @@ TEST(LinearSolver, SomeAreForSymmetricMatricesAlone) {
     if (!IsBuiltIn(kind)) continue;
     EXPECT_THAT(ErrorOf([&] { NewLinearSolver(kind, false); }), HasSubstr("not symmetric"));
   }
+}
+
+TEST(LinearSolver, LetsADeviceBeOpenedAfterViennaCl) {
+  if (!IsBuiltIn(BlockSolver::kViennaCl)) GTEST_SKIP() << "built without ViennaCL";
+  const auto solver = NewLinearSolver(BlockSolver::kViennaCl, true);
+  solver->Factorize(ToCsr(RandomSparse(23, 9)));
+  solver->Solve(RandomVector(23, 3));
+  // What went wrong here took a minute, and was told as a driver that does not end.
+  EXPECT_NO_THROW(kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr));
 }
 
 TEST(LinearSolver, SaysThatViennaClWasLeftOut) {
