@@ -16,6 +16,12 @@ struct LandingRect {
 };
 LandingRect LandingIn(const kernels::BlockGeometry& picture, int k, int l);
 
+// A pixel gets `share` of the ray nearest to the pixel that is `offset` beside it.
+struct RayTap {
+  int offset = 0;
+  double share = 0;  // 0: nothing
+};
+
 // H on the grid, for a whole picture: from the rays of a light field of one channel, views
 // (l * u_count + k) * t_count * s_count + t * s_count + s, to the photograph,
 //   (H L)(x) = sum over rays of E w g L / sum over rays of w g,
@@ -38,25 +44,11 @@ class GridPhotograph {
   double bytes() const;
 
  private:
-  // A pixel gets `share` of the ray nearest to the pixel that is `offset` beside it.
-  struct Tap {
-    int offset = 0;
-    double share = 0;  // 0: nothing
-  };
-  static std::array<Tap, 2> TapsOf(double fraction);
   // Calls visit(weight, x, count, sample): `count` pixels of the row y from x on get weight times
   // the samples of the view from `sample` on.
   template <typename Visit>
-  void ForRow(int k, int l, const Tap& in_y, int y, const Visit& visit) const;
+  void ForRow(int k, int l, const RayTap& in_y, int y, const Visit& visit) const;
   const float* IrradianceFrom(int view, std::size_t sample) const;
-
-  // Neighbouring columns (or rows) of the picture that the views reach alike.
-  struct Run {
-    int begin = 0, end = 0;
-    std::vector<double> shares;  // of a pixel in the rays of each column (row) of views
-  };
-  std::vector<Run> Columns() const;
-  std::vector<Run> Rows() const;
   void SetInverseSums();
   // Multiplies by 1/(sum of w g), 0 where that is 0.
   void Normalise(int y, const Real* from, Real* to) const;

@@ -102,7 +102,9 @@ std::vector<EstimateInput> Inputs() {
           InputOf(11, 8, 1, Gaussian(3, 3), [](int x, int) { return x < 6 ? 1.0 : -2.0; }),
           InputOf(9, 6, 1, Gaussian(3, 3), [](int, int) { return 1e-20; }),
           InputOf(1, 9, 1, Gaussian(3, 3), [](int, int) { return 0.0; }), WithCamera(17, 12, 800),
-          WithCamera(17, 12, 500), WithCamera(17, 12, 250), WithCamera(17, 12, 2000)};
+          WithCamera(17, 12, 500), WithCamera(17, 12, 250), WithCamera(17, 12, 2000),
+          // Higher than two bands of the photograph.
+          WithCamera(6, 75, 250)};
 }
 
 std::vector<double> RandomNumbers(std::size_t count, unsigned seed) {
@@ -187,12 +189,14 @@ class Operators {
 TEST(GridPhotograph, IsTheMatrixOfTheKernels) {
   const auto kernels = kernels::NewReference<double>();
   for (const EstimateInput& input : Inputs()) {
-    const Operators operators(input);
-    const std::vector<double> rays = RandomNumbers(operators.samples(), 1);
-    std::vector<double> found(operators.photograph->pixels());
-    operators.photograph->Apply(rays.data(), found.data());
-    const std::vector<double> expected = kernels->Multiply(operators.h, operators.ToBlock(rays));
-    for (std::size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], expected[i], 1e-6);
+    for (const int threads : {1, 2, 50}) {
+      const Operators operators(input, threads);
+      const std::vector<double> rays = RandomNumbers(operators.samples(), 1);
+      std::vector<double> found(operators.photograph->pixels());
+      operators.photograph->Apply(rays.data(), found.data());
+      const std::vector<double> expected = kernels->Multiply(operators.h, operators.ToBlock(rays));
+      for (std::size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], expected[i], 1e-6);
+    }
   }
 }
 

@@ -33,9 +33,8 @@ std::string Heading(int table) {
     case 2:
       return "Table 2. Picture from a light field: OpenCL, transfers included, against one "
              "thread;\n"
-             "below our best code for the processor. bandwidth: bytes that must be moved, a "
-             "second,\n"
-             "over the machine's triad";
+             "below our best code for the processor. The second of two pictures; bandwidth: bytes\n"
+             "that must be moved, a second, over the machine's triad";
     case 3:
       return "Table 3. Linear solvers of the blocks (16 px, gamma 1; iterations to 1e-6, residual\n"
              "recomputed), then the whole picture at once; one thread each, but for ViennaCL, "

@@ -22,7 +22,7 @@ char SizeNameOf(int width_px, int height_px) {
   return width_px == 256 && height_px == 256 ? 'L' : ' ';
 }
 
-// So that each number of views takes minutes: blocks of 7 x 7 take 30 times what those of 3 x 3 do.
+// So that each number of views takes minutes: blocks of 7 x 7 take 60 times what those of 3 x 3 do.
 PartCount PartCountOf(int views) {
   if (views <= 3) return PartCount::kFour;
   return views <= 5 ? PartCount::kTwo : PartCount::kOne;
