@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "factor_memory.h"
 #include "linear_solver_kinds.h"
 #include "thicklens/error.h"
 
@@ -40,6 +41,7 @@ class UmfpackSolver : public LinearSolver {
 
   void Factorize(const CsrMatrix<double>& matrix) override {
     Analyse(matrix);
+    const FactorMemory::Use use(&memory_);
     const Long status = umfpack_dl_numeric(start_.data(), index_.data(), value_.data(), symbolic_,
                                            &numeric_, control_, info_);
     if (status == UMFPACK_WARNING_singular_matrix) {
@@ -53,6 +55,7 @@ class UmfpackSolver : public LinearSolver {
   std::optional<double> rcond() const override { return rcond_; }
 
   std::vector<double> Solve(const std::vector<double>& b) override {
+    const FactorMemory::Use use(&memory_);
     std::vector<double> x(b.size());
     Check(umfpack_dl_solve(UMFPACK_At, start_.data(), index_.data(), value_.data(), x.data(),
                            b.data(), numeric_, control_, info_),
@@ -63,6 +66,7 @@ class UmfpackSolver : public LinearSolver {
  private:
   void Analyse(const CsrMatrix<double>& matrix) {
     Free();
+    const FactorMemory::Use use(&memory_);
     start_.assign(matrix.row_start.begin(), matrix.row_start.end());
     index_.assign(matrix.column.begin(), matrix.column.end());
     value_ = matrix.value;
@@ -80,10 +84,12 @@ class UmfpackSolver : public LinearSolver {
   }
 
   void Free() {
+    const FactorMemory::Use use(&memory_);
     if (symbolic_ != nullptr) umfpack_dl_free_symbolic(&symbolic_);
     if (numeric_ != nullptr) umfpack_dl_free_numeric(&numeric_);
   }
 
+  FactorMemory memory_;
   double control_[UMFPACK_CONTROL];
   double info_[UMFPACK_INFO];
   std::vector<Long> start_, index_;
