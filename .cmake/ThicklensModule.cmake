@@ -30,7 +30,7 @@ function(thicklens_unity_build target)
   endif()
 endfunction()
 
-# thicklens_module(<name> SOURCES <files...> HEADERS <files below include/...> PRECOMPILE <headers...>)
+# thicklens_module(<name> SOURCES <files...> HEADERS <files below include/...> PRECOMPILE <headers of libraries...>)
 function(thicklens_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PRECOMPILE" ${ARGN})
   set(target thicklens_${name})
@@ -47,7 +47,8 @@ function(thicklens_module name)
   thicklens_compile_settings(${target})
   # What takes longest to read of what most files include. Each still includes what it uses: files are
   # compiled without this where there is ccache.
-  target_precompile_headers(${target} PRIVATE ${ARG_PRECOMPILE})
+  target_precompile_headers(${target} PRIVATE ${ARG_PRECOMPILE} <algorithm> <cmath> <functional>
+                            <optional> <string> <vector>)
   install(
     TARGETS ${target}
     EXPORT thicklensTargets
