@@ -73,7 +73,7 @@ SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
   forecast.weights = weights;
   SceneOptions scene;
   scene.threads = options.threads;
-  ReturnFreedMemory();
+  ReturnFreedMemory(memory_limit_mib);
   const SceneMemory memory(forecast, scene, {},
                            ReachPx(picture->disparity, 0, static_cast<int>(weights.rows())));
   const auto fits = [&](int rows, double operator_bytes) {

@@ -19,9 +19,10 @@ double ResidentBytes() {
   return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-void ReturnFreedMemory() {
+void ReturnFreedMemory(const std::optional<double>& limit_mib) {
 #ifdef __GLIBC__
-  malloc_trim(0);
+  constexpr double kHardlyMissed = 1.0 / 16;
+  if (limit_mib && ResidentBytes() > kHardlyMissed * *limit_mib * kBytesPerMib) malloc_trim(0);
 #endif
 }
 

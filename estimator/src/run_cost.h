@@ -2,6 +2,7 @@
 #define THICKLENS_ESTIMATOR_SRC_RUN_COST_H_
 
 #include <chrono>
+#include <optional>
 
 namespace thicklens::estimator {
 
@@ -10,8 +11,9 @@ constexpr double kBytesPerMib = 1024.0 * 1024.0;
 using Clock = std::chrono::steady_clock;
 double SecondsSince(Clock::time_point start);
 double ResidentBytes();  // of the whole process, now
-// What was freed, but kept for later use, goes back to the system where that is possible.
-void ReturnFreedMemory();
+// What was freed, but kept for later use, goes back to the system where that is possible and the
+// process holds so much of what it may that it could be missed: to get it back takes time.
+void ReturnFreedMemory(const std::optional<double>& limit_mib);
 
 }  // namespace thicklens::estimator
 

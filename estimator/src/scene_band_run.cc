@@ -160,7 +160,7 @@ double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const
   const auto begin = Clock::now();
   if (start == Start::kFound) {
     radiance->FindStart(rows, disparity);
-    ReturnFreedMemory();
+    ReturnFreedMemory(options_.memory_limit_mib);
   }
   const double seconds = SecondsSince(begin);
   radiance->Prepare(rows, std::move(disparity), band);
@@ -258,7 +258,7 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
   if (wants_confidence) whole.of_points.reserve(input_.disparity.disparity.size());
   for (std::size_t i = 0; i < bands.size(); ++i) {
     const SceneBand& band = bands[i];
-    ReturnFreedMemory();  // of the band above
+    ReturnFreedMemory(options_.memory_limit_mib);  // of the band above
     typename Radiance::Run run = RunFor(options);
     run.confidence = wants_confidence;
     run.fan = MayKeepFan(count);

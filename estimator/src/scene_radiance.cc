@@ -103,7 +103,7 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph, Dispar
   projection.fan = run_.fan;
   projection.progress = [this] { run_.progress->Tell(); };
   projection_ = MakeSceneProjection<Real>(disparity_, run_.input.weights, projection);
-  ReturnFreedMemory();
+  ReturnFreedMemory(run_.options.memory_limit_mib);
 
   data_ = DataTermOf(projection_, photograph, run_.threads);
   slope_squared_ = SlopeSquared(photograph);

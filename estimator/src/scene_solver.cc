@@ -71,7 +71,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   keeps.light_field = sink == nullptr;
   keeps.device = backend != nullptr && backend->is_opencl();
   if (sink != nullptr) keeps.sink_bytes = sink->bytes;
-  ReturnFreedMemory();
+  ReturnFreedMemory(options.memory_limit_mib);
   const SceneMemory memory(input, options, keeps, reach_px);
   const int iterations = std::min(options.max_iterations, kUsualIterations);
   IterationProgress progress(options.progress, iterations + static_cast<int>(input.weights.size()));
@@ -89,7 +89,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   SolvedScene solved =
       run.Solve(falloff ? *without_falloff : input.picture, wants_confidence, maps);
   without_falloff.reset();
-  ReturnFreedMemory();
+  ReturnFreedMemory(options.memory_limit_mib);
 
   const auto views_start = Clock::now();
   if (sink == nullptr) {

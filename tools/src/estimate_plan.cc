@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "interrupt.h"
+#include "memory_available.h"
 #include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/functional_solver.h"
@@ -156,8 +157,9 @@ PlanRun RunPlan(const EstimatePlan& plan, const estimator::EstimateInput& input,
   PlanRun run;
   if (plan.solver == "scene") {
     estimator::SceneSummary summary;
-    run.light_field = estimator::EstimateScene(input, SceneOptionsOf(options, on, StopWhenAsked),
-                                               &summary, nullptr, backend);
+    estimator::SceneOptions scene = SceneOptionsOf(options, on, StopWhenAsked);
+    scene.memory_limit_mib = UsualMemoryLimitMib();  // which `estimate` respects, too
+    run.light_field = estimator::EstimateScene(input, scene, &summary, nullptr, backend);
     TakeSeconds(summary, &run);
     TakeIterations(summary, &run);
     run.device = summary.device;

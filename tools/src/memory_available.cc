@@ -81,6 +81,7 @@ void ReturnMemoryAtOnce() {
   constexpr int kBytes = 1 << 20;
   mallopt(M_MMAP_THRESHOLD, kBytes);
   mallopt(M_TRIM_THRESHOLD, kBytes);
+  mallopt(M_TOP_PAD, kBytes);
 #endif
 }
 

@@ -1,7 +1,6 @@
 // The program: finds the command that is asked for, runs it, and tells a failure in one line.
 #include <fmt/format.h>
 #include <glog/logging.h>
-#include <malloc.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -21,6 +20,7 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "option_values.h"
+#include "program_memory.h"
 #include "thicklens/error.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -44,15 +44,6 @@ void SetUpMessages() {
   google::InitGoogleLogging("thicklens");
   spdlog::set_default_logger(spdlog::stderr_logger_mt("thicklens"));
   spdlog::set_pattern("thicklens: %l: %v");
-}
-
-// Pictures are allocated and freed again by the thousand; given back to the system each time, their
-// pages would be cleared anew by each use (a tenth of a calibration's time).
-void KeepFreedMemory() {
-#ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 64 << 20);
-  mallopt(M_TRIM_THRESHOLD, 256 << 20);
-#endif
 }
 
 int Fail(std::string message, ExitCode code) {
@@ -82,7 +73,7 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
 }
 
 int Main(int argc, char** argv) {
-  KeepFreedMemory();
+  tools::KeepFreedMemory();
   SetUpMessages();
   tools::CatchSignals();
   CLI::App program(
