@@ -3,13 +3,7 @@
 
 #include <cstdlib>  // says whether it is glibc
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define THICKLENS_IS_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define THICKLENS_IS_SANITIZED 1
-#endif
-#endif
+#include "sanitized.h"
 
 #if defined(__GLIBC__) && defined(__linux__) && !defined(THICKLENS_IS_SANITIZED)
 
@@ -19,6 +13,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <new>
@@ -34,7 +29,7 @@ constexpr std::size_t kOutsideHeap = 64 * kMib;
 // The part of the heap that is asked for in huge pages ends here. glibc does this by itself, but
 // only if its environment says so before the program starts (glibc.malloc.hugetlb).
 std::mutex heap_mutex;
-std::uintptr_t asked_until = 0;  // 0: nothing is asked for
+std::atomic<std::uintptr_t> asked_until = 0;  // 0: nothing is asked for
 
 std::uintptr_t HeapEnd() { return reinterpret_cast<std::uintptr_t>(::sbrk(0)); }
 

@@ -21,15 +21,8 @@
 #include "interrupt.h"
 #include "option_values.h"
 #include "program_memory.h"
+#include "sanitized.h"
 #include "thicklens/error.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define THICKLENS_IS_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define THICKLENS_IS_SANITIZED 1
-#endif
-#endif
 
 namespace {
 
