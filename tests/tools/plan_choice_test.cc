@@ -309,7 +309,7 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
     return refusal(changed);
   };
   EXPECT_THAT(refusal("text"), HasSubstr("profile.json: is no JSON object"));
-  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/3'"));
+  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/4'"));
   EXPECT_THAT(with("/threads", 0), HasSubstr("threads: a whole number from 1 to"));
   EXPECT_THAT(with("/threads", 10'000'000'000), HasSubstr("threads: a whole number from 1 to"));
   EXPECT_THAT(with("/runs", 2.5), HasSubstr("runs: a whole number from 1 to"));

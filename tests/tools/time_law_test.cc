@@ -88,7 +88,9 @@ TEST(TimeLaw, IsTheSumOfItsTerms) {
                                                   {TimeLaw::kPixelsViewsBlur, 150},
                                                   {TimeLaw::kFileSeconds, 4},
                                                   {TimeLaw::kViews, 25},
-                                                  {TimeLaw::kPixelsViewsChannelsIterations, 112.5}};
+                                                  {TimeLaw::kPixelsViewsChannelsIterations, 112.5},
+                                                  {TimeLaw::kPixelsChannelsIterations, 5.625},
+                                                  {TimeLaw::kPixelsViewsBlurArea, 450}};
   ASSERT_EQ(of_one.size(), static_cast<std::size_t>(TimeLaw::kTerms));
   for (const auto& [term, seconds] : of_one) {
     EXPECT_DOUBLE_EQ(LawOf({{term, 1}}).Seconds({2, 3, 25, 3, 4}), seconds) << term;
@@ -103,7 +105,9 @@ TEST(TimeLaw, IsTheBestWithoutNegativeTerms) {
                                           TimeLaw::kPixelsViews,
                                           TimeLaw::kPixelsChannelsBlur,
                                           TimeLaw::kPixelsViewsBlur,
-                                          TimeLaw::kPixelsViewsChannelsIterations};
+                                          TimeLaw::kPixelsViewsChannelsIterations,
+                                          TimeLaw::kPixelsChannelsIterations,
+                                          TimeLaw::kPixelsViewsBlurArea};
   std::vector<TimedLoad> timed;
   std::mt19937 engine(4);
   std::lognormal_distribution<double> noise(0, 0.5);

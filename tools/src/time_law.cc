@@ -23,7 +23,9 @@ constexpr std::array kSolveTerms = {TimeLaw::kStart,
                                     TimeLaw::kPixelsViews,
                                     TimeLaw::kPixelsChannelsBlur,
                                     TimeLaw::kPixelsViewsBlur,
-                                    TimeLaw::kPixelsViewsChannelsIterations};
+                                    TimeLaw::kPixelsViewsChannelsIterations,
+                                    TimeLaw::kPixelsChannelsIterations,
+                                    TimeLaw::kPixelsViewsBlurArea};
 constexpr std::array kFilesTerms = {TimeLaw::kStart, TimeLaw::kViews, TimeLaw::kPixelsViews,
                                     TimeLaw::kFileSeconds};
 constexpr std::array kRestTerms = {TimeLaw::kStart,       TimeLaw::kViews,
@@ -45,6 +47,8 @@ TimeLaw::Terms TermsOf(const PictureLoad& load) {
   terms[TimeLaw::kViews] = load.views;
   terms[TimeLaw::kPixelsViewsChannelsIterations] =
       pixels * load.views * load.channels * blur / (1 + blur);
+  terms[TimeLaw::kPixelsChannelsIterations] = pixels * load.channels * blur / (0.2 + blur);
+  terms[TimeLaw::kPixelsViewsBlurArea] = pixels * load.views * blur * blur;
   return terms;
 }
 
