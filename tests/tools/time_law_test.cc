@@ -25,7 +25,7 @@ using ::testing::ElementsAre;
 
 std::vector<PictureLoad> Loads(int count, unsigned seed) {
   std::mt19937 engine(seed);
-  std::uniform_real_distribution<double> megapixels(0.01, 0.3), blur(0.3, 3), files(0, 1);
+  std::uniform_real_distribution<double> megapixels(0.01, 0.3), blur(0.03, 3), files(0, 1);
   std::uniform_int_distribution<int> across(1, 4), colour(0, 1);
   std::vector<PictureLoad> loads;
   for (int i = 0; i < count; ++i) {
@@ -65,7 +65,9 @@ PartLaws SomeLaws() {
   return {LawOf({{Law::kStart, 0.01}, {Law::kPixels, 0.1}, {Law::kPixelsViewsBlur, 0.007}}),
           LawOf({{Law::kPixelsChannels, 0.06},
                  {Law::kPixelsChannelsBlur, 0.02},
-                 {Law::kPixelsViewsChannelsIterations, 0.15}}),
+                 {Law::kPixelsViewsChannelsIterations, 0.15},
+                 {Law::kPixelsChannelsIterations, 0.08},
+                 {Law::kPixelsViewsBlurArea, 0.003}}),
           LawOf({{Law::kViews, 0.0006}, {Law::kPixelsViews, 0.01}, {Law::kFileSeconds, 0.55}}),
           LawOf({{Law::kPixels, 0.02}, {Law::kPixelsViewsChannels, 0.003}})};
 }

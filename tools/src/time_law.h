@@ -45,8 +45,8 @@ class TimeLaw {
     kViews,                          // a view's files and threads, whatever their size
     kPixelsViewsChannelsIterations,  // times s / (1 + s): a blur of many pixels takes no more
                                      // iterations than one of a few, and none at all takes few
-    kPixelsChannelsIterations,       // times s / (.2 + s), of what is solved on scene points: their
-                                     // iterations are as many from a third of a pixel on
+    kPixelsChannelsIterations,       // times s / (.2 + s), of what is solved on scene points: with
+                                     // more blur their iterations soon level off
     kPixelsViewsBlurArea,            // times s^2: the pixels that a blur reaches
   };
   static constexpr int kTerms = kPixelsViewsBlurArea + 1;
