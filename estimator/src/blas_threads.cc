@@ -1,6 +1,9 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -54,10 +57,29 @@ std::string BlasDescription() {
   return fmt::format("{} ({})", name, file);
 }
 
+void KeepBlasToOneThread() {
+  const auto threads = Find<int()>("openblas_get_num_threads");
+  const auto set_threads = Find<void(int)>("openblas_set_num_threads");
+  const auto end = Find<int()>("blas_thread_shutdown_");  // what OpenBLAS does before a fork
+  if (threads == nullptr || set_threads == nullptr) return;
+  const int before = threads();
+  set_threads(1);
+  // A thread begins by taking so much memory. Where there is as much for all of them each gets it.
+  constexpr std::size_t kBytesOfThread = std::size_t{128} << 20;
+  const std::size_t bytes = static_cast<std::size_t>(std::max(1, before)) * kBytesOfThread;
+  void* const free = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
+                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (free == MAP_FAILED) return;
+  ::munmap(free, bytes);
+  if (end != nullptr) end();
+}
+
 OneBlasThread::OneBlasThread() {
   const auto threads = Find<int()>("openblas_get_num_threads");
   const auto set_threads = Find<void(int)>("openblas_set_num_threads");
   if (threads == nullptr || set_threads == nullptr) return;
+  // To set the number starts the threads of a BLAS that has none, whatever the number is.
+  if (threads() == 1) return;
   threads_before_ = threads();
   set_threads(1);
 }

@@ -23,6 +23,7 @@
 #include "program_memory.h"
 #include "sanitized.h"
 #include "thicklens/error.h"
+#include "thicklens/estimator/blas.h"
 
 namespace {
 
@@ -123,5 +124,6 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   EndWithoutLibraries();
+  thicklens::estimator::KeepBlasToOneThread();
   return Run(argc, argv);
 }

@@ -25,6 +25,14 @@ class OneBlasThread {
   int threads_before_ = 0;  // 0: there is nothing to bring back
 };
 
+// From now on OpenBLAS uses one thread for each call, as with OneBlasThread, and the threads that
+// it started when it was loaded, one a core, are ended. Each of them waits for work busily before
+// it sleeps (2^26 to 2^28 ticks of the clock, .03 to .1 s): as long as many an estimate takes, and
+// on the cores that its threads need. To be called before other threads start. The threads are left
+// where memory is so short that they may not have begun: they try forever, and could not be waited
+// for. A program that sets another number later gets new ones. Another BLAS needs nothing.
+void KeepBlasToOneThread();
+
 }  // namespace thicklens::estimator
 
 #endif  // THICKLENS_ESTIMATOR_BLAS_H_
