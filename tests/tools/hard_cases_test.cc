@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <ostream>
 #include <set>
@@ -18,6 +19,7 @@
 #include "hard_case.h"
 #include "hard_sweeps.h"
 #include "hard_views.h"
+#include "interrupt.h"
 #include "light_field_io.h"
 #include "support/temporary_folder.h"
 #include "thicklens/error.h"
@@ -259,6 +261,23 @@ TEST(RunProgram, TellsHowAProgramEnded) {
   EXPECT_EQ(crashed.signal, SIGSEGV);
   EXPECT_TRUE(RunProgram("/bin/sh", {"-c", "sleep 60"}, folder.path(), 0.01).timed_out);
   EXPECT_THROW(RunProgram("/no/such/program", {}, folder.path(), 1), Error);
+}
+
+// Ctrl-C is for the whole group: a child that has ended by it was not at fault.
+TEST(RunProgram, IsInterruptedWithItsChild) {
+  const thicklens::testing::TemporaryFolder folder;
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(
+      {
+        CatchSignals();
+        try {
+          RunProgram("/bin/sh", {"-c", "kill -INT $PPID $$"}, folder.path(), 60);
+        } catch (const Interrupted&) {
+          std::_Exit(0);
+        }
+        std::_Exit(1);
+      },
+      ::testing::ExitedWithCode(0), "");
 }
 
 TEST(ShellCommand, CanBeTypedAgain) {

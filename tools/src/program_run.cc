@@ -98,6 +98,7 @@ ProgramRun RunProgram(const std::string& program, const std::vector<std::string>
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
+  ThrowIfInterrupted();  // a person's Ctrl-C ends the child as well, and that may be seen first
   run.seconds = seconds();
   if (WIFEXITED(child.status())) run.exit_code = WEXITSTATUS(child.status());
   if (WIFSIGNALED(child.status())) run.signal = WTERMSIG(child.status());
