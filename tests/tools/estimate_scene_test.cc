@@ -239,6 +239,8 @@ TEST_F(EstimateSceneTest, IsTheDefaultAndSaysWhatItDid) {
   for (const char* part : {"setup", "solve", "views", "files"})
     parts += seconds.at(part).get<double>();
   EXPECT_LE(parts, seconds["total"].get<double>() * 1.001);
+  EXPECT_GT(seconds["read"].get<double>(), 0);
+  EXPECT_LE(seconds["read"].get<double>(), seconds["setup"].get<double>());
   EXPECT_GT(summary["peak_rss_mib"].get<double>(), 10);
   EXPECT_GT(summary["predicted_memory_mib"].get<double>(), 1);
   EXPECT_NEAR(summary["disparity"]["min_px"].get<double>(), -0.5, 1e-6);

@@ -3,13 +3,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "bench_machine.h"
@@ -19,6 +22,7 @@
 #include "profile_measurement.h"
 #include "support/temporary_folder.h"
 #include "thicklens/error.h"
+#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -87,8 +91,8 @@ TEST(ChoosePlan, TakesTheFastestThatLosesNoMore) {
   EXPECT_EQ(ChosenFor({"", 4.0, 1.0}), "tv");
 }
 
-// What the probe took is over before the estimate begins.
-TEST(ChoosePlan, CountsTheProbe) {
+// What reading and the probe took is over by then.
+TEST(ChoosePlan, CountsWhatIsSpent) {
   EXPECT_EQ(ChoosePlan(SomeProfile(), Within(4.2), kLoad, 1, 0.1).plan.prior, "tv");
   EXPECT_EQ(ChoosePlan(SomeProfile(), Within(4.2), kLoad, 1, 0.3).plan.prior, "gradient");
   EXPECT_NEAR(ChoosePlan(SomeProfile(), Loss(0), kLoad, 2, 0.3).expected_seconds, 16.3, 1e-9);
@@ -224,6 +228,7 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
                {112, 2, false, false, 1, Use::kCheck}};
   run.threads = 1;
   run.repeat = 2;
+  run.program = THICKLENS_PROGRAM;
   int told = 0;
   run.progress = [&](int done, int total) {
     EXPECT_LT(done, total);
@@ -233,14 +238,17 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
   ridge.prior = "ridge";
   tv.prior = "tv";
   const MeasuredProfile measured = MeasureProfile({ridge, tv}, run);
-  EXPECT_EQ(told, 16);
+  EXPECT_EQ(told, 4 + 16);
   EXPECT_EQ(measured.judged, 2);
   EXPECT_EQ(measured.profile.runs, 2);
   for (const TimedLoad& timed : measured.loads[0]) {
+    EXPECT_GT(timed.parts.read, 0);
     EXPECT_GT(timed.parts.setup, 0);
     EXPECT_GT(timed.parts.solve, 0);
     EXPECT_GT(timed.parts.files, 0);
-    EXPECT_GE(timed.seconds - timed.parts.setup - timed.parts.solve - timed.parts.files, 0);
+    EXPECT_GE(timed.seconds - timed.parts.read - timed.parts.setup - timed.parts.solve -
+                  timed.parts.files,
+              0);
   }
   ASSERT_EQ(measured.loads.size(), 2U);
   EXPECT_EQ(measured.loads[0].size(), 3U);
@@ -256,6 +264,15 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
                                                                                 "1 channel(s)")));
   run.progress = [](int, int) { throw Error("stop"); };
   EXPECT_THROW(MeasureProfile({ridge}, run), Error);
+  run.progress = {};
+  run.program = "/bin/false";
+  try {
+    MeasureProfile({ridge}, run);
+    ADD_FAILURE() << "no refusal";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), AllOf(StartsWith("/bin/false estimate picture.png"),
+                                    HasSubstr("--prior ridge: it ended with 1")));
+  }
 }
 
 TEST(MeasureProfile, TellsWhereItCannotWrite) {
@@ -309,7 +326,7 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
     return refusal(changed);
   };
   EXPECT_THAT(refusal("text"), HasSubstr("profile.json: is no JSON object"));
-  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/4'"));
+  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/5'"));
   EXPECT_THAT(with("/threads", 0), HasSubstr("threads: a whole number from 1 to"));
   EXPECT_THAT(with("/threads", 10'000'000'000), HasSubstr("threads: a whole number from 1 to"));
   EXPECT_THAT(with("/runs", 2.5), HasSubstr("runs: a whole number from 1 to"));
@@ -377,6 +394,32 @@ TEST_F(EstimateWish, IsTakenFromTheProfileAndHeldAgainstWhatItTook) {
   EXPECT_EQ(summary["plan"]["asked"], "--quality draft");
   EXPECT_EQ(summary["plan"]["seconds"], summary["seconds"]["total"]);
   EXPECT_GT(summary["plan"]["expected_seconds"].get<double>(), 0);
+}
+
+// A depth map that comes so late that nothing else takes as long.
+TEST_F(EstimateWish, CountsReading) {
+  constexpr double kLateSeconds = 2;
+  EstimateProfile profile = SomeProfile();
+  profile.plans = {ProfileOf("ridge", 1e-12, 40)};
+  // Of this machine, so that no probe is needed.
+  profile.processor = ProcessorName();
+  profile.build = BuildInfo();
+  profile.threads = 1;
+  const std::string path = folder_ / "scene/depth.pfm";
+  const std::string bytes = model::ReadWholeFile(path);
+  std::filesystem::remove(path);
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  std::thread writer([&] {
+    std::ofstream pipe(path, std::ios::binary);  // waits for a reader
+    std::this_thread::sleep_for(std::chrono::duration<double>(kLateSeconds));
+    pipe << bytes;
+  });
+  const ProgramResult result = Estimate(
+      {"--quality", "best", "--threads", "1", "--profile", Written(folder_, ProfileJson(profile))});
+  writer.join();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_GE(Summary()["seconds"]["read"].get<double>(), kLateSeconds);
+  EXPECT_GE(Summary()["plan"]["expected_seconds"].get<double>(), kLateSeconds);
 }
 
 TEST_F(EstimateWish, ThatCannotBeMetLeavesNothingBehind) {

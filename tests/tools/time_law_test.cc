@@ -40,9 +40,11 @@ std::vector<PictureLoad> Loads(int count, unsigned seed) {
 struct PartLaws {
   TimeLaw setup, solve, files, rest;
 
+  // Reading takes what it takes, which no law knows.
   TimedLoad Timed(const PictureLoad& load) const {
-    const PartSeconds parts = {setup.Seconds(load), solve.Seconds(load), files.Seconds(load)};
-    return {load, parts.setup + parts.solve + parts.files + rest.Seconds(load), parts};
+    const PartSeconds parts = {0.1 + std::fmod(1000 * load.blur_sigma_px, 1), setup.Seconds(load),
+                               solve.Seconds(load), files.Seconds(load)};
+    return {load, parts.read + parts.setup + parts.solve + parts.files + rest.Seconds(load), parts};
   }
   std::vector<TimedLoad> Timed(const std::vector<PictureLoad>& loads) const {
     std::vector<TimedLoad> timed;
@@ -115,7 +117,7 @@ TEST(TimeLaw, IsTheBestWithoutNegativeTerms) {
   std::lognormal_distribution<double> noise(0, 0.5);
   for (const PictureLoad& load : Loads(12, 3)) {
     const double seconds = (0.02 + SomeLaws().solve.Seconds(load)) * noise(engine);
-    timed.push_back({load, seconds, {0, seconds, 0}});
+    timed.push_back({load, seconds, {0, 0, seconds, 0}});
   }
   const auto error = [&](const TimeLaw& law) {
     double sum = 0;
@@ -171,10 +173,10 @@ TEST(TimeLaw, PartsHaveTheTermsOfTheirWorkAlone) {
   std::vector<TimedLoad> timed;
   for (const PictureLoad& load : Loads(20, 9)) {
     const double seconds = 0.1 + load.file_seconds;
-    timed.push_back({load, seconds, {0, seconds, 0}});
+    timed.push_back({load, seconds, {0, 0, seconds, 0}});
   }
   EXPECT_EQ(FitTimeLaws({timed}).front().coefficients()[TimeLaw::kFileSeconds], 0);
-  for (TimedLoad& load : timed) load.parts = {0, 0, load.seconds};
+  for (TimedLoad& load : timed) load.parts = {0, 0, 0, load.seconds};
   EXPECT_NEAR(FitTimeLaws({timed}).front().coefficients()[TimeLaw::kFileSeconds], 1, 1e-9);
 }
 
@@ -191,6 +193,7 @@ TEST(TimeLaw, RefusesWhatNoLawCanBeMadeFrom) {
   refuses([](TimedLoad* timed) { timed->parts.solve = 2 * timed->seconds; });
   refuses([](TimedLoad* timed) { timed->parts.solve = -1; });
   refuses([](TimedLoad* timed) { timed->parts.setup = std::nan(""); });
+  refuses([](TimedLoad* timed) { timed->parts.read = -0.1; });
   // Each less than the whole, together more.
   refuses([](TimedLoad* timed) { timed->parts.files = timed->parts.setup = 0.6 * timed->seconds; });
 }

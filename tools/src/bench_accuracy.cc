@@ -318,10 +318,11 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
                          {"file_seconds", timed.load.file_seconds},
                          {"seconds", timed.seconds},
                          {"parts",
-                          {{"setup", timed.parts.setup},
+                          {{"read", timed.parts.read},
+                           {"setup", timed.parts.setup},
                            {"solve", timed.parts.solve},
                            {"files", timed.parts.files}}},
-                         {"expected_seconds", plan.law.Seconds(timed.load)}});
+                         {"expected_seconds", timed.parts.read + plan.law.Seconds(timed.load)}});
       }
     }
   }

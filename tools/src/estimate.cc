@@ -181,13 +181,16 @@ void SolveFunctional(const EstimateOptions& options, const estimator::EstimateIn
 }
 
 // By the profile, as fast as this machine is now if it was made on another, or for other threads.
-PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::EstimateInput& input) {
+// What was done since `start` is over, whatever it took.
+PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::EstimateInput& input,
+                          Clock::time_point start) {
   const EstimateProfile profile = ProfileFor(options.profile_path);
   const int threads = model::ResolveThreads(options.common.threads);
-  const auto start = Clock::now();
   const double speed_ratio =
       profile.IsFromHere(threads) ? 1 : ProbeSeconds(threads) / profile.probe_seconds;
   PictureLoad load = PictureLoadOf(input);
+  spdlog::debug("plan: blur of {:.3g} px (sigma, rms), {:.3g} s for the files on one thread",
+                load.blur_sigma_px, load.file_seconds);
   // The law knows how the profile's threads share the files.
   load.file_seconds *= static_cast<double>(profile.threads) / threads;
   PlanChoice choice = ChoosePlan(profile, options.wish, load, speed_ratio, SecondsSince(start));
@@ -305,7 +308,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   ThrowIfInterrupted();
   std::optional<PlanChoice> choice;
   if (options.wish.IsMade()) {
-    choice = ChoosePlanHere(options, prepared.input);
+    choice = ChoosePlanHere(options, prepared.input, start);
     spdlog::info("{}", PrintableUtf8(choice->message));
     ApplyPlan(choice->plan, &options);
     CheckSolverUsage(options);
@@ -313,7 +316,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   }
 
   EstimateOutcome outcome;
-  outcome.seconds.setup = SecondsSince(start);
+  outcome.seconds.read = outcome.seconds.setup = SecondsSince(start);
   LightFieldWriter writer(prepared.input.transfer,
                           options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng,
                           &outputs.light_field);

@@ -65,19 +65,26 @@ std::string PlanName(const EstimatePlan& plan) {
   return name;
 }
 
-std::string PlanArguments(const EstimatePlan& plan) {
-  std::string text = "--solver " + plan.solver;
-  if (!plan.prior.empty()) text += " --prior " + plan.prior;
-  if (!plan.block_solver.empty()) text += " --block-solver " + plan.block_solver;
-  if (plan.block_px) text += fmt::format(" --block-px {}", *plan.block_px);
-  if (plan.tolerance) text += fmt::format(" --tolerance {:g}", *plan.tolerance);
-  if (plan.double_precision) text += " --double";
-  if (plan.on_opencl) text += " --device opencl";
+std::vector<std::string> PlanWords(const EstimatePlan& plan) {
+  std::vector<std::string> words = {"--solver", plan.solver};
+  const auto add = [&words](const char* option, const std::string& value) {
+    words.insert(words.end(), {option, value});
+  };
+  if (!plan.prior.empty()) add("--prior", plan.prior);
+  if (!plan.block_solver.empty()) add("--block-solver", plan.block_solver);
+  if (plan.block_px) add("--block-px", fmt::format("{}", *plan.block_px));
+  if (plan.tolerance) add("--tolerance", fmt::format("{:g}", *plan.tolerance));
+  if (plan.double_precision) words.emplace_back("--double");
+  if (plan.on_opencl) add("--device", "opencl");
   // Else the best there is; ViennaCL takes one for itself.
   if (!plan.on_opencl && plan.solver == "blocks" && plan.block_solver != "viennacl") {
-    text += " --device cpu";
+    add("--device", "cpu");
   }
-  return text;
+  return words;
+}
+
+std::string PlanArguments(const EstimatePlan& plan) {
+  return fmt::format("{}", fmt::join(PlanWords(plan), " "));
 }
 
 json PlanJson(const EstimatePlan& plan) {

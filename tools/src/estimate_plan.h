@@ -30,7 +30,8 @@ std::string PlanName(const EstimatePlan& plan);
 nlohmann::json PlanJson(const EstimatePlan& plan);
 // Throws Error that begins with `where` and names the field.
 EstimatePlan PlanFromJson(const nlohmann::json& json, const std::string& where);
-// The options of a command line that asks for it.
+// The options of a command line that asks for it: word by word, and as one text.
+std::vector<std::string> PlanWords(const EstimatePlan& plan);
 std::string PlanArguments(const EstimatePlan& plan);
 void ApplyPlan(const EstimatePlan& plan, EstimateOptions* options);
 

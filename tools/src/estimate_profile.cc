@@ -25,7 +25,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr char kSchema[] = "thicklens/estimate-profile/4";
+constexpr char kSchema[] = "thicklens/estimate-profile/5";
 
 const json& Field(const json& fields, const char* name, const std::string& where) {
   const auto found = fields.find(name);

@@ -15,8 +15,8 @@ namespace thicklens::tools {
 struct PlanProfile {
   EstimatePlan plan;
   TimeLaw law;
-  // Of the law's predictions of pictures that it was not made from, over what they took: the middle
-  // one of the relative errors, and the largest.
+  // Of what the law foresees, with the time that reading took, of pictures of sizes that it was not
+  // made from, over what they took: the middle one of the relative errors, and the largest.
   double median_error = 0, largest_error = 0;
   double psnr_db = 0;  // of the true views, mean over scenes and views
 };

@@ -20,6 +20,7 @@
 namespace thicklens::tools {
 
 struct EstimateSeconds {
+  double read = 0;   // of the set-up: until a plan is chosen, and that
   double setup = 0;  // reading included
   double solve = 0;
   double views = 0;  // making them; by blocks they are what is solved for

@@ -87,14 +87,14 @@ std::vector<std::string> BeyondProfile(const EstimateProfile& profile, const Pic
 }  // namespace
 
 PlanChoice ChoosePlan(const EstimateProfile& profile, const PlanWish& wish, const PictureLoad& load,
-                      double speed_ratio, double probe_seconds) {
+                      double speed_ratio, double spent_seconds) {
   std::vector<Offer> offers;
   // The files' time is of this machine already.
   PictureLoad there = load;
   there.file_seconds /= speed_ratio;
   for (const PlanProfile& plan : profile.plans) {
     offers.push_back(
-        {&plan, probe_seconds + speed_ratio * plan.law.Seconds(there), profile.LossDb(plan)});
+        {&plan, spent_seconds + speed_ratio * plan.law.Seconds(there), profile.LossDb(plan)});
   }
   const Offer chosen = Choose(profile, wish, offers);
   const Offer best = *std::min_element(offers.begin(), offers.end(), IsBetter);

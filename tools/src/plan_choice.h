@@ -12,7 +12,7 @@ namespace thicklens::tools {
 
 struct PlanChoice {
   EstimatePlan plan;
-  double expected_seconds = 0;  // with the probe, if there was one
+  double expected_seconds = 0;  // of all of the run, with what is over already
   double loss_db = 0;           // below the best of the profile
   double median_error = 0;      // of the law's predictions, relative
   double speed_ratio = 1;       // of this machine's times over the profile's
@@ -25,9 +25,9 @@ struct PlanChoice {
 //   best      the best
 // within_s: the best that is expected to be done by then; psnr_loss_db: the fastest that loses no
 // more; both: the fastest that does both. Throws Error where no plan does, and names the nearest.
-// `probe_seconds`: what finding the ratio took, which counts.
+// `spent_seconds`: what reading, and finding the ratio, took: they count.
 PlanChoice ChoosePlan(const EstimateProfile& profile, const PlanWish& wish, const PictureLoad& load,
-                      double speed_ratio, double probe_seconds = 0);
+                      double speed_ratio, double spent_seconds = 0);
 
 // Its summary once the run took so long.
 nlohmann::json ChoiceJson(const PlanChoice& choice, const PlanWish& wish, double seconds);

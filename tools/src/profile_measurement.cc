@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <system_error>
@@ -20,11 +21,11 @@
 #include "build_info.h"
 #include "depth_io.h"
 #include "estimate_input.h"
-#include "estimate_run.h"
 #include "image_io.h"
 #include "interrupt.h"
 #include "light_field_io.h"
 #include "picture_load.h"
+#include "program_run.h"
 #include "temporary_folder.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
@@ -50,10 +51,21 @@ class OnlyErrors {
   spdlog::level::level_enum level_;
 };
 
+// In the folder of a case; the runs' own are in their folder.
+constexpr char kPicture[] = "picture.png", kDepth[] = "depth.pfm", kCamera[] = "camera.yaml";
+constexpr char kLightField[] = "light-field", kSummary[] = "summary.json";
+
 struct Prepared {
   EstimateOptions options;
-  PictureLoad load;
+  fs::path folder;
   std::optional<model::LightField> truth;
+};
+
+// What was measured of a case.
+struct CaseRuns {
+  Prepared prepared;
+  std::vector<std::vector<TimedLoad>> runs;  // of each plan
+  std::vector<double> file_seconds;          // of each round
 };
 
 model::StoredPicture FirstChannel(const model::StoredPicture& picture) {
@@ -82,11 +94,12 @@ Prepared Prepare(const ProfileCase& what, const ProfileRun& run, const fs::path&
   const model::StoredPicture stored = simulator.Store(simulator.RenderNoiseless(stoppable));
   fs::create_directories(folder);
   Prepared prepared;
+  prepared.folder = folder;
   EstimateOptions& options = prepared.options;
-  options.picture_path = (folder / "picture.png").string();
-  options.depth_path = (folder / "depth.pfm").string();
-  options.camera_path = (folder / "camera.yaml").string();
-  options.output_folder = (folder / "light-field").string();
+  options.picture_path = (folder / kPicture).string();
+  options.depth_path = (folder / kDepth).string();
+  options.camera_path = (folder / kCamera).string();
+  options.output_folder = (folder / kLightField).string();
   model::WriteFileAtomically(options.picture_path,
                              EncodePng(what.colour ? stored : FirstChannel(stored)));
   model::WriteFileAtomically(options.depth_path, EncodePfm(simulator.RenderDepth()));
@@ -96,7 +109,6 @@ Prepared Prepare(const ProfileCase& what, const ProfileRun& run, const fs::path&
   options.views.text = fmt::format("{0}x{0}", what.views);
   options.common.quiet = true;
   options.common.threads = run.threads;
-  prepared.load = PictureLoadOf(PrepareEstimate(options).input);
   if (what.use == ProfileCase::Use::kTimeAndViews) {
     prepared.truth = simulator.RenderLightField(what.views, what.views, stoppable);
     if (!what.colour) prepared.truth = GreyViews(*prepared.truth);
@@ -112,12 +124,59 @@ double PsnrDb(const Prepared& prepared, const model::LightField& estimate, int t
       .mean.psnr_db;
 }
 
+// The summary of a run of its own process.
+nlohmann::json RunOnce(const std::string& program, const Prepared& prepared,
+                       const EstimatePlan& plan) {
+  const EstimateOptions& options = prepared.options;
+  std::vector<std::string> words = {"estimate",
+                                    kPicture,
+                                    kDepth,
+                                    "--camera",
+                                    kCamera,
+                                    "--depth-kind",
+                                    options.depth.kind,
+                                    "--depth-unit",
+                                    options.depth.unit,
+                                    "--views",
+                                    options.views.text,
+                                    "--threads",
+                                    fmt::format("{}", options.common.threads),
+                                    "-o",
+                                    kLightField,
+                                    "--json",
+                                    kSummary,
+                                    "--quiet"};
+  const std::vector<std::string> of_plan = PlanWords(plan);
+  words.insert(words.end(), of_plan.begin(), of_plan.end());
+  const ProgramRun ended =
+      RunProgram(program, words, prepared.folder, std::numeric_limits<double>::infinity());
+  nlohmann::json summary;
+  if (ended.exit_code == 0) {
+    summary = nlohmann::json::parse(model::ReadWholeFile((prepared.folder / kSummary).string()),
+                                    nullptr, false);
+  }
+  if (!summary.is_object() || !summary.contains("seconds")) {
+    throw Error(fmt::format("{} {}: it ended with {} (signal {}) and said: {}", program,
+                            ShellCommand(words), ended.exit_code, ended.signal, ended.err));
+  }
+  return summary;
+}
+
 TimedLoad Timed(const PictureLoad& load, const nlohmann::json& seconds) {
   const auto of = [&](const char* part) { return seconds.at(part).get<double>(); };
   // Parts are measured one by one: rounding may put them above the whole.
-  const double setup = std::min(of("setup"), of("total"));
-  const double solve = std::min(of("solve"), of("total") - setup);
-  return {load, of("total"), {setup, solve, std::min(of("files"), of("total") - setup - solve)}};
+  PartSeconds parts;
+  double left = of("total");
+  const auto take = [&left](double part) {
+    part = std::clamp(part, 0.0, left);
+    left -= part;
+    return part;
+  };
+  parts.read = take(of("read"));
+  parts.setup = take(of("setup") - of("read"));
+  parts.solve = take(of("solve"));
+  parts.files = take(of("files"));
+  return {load, of("total"), parts};
 }
 
 // By the whole time, and of two the slower. One run, so that its parts are of that time.
@@ -209,41 +268,53 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
     profile.plans.emplace_back();
     profile.plans.back().plan = plan;
   }
+  const std::string program = run.program.empty() ? ThisProgram() : run.program;
   int& judged = measured.judged;
   int done = 0;
-  const int total = static_cast<int>(run.cases.size() * plans.size()) * run.repeat;
+  const int total =
+      static_cast<int>(run.cases.size()) * (1 + static_cast<int>(plans.size()) * run.repeat);
+  std::vector<CaseRuns> cases;
   for (const ProfileCase& what : run.cases) {
-    const fs::path of_case = folder.path() / "case";
-    Prepared prepared = Prepare(what, run, of_case);
-    const bool is_check = what.use == ProfileCase::Use::kCheck;
-    if (!is_check) {
-      TakeLarger(prepared.load, &profile.largest);
-    }
-    if (prepared.truth) {
-      ++judged;
-      profile.warping_psnr_db += PsnrDb(
-          prepared, RunWarping(PrepareEstimate(prepared.options).input, run.threads).light_field,
-          run.threads);
-    }
-    std::vector<std::vector<TimedLoad>> runs(plans.size());
-    for (int round = 0; round < run.repeat; ++round) {
-      for (std::size_t i = 0; i < plans.size(); ++i) {
-        if (run.progress) run.progress(done++, total);
-        ApplyPlan(plans[i], &prepared.options);
-        const nlohmann::json summary = RunEstimate(prepared.options).summary;
-        runs[i].push_back(Timed(prepared.load, summary["seconds"]));
-        if (!prepared.truth || round > 0) continue;
-        profile.plans[i].psnr_db +=
-            PsnrDb(prepared, ReadLightField(prepared.options.output_folder, {}), run.threads);
-      }
-    }
-    for (std::size_t i = 0; i < plans.size(); ++i) {
-      (is_check ? measured.checks : measured.loads)[i].push_back(MiddleRun(std::move(runs[i])));
-    }
-    std::error_code ignored;
-    fs::remove_all(of_case, ignored);
+    if (run.progress) run.progress(done++, total);
+    const fs::path of_case = folder.path() / fmt::format("case-{}", cases.size());
+    cases.push_back({Prepare(what, run, of_case), {}, {}});
+    cases.back().runs.resize(plans.size());
+    const Prepared& prepared = cases.back().prepared;
+    if (!prepared.truth) continue;
+    ++judged;
+    profile.warping_psnr_db += PsnrDb(
+        prepared, RunWarping(PrepareEstimate(prepared.options).input, run.threads).light_field,
+        run.threads);
   }
   if (judged == 0) throw Error("a profile needs a case that is judged by its true views");
+  // Round by round: a machine that is slower for a minute spoils one run of each, and no case.
+  for (int round = 0; round < run.repeat; ++round) {
+    for (CaseRuns& of_case : cases) {
+      const Prepared& prepared = of_case.prepared;
+      const PictureLoad load = PictureLoadOf(PrepareEstimate(prepared.options).input);
+      of_case.file_seconds.push_back(load.file_seconds);
+      for (std::size_t i = 0; i < plans.size(); ++i) {
+        if (run.progress) run.progress(done++, total);
+        const nlohmann::json summary = RunOnce(program, prepared, plans[i]);
+        of_case.runs[i].push_back(Timed(load, summary["seconds"]));
+        const std::string& made = prepared.options.output_folder;
+        if (prepared.truth && round == 0) {
+          profile.plans[i].psnr_db += PsnrDb(prepared, ReadLightField(made, {}), run.threads);
+        }
+        std::error_code ignored;
+        fs::remove_all(made, ignored);
+      }
+    }
+  }
+  for (std::size_t c = 0; c < cases.size(); ++c) {
+    const bool is_check = run.cases[c].use == ProfileCase::Use::kCheck;
+    for (std::size_t i = 0; i < plans.size(); ++i) {
+      TimedLoad middle = MiddleRun(std::move(cases[c].runs[i]));
+      middle.load.file_seconds = Median(cases[c].file_seconds);
+      if (!is_check) TakeLarger(middle.load, &profile.largest);
+      (is_check ? measured.checks : measured.loads)[i].push_back(middle);
+    }
+  }
   profile.warping_psnr_db /= judged;
   for (PlanProfile& plan : profile.plans) plan.psnr_db /= judged;
   FitLaws(&measured);
@@ -272,8 +343,8 @@ std::string ProfileTable(const MeasuredProfile& measured) {
   text += fmt::format(
       "{:<32}{:>10.2f}{:>10.2f}\n\n"
       "PSNR: of the true views, mean over {} of the {} pictures. K: 640 x 480 px in colour, 7 x 7\n"
-      "views, blur of 2 px. law's error: of its prediction of a picture of a size that it was not\n"
-      "made from.\n\n",
+      "views, blur of 2 px, once it is read. law's error: of what it foresees, with reading, of a\n"
+      "picture of a size that it was not made from.\n\n",
       "warping (DIBR)", profile.warping_psnr_db, profile.best_psnr_db() - profile.warping_psnr_db,
       measured.judged, measured.loads.front().size());
   if (measured.checks.front().empty()) return text;
@@ -281,7 +352,7 @@ std::string ProfileTable(const MeasuredProfile& measured) {
   std::vector<double> ratios;
   for (std::size_t i = 0; i < profile.plans.size(); ++i) {
     for (const TimedLoad& check : measured.checks[i]) {
-      const double expected = profile.plans[i].law.Seconds(check.load);
+      const double expected = check.parts.read + profile.plans[i].law.Seconds(check.load);
       text += fmt::format(
           "{:<32}{:.2f} megapixels, {} channel(s), {} views: {:.2f} s expected, {:.2f} s taken "
           "({:+.0f} %)\n",

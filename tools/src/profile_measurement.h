@@ -31,6 +31,7 @@ struct ProfileRun {
   int threads = 0;
   int repeat = 3;
   std::uint64_t seed = 1;
+  std::string program;                                // thicklens; empty: the file that runs
   std::function<void(int done, int total)> progress;  // may throw to stop
 };
 
@@ -45,7 +46,9 @@ struct MeasuredProfile {
 
 // Runs `thicklens estimate` with each plan, from files to files in a folder of temporary files, on
 // simulated pictures of several sizes, channels, numbers of views and strengths of blur, whose true
-// views are known: slanted planes and cards before a wall. Throws Error.
+// views are known: slanted planes and cards before a wall. Each run is a process of its own, as a
+// person's is: in one that has run before, memory is there already, which is a good part of the
+// time of a small picture. Throws Error.
 MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const ProfileRun& run);
 
 // What of the plans is worth a choice: by the list of `bench accuracy` grid and blocks cost many

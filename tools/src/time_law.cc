@@ -101,7 +101,7 @@ TimeLaw::Terms FitPart(const PartOfTime& time, const std::array<TimeLaw::Term, N
 }
 
 double RestSeconds(const TimedLoad& load) {
-  return load.seconds - load.parts.setup - load.parts.solve - load.parts.files;
+  return load.seconds - load.parts.read - load.parts.setup - load.parts.solve - load.parts.files;
 }
 
 void CheckTimes(const TimesOfPlans& plans) {
@@ -113,13 +113,13 @@ void CheckTimes(const TimesOfPlans& plans) {
           plans.front().size(), plan.size()));
     }
     for (const TimedLoad& load : plan) {
-      const auto [setup, solve, files] = load.parts;
-      if (!(load.seconds > 0) || !(setup >= 0) || !(solve >= 0) || !(files >= 0) ||
+      const auto [read, setup, solve, files] = load.parts;
+      if (!(load.seconds > 0) || !(read >= 0) || !(setup >= 0) || !(solve >= 0) || !(files >= 0) ||
           !(RestSeconds(load) >= 0)) {
-        throw Error(fmt::format(
-            "a law of the time needs times above 0, and parts of them, found {} s (setup), {} s "
-            "(solve) and {} s (files) of {} s",
-            setup, solve, files, load.seconds));
+        throw Error(
+            fmt::format("a law of the time needs times above 0, and parts of them, found {} s "
+                        "(read), {} s (setup), {} s (solve) and {} s (files) of {} s",
+                        read, setup, solve, files, load.seconds));
       }
     }
   }
@@ -173,7 +173,8 @@ std::vector<std::vector<double>> LeftOutRatios(const TimesOfPlans& plans) {
     }
     const std::vector<TimeLaw> laws = FitTimeLaws(others);
     for (std::size_t k = 0; k < plans.size(); ++k) {
-      ratios[k].push_back(laws[k].Seconds(plans[k][i].load) / plans[k][i].seconds);
+      const TimedLoad& timed = plans[k][i];
+      ratios[k].push_back((timed.parts.read + laws[k].Seconds(timed.load)) / timed.seconds);
     }
   }
   return ratios;

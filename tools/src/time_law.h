@@ -18,7 +18,8 @@ struct PictureLoad {
 
 // Of the seconds of a run: what is left of the whole is making the views, and the end.
 struct PartSeconds {
-  double setup = 0;  // reading and geometry
+  double read = 0;   // of the files, until the plan is chosen: over by then, and in no law
+  double setup = 0;  // geometry
   double solve = 0;  // what the plan alone decides; all else is the same for others of its kind
   double files = 0;  // writing the views
 };
@@ -29,14 +30,15 @@ struct TimedLoad {
   PartSeconds parts;   // none below 0, together no more than the whole
 };
 
-// Seconds as a sum of terms, none of them negative. Pixels are in millions.
+// Seconds of a run from when its files are read, as a sum of terms, none of them negative. Pixels
+// are in millions.
 class TimeLaw {
  public:
   // In the order of the profile's file, whose schema changes with it. s: the blur's sigma in px.
   enum Term {
     kStart,                          // seconds, whatever the picture
-    kPixels,                         // reading, depth
-    kPixelsChannels,                 // reading, and what iterations do for a pixel
+    kPixels,                         // depth
+    kPixelsChannels,                 // what iterations do for a pixel
     kPixelsViews,                    // the geometry of the views
     kPixelsViewsChannels,            // making them
     kPixelsChannelsBlur,             // times s: what iterations do for a blur
@@ -73,8 +75,8 @@ using TimesOfPlans = std::vector<std::vector<TimedLoad>>;
 // plans of different pictures.
 std::vector<TimeLaw> FitTimeLaws(const TimesOfPlans& plans);
 
-// Of each plan and picture the law's prediction from the pictures of all other sizes, over what was
-// measured.
+// Of each plan and picture what was foreseen once it was read, by the law from the pictures of all
+// other sizes, over what was measured.
 std::vector<std::vector<double>> LeftOutRatios(const TimesOfPlans& plans);
 
 }  // namespace thicklens::tools
