@@ -10,6 +10,7 @@
 
 #include "random_draws.h"
 #include "thicklens/error.h"
+#include "thicklens/model/stored_levels.h"
 
 namespace thicklens::model {
 namespace {
@@ -39,21 +40,26 @@ void CheckBits(int bits) {
   }
 }
 
-// `noise` gives what is added to each stored value, in full scales, before it is rounded.
-template <typename Noise>
-StoredPicture ToStoredPlus(const LinearPicture& picture, const TransferCurve& transfer, int bits,
-                           const Noise& noise) {
+double FullScale(int bits) {
   CheckBits(bits);
+  return bits == 8 ? 255.0 : 65535.0;
+}
+
+// The level of a value that is stored as integers up to `full_scale`.
+std::uint16_t RoundedLevel(double stored, double full_scale) {
+  const double level = std::floor(stored * full_scale + 0.5);
+  // Written so that NaN becomes black; a cast of it would be undefined.
+  return static_cast<std::uint16_t>(level > 0 ? std::min(level, full_scale) : 0.0);
+}
+
+// `level_of` gives what is stored for each value.
+template <typename LevelOf>
+StoredPicture StoredBy(const LinearPicture& picture, int bits, const LevelOf& level_of) {
   CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
             picture.values.size());
   StoredPicture stored{picture.width_px, picture.height_px, picture.channels, bits, {}};
-  stored.values.reserve(picture.values.size());
-  for (const float light : picture.values) {
-    const double level = std::floor((transfer.Encode(light) + noise()) * stored.full_scale() + 0.5);
-    // Written so that NaN becomes black; a cast of it would be undefined.
-    const double clipped = level > 0 ? std::min(level, stored.full_scale()) : 0.0;
-    stored.values.push_back(static_cast<std::uint16_t>(clipped));
-  }
+  stored.values.resize(picture.values.size());
+  std::transform(picture.values.begin(), picture.values.end(), stored.values.begin(), level_of);
   return stored;
 }
 
@@ -183,6 +189,30 @@ void CheckPlausible(const Camera& camera, const DepthStatistics& depth,
 
 }  // namespace
 
+StoredLevels::StoredLevels(const TransferCurve& transfer, int bits) : bits_(bits) {
+  const double full_scale = FullScale(bits);
+  const auto level_of = [&](float light) {
+    return RoundedLevel(transfer.Encode(light), full_scale);
+  };
+  least_light_.push_back(0);
+  for (int level = 1; level <= static_cast<int>(full_scale); ++level) {
+    // Decode and Encode are inverse to each other up to their rounding, which may cross a float.
+    auto least = static_cast<float>(transfer.Decode((level - 0.5) / full_scale));
+    while (level_of(least) >= level) least = std::nextafter(least, 0.0F);
+    while (level_of(least) < level) least = std::nextafter(least, 2.0F);
+    least_light_.push_back(least);
+  }
+  lowest_level_.resize(CellOf(1) + 1);
+  for (std::size_t level = 1; level < least_light_.size(); ++level) {
+    // From the cell after the one that the level begins in.
+    const std::size_t cell = CellOf(least_light_[level]) + 1;
+    if (cell < lowest_level_.size()) lowest_level_[cell] = static_cast<std::uint16_t>(level);
+  }
+  for (std::size_t cell = 1; cell < lowest_level_.size(); ++cell) {
+    lowest_level_[cell] = std::max(lowest_level_[cell], lowest_level_[cell - 1]);
+  }
+}
+
 LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transfer) {
   CheckBits(picture.bits);
   CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
@@ -206,7 +236,14 @@ LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transf
 }
 
 StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits) {
-  return ToStoredPlus(picture, transfer, bits, [] { return 0.0; });
+  const double full_scale = FullScale(bits);
+  return StoredBy(picture, bits, [&](float light) {
+    return RoundedLevel(transfer.Encode(light), full_scale);
+  });
+}
+
+StoredPicture ToStored(const LinearPicture& picture, const StoredLevels& levels) {
+  return StoredBy(picture, levels.bits(), [&](float light) { return levels.LevelOf(light); });
 }
 
 StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurve& transfer,
@@ -216,8 +253,11 @@ StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurv
         fmt::format("picture: the noise is {} full scales: it must be finite and >= 0", sigma));
   }
   if (sigma == 0) return ToStored(picture, transfer, bits);
+  const double full_scale = FullScale(bits);
   RandomDraws draws(seed, RandomDraws::Purpose::kStoredNoise, 0);
-  return ToStoredPlus(picture, transfer, bits, [&] { return sigma * draws.Normal(); });
+  return StoredBy(picture, bits, [&](float light) {
+    return RoundedLevel(transfer.Encode(light) + sigma * draws.Normal(), full_scale);
+  });
 }
 
 LinearPicture ToGrey(const LinearPicture& picture) {

@@ -422,7 +422,10 @@ std::vector<std::string> LightFieldEntries() {
 
 LightFieldWriter::LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format,
                                    model::OutputFolder* folder)
-    : transfer_(transfer), format_(format), folder_(folder) {}
+    : transfer_(transfer), format_(format), folder_(folder) {
+  constexpr int kBits = 16;
+  if (format_ == ViewFormat::kPng) levels_.emplace(transfer, kBits);
+}
 
 double LightFieldWriter::BytesForView(double values) const {
   constexpr double kPngBytes = 10;  // stored values, rows of them, and the file as it grows
@@ -439,9 +442,8 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view)
       WriteFloatTiff(view, path, shown);
     });
   } else {
-    constexpr int kBits = 16;
-    folder_->Write(name, EncodePng(model::ToStored(view, transfer_, kBits)));
-    clipped = CountClipped(view, transfer_, kBits);
+    folder_->Write(name, EncodePng(model::ToStored(view, *levels_)));
+    clipped = CountClipped(view, transfer_, levels_->bits());
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   clipped_ += clipped;
@@ -508,10 +510,11 @@ std::size_t WriteHciLightField(const model::LightField& light_field, model::Outp
   RequireValid(light_field);
   constexpr int kBits = 8;
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
+  const model::StoredLevels levels(srgb, kBits);
   std::atomic<std::size_t> clipped{0};
   ForEachView(light_field, [&](int k, int l, const model::LinearPicture& view) {
     folder->Write(HciFile(l * light_field.u_count + k),
-                  EncodePng(model::ToStored(view, srgb, kBits)));
+                  EncodePng(model::ToStored(view, levels)));
     clipped += CountClipped(view, srgb, kBits);
   });
   folder->Write(kHciMarker, HciParameters(light_field));

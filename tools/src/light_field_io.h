@@ -11,6 +11,7 @@
 
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/output_file.h"
+#include "thicklens/model/stored_levels.h"
 
 namespace thicklens::tools {
 
@@ -61,6 +62,7 @@ class LightFieldWriter {
 
  private:
   const model::TransferCurve transfer_;
+  std::optional<model::StoredLevels> levels_;  // of PNG
   const ViewFormat format_;
   model::OutputFolder* folder_;
   std::mutex mutex_;

@@ -10,6 +10,7 @@
 #include "stopwatch.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
+#include "thicklens/model/stored_levels.h"
 
 namespace thicklens::tools {
 namespace {
@@ -38,10 +39,11 @@ double FileSeconds(const estimator::EstimateInput& input) {
   for (std::size_t i = 0; i + channels < part.values.size(); ++i) {
     part.values[i] = (part.values[i] + part.values[i + channels]) / 2;
   }
+  const model::StoredLevels levels(input.transfer, kBits);
   double best = 0;
   for (int run = 0; run < kRuns; ++run) {
     const auto start = Clock::now();
-    const std::string file = EncodePng(model::ToStored(part, input.transfer, kBits));
+    const std::string file = EncodePng(model::ToStored(part, levels));
     const std::chrono::duration<double> seconds = Clock::now() - start;
     best = run == 0 ? seconds.count() : std::min(best, seconds.count());
   }
