@@ -35,7 +35,8 @@ const std::vector<Room>& Rooms() {
        {"model", "kernels", "calib", "estimator"},
        {},
        {"Eigen/", "fmt/", "CLI/", "nlohmann/", "spdlog/", "exiv2/", "openssl/", "glog/", "cairo.h",
-        "tiffio.h", "cairo-pdf.h", "opencv2/core", "opencv2/imgcodecs", "opencv2/imgproc"}},
+        "tiffio.h", "spng.h", "zlib.h", "cairo-pdf.h", "opencv2/core", "opencv2/imgcodecs",
+        "opencv2/imgproc"}},
   };
   return rooms;
 }

@@ -23,6 +23,8 @@ file(REMOVE_RECURSE "${work_dir}")
 run(${CMAKE_COMMAND} --install "${build_dir}" --config ${config} --prefix "${prefix}")
 
 run("${prefix}/${bin}/thicklens" --help)
+# What it loads itself is not on the system's search path.
+run("${prefix}/${bin}/thicklens" doctor --device cpu)
 file(GLOB_RECURSE configs RELATIVE "${configs_dir}" "${configs_dir}/*.yaml")
 if(NOT configs)
   message(FATAL_ERROR "there is no configuration in ${configs_dir}")

@@ -110,6 +110,10 @@ std::string PoclLibrary() {
   return "";
 }
 
+TEST_F(DoctorTest, SaysWhichPictureFilesAreRead) {
+  EXPECT_EQ(Json("cpu")["picture_files"], "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV");
+}
+
 TEST_F(DoctorTest, FindsThisMachineWell) {
   const nlohmann::json json = Json("auto");
   EXPECT_EQ(json["status"], "ok");

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -147,6 +148,17 @@ void ReplaceInFile(const std::string& path, const std::string& from, const std::
   const auto at = text.find(from);
   ASSERT_NE(at, std::string::npos) << from << " is not in " << path;
   std::ofstream(path, std::ios::binary) << text.replace(at, from.size(), to);
+}
+
+// They bring a hundred libraries along, which take longer to load than all that the program does
+// when it starts.
+TEST(Program, StartsWithoutOpenCvsDecoders) {
+  const TemporaryFolder folder;
+  const std::string list = folder / "libraries";
+  const std::string command = "LD_TRACE_LOADED_OBJECTS=1 '" THICKLENS_PROGRAM "' > '" + list + "'";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_THAT(ContentOf(list), HasSubstr("libopencv_core"));
+  EXPECT_THAT(ContentOf(list), Not(HasSubstr("libopencv_imgcodecs")));
 }
 
 TEST_F(ProgramTest, TellsItsVersionAndWhatItWasBuiltWith) {

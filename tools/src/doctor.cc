@@ -15,6 +15,7 @@
 #include "hard_cases.h"
 #include "interrupt.h"
 #include "light_field_options.h"
+#include "opencv_codecs.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
@@ -40,6 +41,7 @@ struct Findings {
   int threads = 0;
   std::string blas;
   std::vector<std::string> block_solvers;
+  std::string picture_files;
   std::optional<kernels::DeviceSurvey> survey;   // none if OpenCL was not to be touched
   std::string used, used_description, used_why;  // empty: nothing can be used
   std::string notice;                            // of the fall back from OpenCL
@@ -97,6 +99,16 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
   }
 }
 
+void ExaminePictureFiles(Findings* findings) {
+  try {
+    LoadedOpenCvCodecs();
+    findings->picture_files = "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV";
+  } catch (const Error& error) {
+    findings->picture_files = "PNG alone";
+    if (findings->refusal.empty()) findings->refusal = error.what();
+  }
+}
+
 double Mib(std::uint64_t bytes) { return static_cast<double>(bytes) / kBytesPerMib; }
 
 std::string NameOf(const kernels::DeviceDescription& device) {
@@ -151,6 +163,7 @@ std::string FindingsText(const Findings& findings) {
   text += fmt::format("blas           {}\n", PrintableUtf8(findings.blas));
   text += fmt::format("block solvers  {} (default {})\n", Joined(findings.block_solvers),
                       estimator::BlockSolverName(estimator::DefaultBlockSolver()));
+  text += fmt::format("pictures       {}\n", findings.picture_files);
   text += SurveyText(findings);
   if (!findings.used.empty()) {
     text += fmt::format("used           {}: {}\n               {}\n", findings.used,
@@ -202,6 +215,7 @@ nlohmann::json FindingsJson(const Findings& findings) {
       {"blas", PrintableUtf8(findings.blas)},
       {"block_solvers", findings.block_solvers},
       {"default_block_solver", estimator::BlockSolverName(estimator::DefaultBlockSolver())},
+      {"picture_files", findings.picture_files},
       {"opencl", SurveyJson(findings)},
       {"notice", PrintableUtf8(findings.notice)},
       {"used", nullptr},
@@ -230,6 +244,7 @@ CommandResult Doctor(const DoctorOptions& options) {
   findings.blas = estimator::BlasDescription();
   findings.block_solvers = BuiltInSolvers();
   ExamineDevice(options, &findings);
+  ExaminePictureFiles(&findings);
   PrintResult(options.common, FindingsText(findings));
   return {FindingsJson(findings), findings.refusal};
 }

@@ -4,24 +4,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "picture_kind.h"
+#include "png_pixels.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
-
-// OpenCV keeps colours as BGR; the project as RGB.
-cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
-  if (picture.channels() == 1) return picture;
-  cv::Mat swapped;
-  cv::cvtColor(picture, swapped, picture.channels() == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
-  return swapped;
-}
 
 template <typename T>
 void CopyValues(const cv::Mat& picture, std::vector<std::uint16_t>* values) {
@@ -30,14 +21,6 @@ void CopyValues(const cv::Mat& picture, std::vector<std::uint16_t>* values) {
     values->insert(values->end(), row,
                    row + static_cast<std::ptrdiff_t>(picture.cols) * picture.channels());
   }
-}
-
-std::string PngFile(const cv::Mat& values, const std::vector<int>& settings) {
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", values, bytes, settings)) {
-    throw Error("a picture could not be encoded as PNG");
-  }
-  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace
@@ -50,10 +33,8 @@ cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
                        PictureKind::kPnm},
                       &why);
   if (picture.empty()) {
-    throw Error(
-        fmt::format("{}: cannot be decoded as a picture ({} bytes): a PNG, TIFF, JPEG, BMP "
-                    "or PNM file is expected",
-                    name, bytes.size()));
+    throw Error(fmt::format("{}: cannot be decoded as a picture ({} bytes): {}", name, bytes.size(),
+                            why.empty() ? "a PNG, TIFF, JPEG, BMP or PNM file is expected" : why));
   }
   if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
     throw Error(
@@ -64,7 +45,7 @@ cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
   if (channels != 1 && channels != 3 && channels != 4) {
     throw Error(fmt::format("{}: 1, 3 or 4 channels are expected, found {}", name, channels));
   }
-  return SwapRedAndBlue(picture);
+  return picture;
 }
 
 cv::Mat ReadPictureFile(const std::string& path) {
@@ -98,11 +79,9 @@ std::string EncodePng(const model::StoredPicture& picture) {
                      const_cast<std::uint16_t*>(picture.values.data()));  // NOLINT: only read
   cv::Mat values = wide;
   if (picture.bits == 8) wide.convertTo(values, CV_8U);
-  // OpenCV tries every filter where it is given a level. Its own settings are three times as fast
-  // and make pictures of 16 bits no larger; those of 8 bits have repetitions, which they miss.
-  std::vector<int> settings;
-  if (picture.bits == 8) settings = {cv::IMWRITE_PNG_COMPRESSION, 1};
-  return PngFile(SwapRedAndBlue(values), settings);
+  // To try every filter takes three times as long and makes pictures of 16 bits no smaller; those
+  // of 8 bits have repetitions.
+  return EncodePngPixels(values, picture.bits == 8 ? PngPacking::kRepetitions : PngPacking::kFast);
 }
 
 std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px) {
@@ -113,7 +92,7 @@ std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px)
   }
   const cv::Mat values(static_cast<int>(bytes.size() / width), width_px, CV_8U,
                        const_cast<std::uint8_t*>(bytes.data()));  // NOLINT: only read
-  return PngFile(values, {});
+  return EncodePngPixels(values, PngPacking::kFast);
 }
 
 }  // namespace thicklens::tools

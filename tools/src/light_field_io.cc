@@ -65,15 +65,10 @@ model::LinearPicture ReadPngView(const std::string& path, const model::TransferC
   return model::ToLinear(WithoutAlpha(ToStoredPicture(ReadPictureFile(path))), transfer);
 }
 
-// OpenCV keeps colours as BGR; the project as RGB.
-void SwapRedAndBlue(cv::Mat* picture) {
-  if (picture->channels() == 3) cv::cvtColor(*picture, *picture, cv::COLOR_BGR2RGB);
-}
-
 model::LinearPicture ReadTiffView(const std::string& path) {
   const std::string bytes = model::ReadWholeFile(path);
   std::string why;
-  cv::Mat picture = DecodeUnchanged(bytes, path, {PictureKind::kTiff}, &why);
+  const cv::Mat picture = DecodeUnchanged(bytes, path, {PictureKind::kTiff}, &why);
   if (picture.empty()) {
     throw Error(fmt::format("{}: cannot be decoded as a TIFF file ({} bytes)", path, bytes.size()));
   }
@@ -82,7 +77,6 @@ model::LinearPicture ReadTiffView(const std::string& path) {
         "{}: float values in 1 or 3 channels are expected, found {} channel(s) of {} bits{}", path,
         picture.channels(), 8 * picture.elemSize1(), picture.depth() >= CV_32F ? ", float" : ""));
   }
-  SwapRedAndBlue(&picture);
   model::LinearPicture light{picture.cols, picture.rows, picture.channels(), {}};
   light.values.reserve(picture.total() * static_cast<std::size_t>(picture.channels()));
   for (int y = 0; y < picture.rows; ++y) {
@@ -513,8 +507,7 @@ std::size_t WriteHciLightField(const model::LightField& light_field, model::Outp
   const model::StoredLevels levels(srgb, kBits);
   std::atomic<std::size_t> clipped{0};
   ForEachView(light_field, [&](int k, int l, const model::LinearPicture& view) {
-    folder->Write(HciFile(l * light_field.u_count + k),
-                  EncodePng(model::ToStored(view, levels)));
+    folder->Write(HciFile(l * light_field.u_count + k), EncodePng(model::ToStored(view, levels)));
     clipped += CountClipped(view, srgb, kBits);
   });
   folder->Write(kHciMarker, HciParameters(light_field));

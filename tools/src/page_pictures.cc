@@ -6,10 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "opencv_codecs.h"
+#include "png_pixels.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
 #include "thicklens/model/transfer_curve.h"
@@ -65,17 +66,12 @@ std::array<std::uint8_t, 3> HatchColour(int x, int y) {
 }
 
 std::vector<unsigned char> Encoded(const cv::Mat& shown, bool jpeg) {
-  cv::Mat bgr;  // a matrix of its own: a copy of the header would write into `shown`
-  if (shown.channels() == 3) {
-    cv::cvtColor(shown, bgr, cv::COLOR_RGB2BGR);
-  } else {
-    bgr = shown;
+  if (!jpeg) {
+    const std::string png = EncodePngPixels(shown, PngPacking::kSmall);
+    return {png.begin(), png.end()};
   }
-  std::vector<unsigned char> bytes;
-  const bool done = jpeg
-                        ? cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality})
-                        : cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
-  if (!done) throw Error("a picture of the page could not be encoded");
+  std::vector<unsigned char> bytes = LoadedOpenCvCodecs().encode_jpeg(shown, kJpegQuality);
+  if (bytes.empty()) throw Error("a picture of the page could not be encoded as JPEG");
   return bytes;
 }
 

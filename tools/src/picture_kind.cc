@@ -13,9 +13,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 
+#include "opencv_codecs.h"
 #include "png_check.h"
+#include "png_pixels.h"
 #include "printable_text.h"
 #include "thicklens/error.h"
 
@@ -311,16 +312,8 @@ cv::Mat DecodeUnchanged(const std::string& bytes, const std::string& name,
   if (!kind || std::find(kinds.begin(), kinds.end(), *kind) == kinds.end()) return {};
   RequireWholePng(bytes, name);
   RequirePossibleSize(bytes, *kind, name);
-  try {
-    // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
-    // pixels as the sensor gave them.
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
-                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
-    return cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception& error) {
-    *why = error.err;  // e.g. that OpenCV was built, or started, without EXR
-    return {};
-  }
+  if (*kind == PictureKind::kPng) return DecodePngPixels(bytes, why);
+  return LoadedOpenCvCodecs().decode(bytes, why);
 }
 
 }  // namespace thicklens::tools

@@ -20,9 +20,9 @@ std::optional<PictureKind> KindOfPicture(const std::string& bytes);
 // understood passes, for the decoder to say so.
 void RequirePossibleSize(const std::string& bytes, PictureKind kind, const std::string& name);
 
-// The picture in the bytes of a file, unchanged and never turned, as OpenCV has it (BGR). Empty if
-// it is of no such kind or cannot be decoded; `why` then says what is known, or nothing. Throws
-// Error that begins with `name` for PNG files that are not whole and for impossible sizes.
+// The picture in the bytes of a file, unchanged and never turned, red first. Empty if it is of no
+// such kind or cannot be decoded; `why` then says what is known, or nothing. Throws Error that
+// begins with `name` for PNG files that are not whole and for impossible sizes.
 cv::Mat DecodeUnchanged(const std::string& bytes, const std::string& name,
                         const std::vector<PictureKind>& kinds, std::string* why);
 

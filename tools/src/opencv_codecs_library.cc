@@ -1,0 +1,47 @@
+// The library that opencv_codecs.h speaks of. Nothing else of the program may include imgcodecs.
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "opencv_codecs.h"
+
+namespace thicklens::tools {
+namespace {
+
+// OpenCV keeps colours as BGR; the project as RGB.
+cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
+  if (picture.channels() != 3 && picture.channels() != 4) return picture;
+  cv::Mat swapped;
+  cv::cvtColor(picture, swapped, picture.channels() == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
+  return swapped;
+}
+
+cv::Mat Decode(const std::string& bytes, std::string* why) {
+  try {
+    // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
+    // pixels as the sensor gave them.
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
+                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
+    return SwapRedAndBlue(cv::imdecode(buffer, cv::IMREAD_UNCHANGED));
+  } catch (const cv::Exception& error) {
+    *why = error.err;  // e.g. that OpenCV was built, or started, without EXR
+    return {};
+  }
+}
+
+std::vector<unsigned char> EncodeJpeg(const cv::Mat& picture, int quality) {
+  std::vector<unsigned char> bytes;
+  const bool done =
+      cv::imencode(".jpg", SwapRedAndBlue(picture), bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return done ? bytes : std::vector<unsigned char>();
+}
+
+}  // namespace
+}  // namespace thicklens::tools
+
+extern "C" __attribute__((visibility("default"))) const thicklens::tools::OpenCvCodecs*
+ThicklensOpenCvCodecs() {
+  static const thicklens::tools::OpenCvCodecs codecs{thicklens::tools::Decode,
+                                                     thicklens::tools::EncodeJpeg};
+  return &codecs;
+}
