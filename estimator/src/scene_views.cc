@@ -34,6 +34,10 @@ class Spare {
   std::vector<T> spare_;
 };
 
+kernels::ViewSources SourcesOf(const CompactView& view) {
+  return {&view.disparity, view.shift.x(), view.shift.y(), &view.hidden};
+}
+
 // Views of one picture, on a device or on the processor; by many threads.
 class ViewMaker {
  public:
@@ -50,15 +54,10 @@ class ViewMaker {
 
   void Make(const CompactView& view, model::LinearPicture* made) {
     if (native_) return native_->Warp(view, made);
-    ViewDisparity whole = spare_.Take();
-    Expand(view, &whole);
     *made = {picture_.width_px, picture_.height_px, picture_.channels, std::move(made->values)};
     made->values.resize(picture_.values.size());
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);  // a device has one queue
-      on_device_->Warp({&whole.disparity, &whole.source_x, &whole.source_y}, &made->values);
-    }
-    spare_.Give(std::move(whole));
+    const std::lock_guard<std::mutex> lock(mutex_);  // a device has one queue
+    on_device_->Warp(SourcesOf(view), &made->values);
   }
 
  private:
@@ -66,7 +65,6 @@ class ViewMaker {
   std::optional<PictureWarper> native_;
   std::unique_ptr<kernels::ViewWarp> on_device_;
   std::mutex mutex_;
-  Spare<ViewDisparity> spare_;
 };
 
 }  // namespace

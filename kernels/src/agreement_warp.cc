@@ -1,4 +1,6 @@
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -32,12 +34,22 @@ void CompareWarp(Backend* device, Worst* worst) {
     const std::unique_ptr<ViewWarp> found = device->NewWarp(picture);
     const std::unique_ptr<ViewWarp> right = NewReferenceWarp(picture);
     for (const double reach : {0.0, 2.5, 500.0}) {
-      auto source_x = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
-      auto source_y = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
-      for (std::size_t i = 0; i < source_x.size(); i += 3) source_x[i] = 1;
+      const auto source_x = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
+      const auto source_y = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
       const auto of_view = numbers.Vector<float>(kWidth * kHeight, -0.6, 1.7);
+      // Shifts that a float has, so that no sample is on the edge of being read elsewhere.
+      const double shift_x = numbers.Between(-reach, reach),
+                   shift_y = numbers.Between(-reach, reach);
       for (const std::vector<float>* surface : {&disparity, &of_view}) {
-        const ViewSources view{surface, &source_x, &source_y};
+        std::vector<float> seen = *surface;
+        std::vector<HiddenSample> hidden;
+        for (std::size_t i = 0; i < seen.size(); i += 3) {
+          hidden.push_back({static_cast<std::int32_t>(i), source_x[i], source_y[i], seen[i]});
+          if (i % 2 == 0) hidden.back().source_x = 1;
+          seen[i] = std::numeric_limits<float>::quiet_NaN();
+        }
+        const ViewSources view{&seen, static_cast<float>(shift_x), static_cast<float>(shift_y),
+                               &hidden};
         std::vector<float> of_device, of_twin;
         found->Warp(view, &of_device);
         right->Warp(view, &of_twin);

@@ -45,6 +45,19 @@ std::vector<float> PixelsOf(const SurfacePicture& picture) {
   return pixels;
 }
 
+// The shift of a view in floats, and what they leave of it, so that a device without double finds
+// the sources to the last digit of a float, as the twin does. A product with what is larger than
+// the bound is outside of any picture.
+cl_float4 ShiftOf(const ViewSources& view) {
+  constexpr double kBound = 1e30;
+  const double x = std::clamp(view.shift_x, -kBound, kBound);
+  const double y = std::clamp(view.shift_y, -kBound, kBound);
+  const auto float_x = static_cast<float>(x), float_y = static_cast<float>(y);
+  return {{float_x, float_y, static_cast<float>(x - float_x), static_cast<float>(y - float_y)}};
+}
+
+static_assert(sizeof(HiddenSample) == 16, "Hidden in warp.cl");
+
 // Least, largest, pixel by pixel.
 std::vector<float> PairsOf(const TapRanges& ranges) {
   std::vector<float> pairs;
@@ -71,6 +84,10 @@ class OpenClWarp : public ViewWarp {
     const SurfacesArgument surfaces{picture_.width_px, picture_.height_px, picture_.channels,
                                     picture_.tolerance,
                                     static_cast<cl_float>(picture_.width_px + picture_.height_px)};
+    // In place of an empty list, which OpenCL cannot have.
+    static const std::vector<HiddenSample> no_sample(1);
+    const std::vector<HiddenSample>& hidden = view.hidden->empty() ? no_sample : *view.hidden;
+    const auto hidden_count = static_cast<int>(view.hidden->size());
     values->resize(picture_.values->size());
     OpenClCall(queue_.get(), "WarpView")
         .Value(surfaces)
@@ -78,13 +95,16 @@ class OpenClWarp : public ViewWarp {
         .OnDevice(disparity_)
         .OnDevice(ranges_)
         .Input("disparity of a view", *view.disparity)
-        .Input("sources of a view across", *view.source_x)
-        .Input("sources of a view down", *view.source_y)
+        .Value(ShiftOf(view))
+        .Input("hidden samples of a view", hidden)
+        .Value(static_cast<cl_int>(hidden_count))
         .Output("view", values)
-        .Run(Index((picture_.width_px + lanes_ - 1) / lanes_) * Index(picture_.height_px));
+        .Run(ItemsOf(picture_.width_px) * Index(picture_.height_px) + ItemsOf(hidden_count));
   }
 
  private:
+  std::size_t ItemsOf(int samples) const { return Index((samples + lanes_ - 1) / lanes_); }
+
   const std::unique_ptr<OpenClQueue> queue_;
   const int lanes_;  // samples of an item
   const SurfacePicture picture_;

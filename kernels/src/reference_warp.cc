@@ -47,27 +47,35 @@ class ReferenceWarp : public ViewWarp {
 
   void Warp(const ViewSources& view, std::vector<float>* values) override {
     CheckView(picture_, view);
-    const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
-    values->clear();
-    values->reserve(picture_.values->size());
-    for (int y = 0; y < picture_.height_px; ++y) {
-      for (int x = 0; x < picture_.width_px; ++x) {
-        const std::size_t i = At(x, y);
-        const Place across = PlaceAt(x, (*view.source_x)[i], picture_.width_px, limit_px);
-        const Place down = PlaceAt(y, (*view.source_y)[i], picture_.height_px, limit_px);
-        const float disparity = (*view.disparity)[i];
-        const std::size_t there = At(across.pixel, down.pixel);
-        const bool cubic = IsOnSurface(ranges_.lowest[there], disparity) &&
-                           IsOnSurface(ranges_.highest[there], disparity);
-        for (int channel = 0; channel < picture_.channels; ++channel) {
-          values->push_back(cubic ? Cubic(across, down, channel)
-                                  : Linear(across, down, disparity, channel));
-        }
-      }
+    values->resize(picture_.values->size());
+    for (std::size_t i = 0; i < view.disparity->size(); ++i) {
+      const float disparity = (*view.disparity)[i];
+      if (std::isnan(disparity)) continue;
+      ReadSample(i, static_cast<float>(view.shift_x * disparity),
+                 static_cast<float>(view.shift_y * disparity), disparity, values);
+    }
+    for (const HiddenSample& hidden : *view.hidden) {
+      ReadSample(Index(hidden.index), hidden.source_x, hidden.source_y, hidden.disparity, values);
     }
   }
 
  private:
+  void ReadSample(std::size_t sample, float source_x, float source_y, float disparity,
+                  std::vector<float>* values) const {
+    const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
+    const int x = static_cast<int>(sample % Index(picture_.width_px));
+    const int y = static_cast<int>(sample / Index(picture_.width_px));
+    const Place across = PlaceAt(x, source_x, picture_.width_px, limit_px);
+    const Place down = PlaceAt(y, source_y, picture_.height_px, limit_px);
+    const std::size_t there = At(across.pixel, down.pixel);
+    const bool cubic = IsOnSurface(ranges_.lowest[there], disparity) &&
+                       IsOnSurface(ranges_.highest[there], disparity);
+    for (int channel = 0; channel < picture_.channels; ++channel) {
+      (*values)[sample * Index(picture_.channels) + Index(channel)] =
+          cubic ? Cubic(across, down, channel) : Linear(across, down, disparity, channel);
+    }
+  }
+
   std::size_t At(int x, int y) const {
     return Index(std::clamp(y, 0, picture_.height_px - 1)) * Index(picture_.width_px) +
            Index(std::clamp(x, 0, picture_.width_px - 1));
@@ -141,8 +149,24 @@ void CheckPicture(const SurfacePicture& picture) {
 
 void CheckView(const SurfacePicture& picture, const ViewSources& view) {
   CheckCount("disparity of a view", view.disparity, PixelsOf(picture));
-  CheckCount("sources of a view across", view.source_x, PixelsOf(picture));
-  CheckCount("sources of a view down", view.source_y, PixelsOf(picture));
+  for (const double shift : {view.shift_x, view.shift_y}) {
+    if (std::isfinite(shift)) continue;
+    throw Error(fmt::format("shift of a view is {}: it must be finite", shift));
+  }
+  if (view.hidden == nullptr) throw Error("hidden samples of a view: there must be a list");
+  for (const HiddenSample& hidden : *view.hidden) {
+    if (!(hidden.index >= 0 && Index(hidden.index) < PixelsOf(picture))) {
+      throw Error(fmt::format("hidden sample of a view has the index {}: it must be 0 to {}",
+                              hidden.index, PixelsOf(picture) - 1));
+    }
+    // Else two items of a device would write it.
+    const float seen = (*view.disparity)[Index(hidden.index)];
+    if (std::isnan(seen)) continue;
+    throw Error(
+        fmt::format("hidden sample {} of a view is of disparity {} among those that are "
+                    "seen: it must be NaN there",
+                    hidden.index, seen));
+  }
 }
 
 TapRanges TapRangesOf(const SurfacePicture& picture) {

@@ -24,6 +24,12 @@ typedef struct {
   float tolerance, limit_px;
 } Surfaces;
 
+// HiddenSample in view_warp.h.
+typedef struct {
+  int index;
+  float source_x, source_y, disparity;
+} Hidden;
+
 // The pixels before the places of samples on a line, and the rests of the ways to the next.
 WHOLE PixelsBefore(WHOLE sample, FLOATS source, int count, float limit_px, FLOATS* rest) {
   const FLOATS way = clamp(source, -limit_px, limit_px);
@@ -118,51 +124,81 @@ FLOATS LoadSamples(global const float* from, int count) {
   return LOAD_LANES(padded);
 }
 
-// One item LANES samples of a row: see filter.cl. `ranges`: the least and the largest of the
-// disparities around each pixel.
+// One item LANES samples of a row (see filter.cl); the items after those of all rows LANES hidden
+// ones each, wherever they are. `ranges`: the least and the largest of the disparities around each
+// pixel. `shift`: across and down, then what float leaves of these.
 kernel void WarpView(const Surfaces picture, global const float* pixels,
                      global const float* disparity, global const float2* ranges,
-                     global const float* view_disparity, global const float* source_x,
-                     global const float* source_y, global float* values) {
+                     global const float* view_disparity, const float4 shift,
+                     global const Hidden* hidden, const int hidden_count, global float* values) {
   const int items_in_row = (picture.width_px + LANES - 1) / LANES;
   const int row = (int)get_global_id(0) / items_in_row;
-  if (row >= picture.height_px) return;
-  const int first = (int)get_global_id(0) % items_in_row * LANES;
-  const int count = min(LANES, picture.width_px - first);
-  const size_t sample = (size_t)row * picture.width_px + first;
-  view_disparity += sample;
-  values += sample * picture.channels;
+  int count, sample[LANES];
+  float sample_disparity[LANES];
+  WHOLE sample_x, sample_y;
+  FLOATS source_x, source_y;
+  if (row < picture.height_px) {
+    const int first = (int)get_global_id(0) % items_in_row * LANES;
+    count = min(LANES, picture.width_px - first);
+    sample_x = (WHOLE)first + ORDER;
+    sample_y = (WHOLE)row;
+    STORE_LANES((WHOLE)(row * picture.width_px) + sample_x, sample);
+    const FLOATS seen =
+        LoadSamples(view_disparity + (size_t)row * picture.width_px + first, count);
+    source_x = mad((FLOATS)shift.s0, seen, shift.s2 * seen);
+    source_y = mad((FLOATS)shift.s1, seen, shift.s3 * seen);
+    STORE_LANES(seen, sample_disparity);
+  } else {
+    const int first = ((int)get_global_id(0) - items_in_row * picture.height_px) * LANES;
+    count = min(LANES, hidden_count - first);
+    if (count <= 0) return;
+    int column[LANES], line[LANES];
+    float across[LANES], down[LANES];
+    for (int lane = 0; lane < LANES; ++lane) {
+      const Hidden one = hidden[first + min(lane, count - 1)];
+      sample[lane] = one.index;
+      column[lane] = one.index % picture.width_px;
+      line[lane] = one.index / picture.width_px;
+      across[lane] = one.source_x;
+      down[lane] = one.source_y;
+      sample_disparity[lane] = one.disparity;
+    }
+    sample_x = LOAD_LANES(column);
+    sample_y = LOAD_LANES(line);
+    source_x = LOAD_LANES(across);
+    source_y = LOAD_LANES(down);
+  }
 
   FLOATS rests_x, rests_y;
   int pixel_x[LANES], pixel_y[LANES];
   float rest_x[LANES], rest_y[LANES];
-  STORE_LANES(PixelsBefore((WHOLE)first + ORDER, LoadSamples(source_x + sample, count),
-                           picture.width_px, picture.limit_px, &rests_x),
+  STORE_LANES(PixelsBefore(sample_x, source_x, picture.width_px, picture.limit_px, &rests_x),
               pixel_x);
-  STORE_LANES(PixelsBefore((WHOLE)row, LoadSamples(source_y + sample, count), picture.height_px,
-                           picture.limit_px, &rests_y),
+  STORE_LANES(PixelsBefore(sample_y, source_y, picture.height_px, picture.limit_px, &rests_y),
               pixel_y);
   STORE_LANES(rests_x, rest_x);
   STORE_LANES(rests_y, rest_y);
 
   const int stride = picture.width_px + 3;
   const int plane = stride * (picture.height_px + 3);
-  for (int lane = 0; lane < count; ++lane, values += picture.channels) {
+  for (int lane = 0; lane < count; ++lane) {
+    const float d = sample_disparity[lane];
+    if (isnan(d)) continue;  // one of the hidden, which another item reads
     const int x = pixel_x[lane];
     const int y = pixel_y[lane];
-    const float d = view_disparity[lane];
+    global float* to = values + (size_t)sample[lane] * picture.channels;
     const float2 range = ranges[y * picture.width_px + x];
     const bool is_cubic =
         fabs(range.s0 - d) <= picture.tolerance && fabs(range.s1 - d) <= picture.tolerance;
     if (picture.channels == 1) {
       global const float* tap = pixels + y * stride + x;  // at -1, -1
       if (is_cubic) {
-        *values = BicubicOfOne(tap, stride, CatmullRom(rest_x[lane]), CatmullRom(rest_y[lane]));
+        *to = BicubicOfOne(tap, stride, CatmullRom(rest_x[lane]), CatmullRom(rest_y[lane]));
         continue;
       }
       tap += stride + 1;
-      *values = dot(Shares(picture, disparity, x, y, rest_x[lane], rest_y[lane], d),
-                    (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
+      *to = dot(Shares(picture, disparity, x, y, rest_x[lane], rest_y[lane], d),
+                (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
       continue;
     }
     global const float4* tap = (global const float4*)pixels + y * stride + x;
@@ -170,8 +206,7 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
       const float16 weight_x = CatmullRomOfFour(rest_x[lane]);
       const float4 weight_y = CatmullRom(rest_y[lane]);
       for (int c = 0; c < picture.channels; c += 4, tap += plane) {
-        StoreChannels(BicubicOfFour(tap, stride, weight_x, weight_y), picture.channels - c,
-                      values + c);
+        StoreChannels(BicubicOfFour(tap, stride, weight_x, weight_y), picture.channels - c, to + c);
       }
       continue;
     }
@@ -180,7 +215,7 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
     for (int c = 0; c < picture.channels; c += 4, tap += plane) {
       StoreChannels(share.s0 * tap[0] + share.s1 * tap[1] + share.s2 * tap[stride] +
                         share.s3 * tap[stride + 1],
-                    picture.channels - c, values + c);
+                    picture.channels - c, to + c);
     }
   }
 }

@@ -5,7 +5,7 @@
 
 namespace thicklens::kernels {
 
-// Throw Error for sizes that do not fit.
+// Throw Error for sizes and indices that do not fit.
 void CheckPicture(const SurfacePicture& picture);
 void CheckView(const SurfacePicture& picture, const ViewSources& view);
 

@@ -72,14 +72,12 @@ void ViewOpenCl(benchmark::State& state) {
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr);
   const auto warp = backend->NewWarp(
       {kWidth, kHeight, channels, &scene.picture.values, &scene.map.disparity, 0.3F});
-  std::array<ViewDisparity, kViews> whole;
   std::array<std::vector<float>, kViews> values;
   std::mutex mutex;
   const auto make = [&](int i) {
-    const auto n = static_cast<std::size_t>(i);
-    Expand(view, &whole[n]);
     const std::lock_guard<std::mutex> lock(mutex);
-    warp->Warp({&whole[n].disparity, &whole[n].source_x, &whole[n].source_y}, &values[n]);
+    warp->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden},
+               &values[static_cast<std::size_t>(i)]);
   };
   for (int i = 0; i < kViews; ++i) make(i);  // a first call compiles
   for (auto _ : state) {

@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <random>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -27,6 +30,7 @@ using thicklens::testing::ErrorOf;
 
 constexpr int kW = 12, kH = 9;
 constexpr std::size_t kPixels = kW * kH;
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 std::size_t At(int x, int y) { return static_cast<std::size_t>(y * kW + x); }
 
@@ -53,8 +57,23 @@ class ViewWarpTest : public ::testing::TestWithParam<Form> {
   std::vector<float> Warp(int channels = 1) {
     picture_ = {kW, kH, channels, &values_, &disparity_, 0.3F};
     std::vector<float> values;
-    NewWarp(GetParam(), picture_)->Warp({&of_view_, &source_x_, &source_y_}, &values);
+    NewWarp(GetParam(), picture_)->Warp({&of_view_, shift_x_, shift_y_, &hidden_}, &values);
     return values;
+  }
+  void Hide(std::size_t i, float source_x, float source_y) {
+    hidden_.push_back({static_cast<std::int32_t>(i), source_x, source_y, of_view_[i]});
+    of_view_[i] = kNone;
+  }
+  // All samples, of that disparity.
+  void HideAll(float source_x, float source_y, float disparity) {
+    hidden_.clear();
+    of_view_.assign(kPixels, disparity);
+    for (std::size_t i = 0; i < kPixels; ++i) Hide(i, source_x, source_y);
+  }
+  // The picture and the view are of one disparity.
+  void Flatten(float disparity) {
+    disparity_.assign(kPixels, disparity);
+    of_view_.assign(kPixels, disparity);
   }
   void FillPolynomial() {  // cubic interpolation is exact for squares
     for (int y = 0; y < kH; ++y) {
@@ -69,8 +88,8 @@ class ViewWarpTest : public ::testing::TestWithParam<Form> {
   std::vector<float> values_ = std::vector<float>(kPixels, 0.0F);
   std::vector<float> disparity_ = std::vector<float>(kPixels, 0.0F);
   std::vector<float> of_view_ = std::vector<float>(kPixels, 0.0F);
-  std::vector<float> source_x_ = std::vector<float>(kPixels, 0.0F);
-  std::vector<float> source_y_ = std::vector<float>(kPixels, 0.0F);
+  double shift_x_ = 0, shift_y_ = 0;
+  std::vector<HiddenSample> hidden_;
   SurfacePicture picture_;
 };
 INSTANTIATE_TEST_SUITE_P(Twin, ViewWarpTest, ::testing::Values(Form::kTwin));
@@ -80,19 +99,54 @@ INSTANTIATE_TEST_SUITE_P(SingleSamples, ViewWarpTest, ::testing::Values(Form::kS
 TEST_P(ViewWarpTest, IsThePictureWhereNothingMoves) {
   FillPolynomial();
   EXPECT_THAT(Warp(), ::testing::Pointwise(FloatNear(1e-6F), values_));
+  shift_x_ = 2, shift_y_ = -3;  // px per unit of a disparity of 0
+  EXPECT_THAT(Warp(), ::testing::Pointwise(FloatNear(1e-6F), values_));
 }
 
 TEST_P(ViewWarpTest, IsExactForSquaresInsideOfASurface) {
   FillPolynomial();
-  source_x_.assign(kPixels, 0.375F);
-  source_y_.assign(kPixels, -0.25F);
-  const std::vector<float> warped = Warp();
-  for (int y = 2; y < kH - 2; ++y) {
-    for (int x = 1; x < kW - 2; ++x) {
-      const auto at_x = static_cast<float>(x) + 0.375F, at_y = static_cast<float>(y) - 0.25F;
-      EXPECT_NEAR(warped[At(x, y)], Polynomial(at_x, at_y), 1e-5) << x << ", " << y;
+  const auto expect_squares = [&](const std::vector<float>& warped) {
+    for (int y = 2; y < kH - 2; ++y) {
+      for (int x = 1; x < kW - 2; ++x) {
+        const auto at_x = static_cast<float>(x) + 0.375F, at_y = static_cast<float>(y) - 0.25F;
+        EXPECT_NEAR(warped[At(x, y)], Polynomial(at_x, at_y), 1e-5) << x << ", " << y;
+      }
     }
-  }
+  };
+  Flatten(0.5F);
+  shift_x_ = 0.75, shift_y_ = -0.5;
+  expect_squares(Warp());
+  HideAll(0.375F, -0.25F, 0.5F);
+  expect_squares(Warp());
+}
+
+TEST_P(ViewWarpTest, ReadsHiddenSamplesWhereTheyAre) {
+  for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
+  Flatten(2);
+  disparity_[At(9, 6)] = 0;
+  shift_x_ = 0.5;  // one pixel
+  Hide(At(0, 0), 11, 8);
+  Hide(At(4, 5), 5, 1);  // to (9, 6), which is of another surface
+  hidden_.back().disparity = 0;
+  Hide(At(11, 8), -11, 0);
+  const std::vector<float> warped = Warp();
+  EXPECT_EQ(warped[At(0, 0)], values_[At(11, 8)]);
+  EXPECT_EQ(warped[At(4, 5)], values_[At(9, 6)]);
+  EXPECT_EQ(warped[At(11, 8)], values_[At(0, 8)]);
+  EXPECT_EQ(warped[At(1, 0)], values_[At(2, 0)]);
+  EXPECT_EQ(warped[At(5, 5)], values_[At(6, 5)]);
+  EXPECT_EQ(warped[At(10, 8)], values_[At(11, 8)]);
+}
+
+// Rounded to float, the shift would lead a digit short of the pixel, which is of another surface,
+// to the one before it.
+TEST_P(ViewWarpTest, TakesAShiftWithMoreDigitsThanAFloat) {
+  for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i % kW);
+  Flatten(2.6F);
+  disparity_[At(7, 4)] = 9;
+  shift_x_ = 3.0 / double{2.6F};
+  ASSERT_LT(static_cast<float>(shift_x_) * 2.6F, 3);
+  EXPECT_EQ(Warp()[At(4, 4)], 7);
 }
 
 TEST_P(ViewWarpTest, StaysOnItsSurface) {
@@ -103,25 +157,31 @@ TEST_P(ViewWarpTest, StaysOnItsSurface) {
       disparity_[At(x, y)] = x < 6 ? 0.0F : 1.0F;
     }
   }
-  source_x_.assign(kPixels, 0.5F);
-  std::vector<float> warped = Warp();
+  HideAll(0.5F, 0, 0);
+  const std::vector<float> warped = Warp();
   EXPECT_NEAR(warped[At(5, 4)], 0.25, 1e-6);  // of 5 and 6 only 5 is the sample's
   EXPECT_NEAR(warped[At(4, 4)], 0.25, 1e-6);  // no bicubic taps past the edge
-  of_view_.assign(kPixels, 1.0F);
-  warped = Warp();
-  EXPECT_NEAR(warped[At(5, 4)], 1, 1e-6);
-  // On no surface around: the one that is nearest in disparity.
-  of_view_.assign(kPixels, 0.6F);
+  HideAll(0.5F, 0, 1);
   EXPECT_NEAR(Warp()[At(5, 4)], 1, 1e-6);
-  of_view_.assign(kPixels, 0.4F);
+  // On no surface around: the one that is nearest in disparity.
+  HideAll(0.5F, 0, 0.6F);
+  EXPECT_NEAR(Warp()[At(5, 4)], 1, 1e-6);
+  HideAll(0.5F, 0, 0.4F);
+  EXPECT_NEAR(Warp()[At(5, 4)], 0.25, 1e-6);
+  // The same of samples that are seen.
+  hidden_.clear();
+  of_view_.assign(kPixels, 0.625F);
+  shift_x_ = 0.8;
+  EXPECT_NEAR(Warp()[At(5, 4)], 1, 1e-6);
+  of_view_.assign(kPixels, 0.25F);
+  shift_x_ = 2;
   EXPECT_NEAR(Warp()[At(5, 4)], 0.25, 1e-6);
 }
 
 TEST_P(ViewWarpTest, WeighsWhatIsLeftOfTheFourAround) {
   for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
   disparity_[At(5, 5)] = 9;
-  source_x_.assign(kPixels, 0.25F);
-  source_y_.assign(kPixels, 0.5F);
+  HideAll(0.25F, 0.5F, 0);
   // At (4.25, 4.5): without (5, 5).
   const float expected =
       (0.375F * values_[At(4, 4)] + 0.125F * values_[At(5, 4)] + 0.375F * values_[At(4, 5)]) /
@@ -131,15 +191,21 @@ TEST_P(ViewWarpTest, WeighsWhatIsLeftOfTheFourAround) {
 
 TEST_P(ViewWarpTest, IsCutToThePicture) {
   FillPolynomial();
-  source_x_.assign(kPixels, -1e30F);
-  source_y_.assign(kPixels, 1e30F);
+  HideAll(-1e30F, 1e30F, 0);
   EXPECT_THAT(Warp(), Each(FloatNear(values_[At(0, kH - 1)], 1e-5F)));
+  hidden_.clear();
+  Flatten(0.5F);
+  for (const double far : {1e3, 1e30, 1e38}) {
+    shift_x_ = -far, shift_y_ = far;
+    EXPECT_THAT(Warp(), Each(FloatNear(values_[At(0, kH - 1)], 1e-5F))) << far;
+  }
 }
 
 TEST_P(ViewWarpTest, KeepsChannelsApart) {
-  source_x_.assign(kPixels, 0.5F);
+  Flatten(1);
+  shift_x_ = 0.5;
   // Left of an edge, where four pixels are read, 16, and one.
-  for (int y = 0; y < kH; ++y) disparity_[At(9, y)] = 1;
+  for (int y = 0; y < kH; ++y) disparity_[At(9, y)] = 2;
   for (const std::size_t channels : {1, 2, 3, 4, 5, 8, 9}) {
     values_.clear();
     for (std::size_t i = 0; i < kPixels; ++i) {
@@ -159,9 +225,20 @@ TEST_P(ViewWarpTest, KeepsChannelsApart) {
 }
 
 TEST_P(ViewWarpTest, RefusesWhatDoesNotFit) {
-  source_y_.pop_back();
-  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("sources of a view down: 107 numbers"));
-  source_y_.push_back(0);
+  of_view_.pop_back();
+  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("disparity of a view: 107 numbers"));
+  of_view_.push_back(0);
+  for (const std::int32_t index : {-1, 108}) {
+    hidden_ = {{index, 0, 0, 0}};
+    EXPECT_THAT(ErrorOf([&] { Warp(); }),
+                HasSubstr(std::to_string(index) + ": it must be 0 to 107"));
+  }
+  hidden_ = {{5, 0, 0, 0}};
+  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("hidden sample 5 of a view is of disparity 0"));
+  hidden_.clear();
+  shift_y_ = kNone;
+  EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("shift of a view is nan"));
+  shift_y_ = 0;
   values_.push_back(0);
   EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("there must be 108"));
 }
@@ -204,14 +281,27 @@ TEST_P(DeviceWarpTest, IsThatOfTheTwin) {
     const SurfacePicture picture{c.width, c.height, c.channels, &values, &disparity, 0.3F};
     const auto of_view = numbers(pixels, -0.5F, 1.5F);
     for (const float reach : {0.0F, 3.0F, 300.0F}) {
+      const auto shift = numbers(2, -reach, reach);
       const auto source_x = numbers(pixels, -reach, reach);
       const auto source_y = numbers(pixels, -reach, reach);
       for (const std::vector<float>* surface : {&std::as_const(disparity), &of_view}) {
-        std::vector<float> found, right;
-        NewWarp(GetParam(), picture)->Warp({surface, &source_x, &source_y}, &found);
-        NewWarp(Form::kTwin, picture)->Warp({surface, &source_x, &source_y}, &right);
-        EXPECT_THAT(found, ::testing::Pointwise(FloatNear(3e-6F), right))
-            << c.width << "x" << c.height << ", " << c.channels << " channels, " << reach << " px";
+        // None is hidden, the first, every third, all.
+        for (const int every : {0, pixels, 3, 1}) {
+          std::vector<float> seen = *surface;
+          std::vector<HiddenSample> hidden;
+          for (int i = 0; every > 0 && i < pixels; i += every) {
+            const auto n = static_cast<std::size_t>(i);
+            hidden.push_back({i, source_x[n], source_y[n], seen[n]});
+            seen[n] = kNone;
+          }
+          const ViewSources view{&seen, shift[0], shift[1], &hidden};
+          std::vector<float> found, right;
+          NewWarp(GetParam(), picture)->Warp(view, &found);
+          NewWarp(Form::kTwin, picture)->Warp(view, &right);
+          EXPECT_THAT(found, ::testing::Pointwise(FloatNear(3e-6F), right))
+              << c.width << "x" << c.height << ", " << c.channels << " channels, " << reach
+              << " px, hidden every " << every;
+        }
       }
     }
   }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "thicklens/kernels/view_warp.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
 
@@ -71,10 +72,7 @@ struct ViewDisparity {
 // ViewDisparity in a third of the memory: the way to the source of what is seen follows from its
 // disparity.
 struct CompactView {
-  struct Hidden {
-    std::int32_t index = 0;  // of the sample
-    float source_x = 0, source_y = 0, disparity = 0;
-  };
+  using Hidden = kernels::HiddenSample;
   int width_px = 0;
   int height_px = 0;
   Eigen::Vector2d shift{0, 0};   // px per unit of disparity

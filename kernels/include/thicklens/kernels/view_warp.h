@@ -1,6 +1,7 @@
 #ifndef THICKLENS_KERNELS_VIEW_WARP_H_
 #define THICKLENS_KERNELS_VIEW_WARP_H_
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -15,12 +16,21 @@ struct SurfacePicture {
   float tolerance = 0;
 };
 
-// Where the samples of a view read the picture: sample (x, y) at (x + source_x, y + source_y), cut
-// to the picture, on the surface of `disparity`. One number a sample, as many as the picture has
-// pixels.
+// A sample of a view that does not show what stands at its disparity.
+struct HiddenSample {
+  std::int32_t index = 0;            // y width + x
+  float source_x = 0, source_y = 0;  // px to what is read in its place
+  float disparity = 0;               // of that
+};
+
+// Where the samples of a view read the picture, cut to it. What is seen follows from its disparity,
+// so that a view is one number a sample and a list, and no more than that has to go to a device.
 struct ViewSources {
+  // One a sample, as many as the picture has pixels. Sample (x, y) of disparity d reads at
+  // (x + shift_x d, y + shift_y d), on the surface of d. NaN: it is one of `hidden`.
   const std::vector<float>* disparity = nullptr;
-  const std::vector<float>*source_x = nullptr, *source_y = nullptr;
+  double shift_x = 0, shift_y = 0;                    // px per unit of disparity
+  const std::vector<HiddenSample>* hidden = nullptr;  // those that are NaN, each once
 };
 
 // Reads one picture for many views. Bicubic (Catmull-Rom, the borders repeated) where all 16 pixels
@@ -31,7 +41,7 @@ class ViewWarp {
  public:
   virtual ~ViewWarp() = default;
   // Sets `values`, as SurfacePicture has them, in the memory that they have. Throws Error for sizes
-  // that do not fit, and what a device reports.
+  // and indices that do not fit, and what a device reports.
   virtual void Warp(const ViewSources& view, std::vector<float>* values) = 0;
 };
 
