@@ -92,17 +92,18 @@ cl::Buffer OpenClQueue::NewBuffer(const std::string& what, void* data, std::size
   });
 }
 
-void OpenClQueue::BringHome(const std::string& what, const cl::Buffer& buffer, void* data,
-                            std::size_t bytes) {
-  Guarded(*device_, what, [&] {
+cl::Event OpenClQueue::SendHome(const std::string& what, const cl::Buffer& buffer, void* data,
+                                std::size_t bytes) {
+  return Guarded(*device_, what, [&] {
+    cl::Event sent;
     if (memory_ == HostMemory::kCopied) {
-      queue_.enqueueReadBuffer(buffer, CL_TRUE, 0, bytes, data);
-      return;
+      queue_.enqueueReadBuffer(buffer, CL_FALSE, 0, bytes, data, nullptr, &sent);
+      return sent;
     }
     // Mapping makes lent memory current; nothing is copied where the device works in it.
-    void* mapped = queue_.enqueueMapBuffer(buffer, CL_TRUE, CL_MAP_READ, 0, bytes);
+    void* mapped = queue_.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, bytes, nullptr, &sent);
     queue_.enqueueUnmapMemObject(buffer, mapped);
-    queue_.finish();
+    return sent;
   });
 }
 
@@ -113,7 +114,13 @@ DeviceArray::DeviceArray(OpenClQueue* queue, const std::string& what, void* data
       bytes_(bytes),
       buffer_(queue->NewBuffer(what, data, bytes, true, true)) {}
 
-void DeviceArray::BringHome() { queue_->BringHome(what_, buffer_, data_, bytes_); }
+void DeviceArray::BringHome() {
+  const cl::Event sent = queue_->SendHome(what_, buffer_, data_, bytes_);
+  Guarded(*queue_->device_, what_, [&] {
+    queue_->queue_.finish();
+    sent.wait();
+  });
+}
 
 DeviceMemory::DeviceMemory(OpenClQueue* queue, const std::string& what, std::size_t bytes)
     : queue_(queue), what_(what), bytes_(bytes) {
@@ -168,8 +175,12 @@ void OpenClCall::SetBuffer(const cl::Buffer& buffer) {
 void OpenClCall::AddArray(const std::string& what, void* data, std::size_t bytes, bool is_read,
                           bool is_written) {
   const std::string name = name_ + ", " + what;
-  arrays_.push_back(
-      {name, queue_->NewBuffer(name, data, bytes, is_read, is_written), data, bytes, is_written});
+  arrays_.push_back({name,
+                     queue_->NewBuffer(name, data, bytes, is_read, is_written),
+                     data,
+                     bytes,
+                     is_written,
+                     {}});
   SetBuffer(arrays_.back().buffer);
 }
 
@@ -188,14 +199,19 @@ void OpenClCall::Enqueue(std::size_t items) {
 void OpenClCall::Run(std::size_t items) {
   try {
     Enqueue(items);
-    // What goes wrong while the kernel runs is then said with its name.
+    for (Array& array : arrays_) {
+      if (!array.is_written) continue;
+      array.sent = queue_->SendHome(array.what, array.buffer, array.data, array.bytes);
+    }
+    // One wait for all of it: on a processor each costs as much as a small kernel. What goes wrong
+    // while the kernel runs is said with its name.
     Guarded(*queue_->device_, name_, [&] { queue_->queue_.finish(); });
+    for (const Array& array : arrays_) {
+      if (array.is_written) Guarded(*queue_->device_, array.what, [&] { array.sent.wait(); });
+    }
   } catch (...) {
     queue_->Settle();  // the arrays may go with the error
     throw;
-  }
-  for (const Array& array : arrays_) {
-    if (array.is_written) queue_->BringHome(array.what, array.buffer, array.data, array.bytes);
   }
 }
 

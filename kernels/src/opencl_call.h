@@ -45,7 +45,9 @@ class OpenClQueue {
   Entry& EntryOf(const std::string& kernel);
   cl::Buffer NewBuffer(const std::string& what, void* data, std::size_t bytes, bool is_read,
                        bool is_written);
-  void BringHome(const std::string& what, const cl::Buffer& buffer, void* data, std::size_t bytes);
+  // Returns at once: it is there when the queue is done, and the event says whether it came.
+  cl::Event SendHome(const std::string& what, const cl::Buffer& buffer, void* data,
+                     std::size_t bytes);
 
   std::shared_ptr<const OpenClDevice> device_;
   cl::Program program_;
@@ -146,6 +148,7 @@ class OpenClCall {
     void* data;
     std::size_t bytes;
     bool is_written;
+    cl::Event sent;
   };
   void SetBytes(const void* bytes, std::size_t count);
   void SetBuffer(const cl::Buffer& buffer);
