@@ -108,9 +108,9 @@ double SceneMemory::ViewsBytes() const {
   const int at_once = std::min(threads_, u_count_ * v_count_);
   double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
   bytes += at_once * keeps_.sink_bytes;
-  // On the device: the picture, one view, the disparities of both, the picture's ranges, and what
-  // is hidden, where a third is.
-  if (keeps_.device) bytes += all * (2 * view + 6 * kFloat);
+  // On the device: the picture, its disparity and ranges; and of each view in the making the
+  // values, the disparity and what is hidden, where a third is.
+  if (keeps_.device) bytes += all * (view + 3 * kFloat + at_once * (view + 3 * kFloat));
   if (keeps_.light_field) {
     const double ray = view + (keeps_.maps ? 1 : 0);
     bytes += all * ray * u_count_ * v_count_;

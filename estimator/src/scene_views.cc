@@ -55,8 +55,6 @@ class ViewMaker {
   void Make(const CompactView& view, model::LinearPicture* made) {
     if (native_) return native_->Warp(view, made);
     *made = {picture_.width_px, picture_.height_px, picture_.channels, std::move(made->values)};
-    made->values.resize(picture_.values.size());
-    const std::lock_guard<std::mutex> lock(mutex_);  // a device has one queue
     on_device_->Warp(SourcesOf(view), &made->values);
   }
 
@@ -64,7 +62,6 @@ class ViewMaker {
   const model::LinearPicture& picture_;
   std::optional<PictureWarper> native_;
   std::unique_ptr<kernels::ViewWarp> on_device_;
-  std::mutex mutex_;
 };
 
 }  // namespace

@@ -1,7 +1,10 @@
 // Views on a device: warp.cl.
 #include <algorithm>
 #include <cstddef>
+#include <memory>
+#include <mutex>
 #include <utility>
+#include <vector>
 
 #include "opencl_call.h"
 #include "opencl_device.h"
@@ -89,7 +92,8 @@ class OpenClWarp : public ViewWarp {
     const std::vector<HiddenSample>& hidden = view.hidden->empty() ? no_sample : *view.hidden;
     const auto hidden_count = static_cast<int>(view.hidden->size());
     values->resize(picture_.values->size());
-    OpenClCall(queue_.get(), "WarpView")
+    std::unique_ptr<OpenClQueue> queue = TakeQueue();
+    OpenClCall(queue.get(), "WarpView")
         .Value(surfaces)
         .OnDevice(pixels_)
         .OnDevice(disparity_)
@@ -100,15 +104,28 @@ class OpenClWarp : public ViewWarp {
         .Value(static_cast<cl_int>(hidden_count))
         .Output("view", values)
         .Run(ItemsOf(picture_.width_px) * Index(picture_.height_px) + ItemsOf(hidden_count));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    spare_queues_.push_back(std::move(queue));
   }
 
  private:
+  // Each thread in here has a queue, so that the device computes a view while another waits to be
+  // told of the last one: of small views that is most of the time.
+  std::unique_ptr<OpenClQueue> TakeQueue() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (spare_queues_.empty()) return queue_->Clone();
+    std::unique_ptr<OpenClQueue> queue = std::move(spare_queues_.back());
+    spare_queues_.pop_back();
+    return queue;
+  }
   std::size_t ItemsOf(int samples) const { return Index((samples + lanes_ - 1) / lanes_); }
 
-  const std::unique_ptr<OpenClQueue> queue_;
-  const int lanes_;  // samples of an item
+  const std::unique_ptr<OpenClQueue> queue_;  // by which the picture came
+  const int lanes_;                           // samples of an item
   const SurfacePicture picture_;
   const DeviceMemory pixels_, disparity_, ranges_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<OpenClQueue>> spare_queues_;
 };
 
 }  // namespace

@@ -1,14 +1,12 @@
 // Views of a picture with a step in its depth, 640 x 480 px in 1 and in 3 channels, to memory that
-// is there, as a light field's are made: by C++ on two threads, two views at a time, and by an
-// OpenCL device, one after the other. `views_per_second` compares them; where the device is the
-// processor, so does column CPU, the time of the process's threads, which other programs on the
-// machine disturb less.
+// is there, as a light field's are made, two at a time on two threads: by C++, and by an OpenCL
+// device. `views_per_second` compares them; where the device is the processor, so does column CPU,
+// the time of the process's threads, which other programs on the machine disturb less.
 #include <benchmark/benchmark.h>
 
 #include <array>
 #include <cstddef>
 #include <memory>
-#include <mutex>
 #include <random>
 #include <vector>
 
@@ -73,9 +71,7 @@ void ViewOpenCl(benchmark::State& state) {
   const auto warp = backend->NewWarp(
       {kWidth, kHeight, channels, &scene.picture.values, &scene.map.disparity, 0.3F});
   std::array<std::vector<float>, kViews> values;
-  std::mutex mutex;
   const auto make = [&](int i) {
-    const std::lock_guard<std::mutex> lock(mutex);
     warp->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden},
                &values[static_cast<std::size_t>(i)]);
   };

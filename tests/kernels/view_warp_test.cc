@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -12,6 +13,7 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -241,6 +243,29 @@ TEST_P(ViewWarpTest, RefusesWhatDoesNotFit) {
   shift_y_ = 0;
   values_.push_back(0);
   EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("there must be 108"));
+}
+
+TEST_P(ViewWarpTest, IsUsedByManyThreads) {
+  for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
+  Flatten(1);
+  Hide(At(6, 4), 0, 0);
+  picture_ = {kW, kH, 1, &values_, &disparity_, 0.3F};
+  const std::unique_ptr<ViewWarp> warp = NewWarp(GetParam(), picture_);
+  constexpr std::size_t kThreads = 4;
+  std::array<std::vector<float>, kThreads> warped;
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&, t] {  // each so many pixels to the right
+      for (int i = 0; i < 20; ++i) {
+        warp->Warp({&of_view_, static_cast<double>(t), 0, &hidden_}, &warped[t]);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    EXPECT_EQ(warped[t][At(3, 3)], values_[At(3 + static_cast<int>(t), 3)]);
+    EXPECT_EQ(warped[t][At(6, 4)], values_[At(6, 4)]);
+  }
 }
 
 // Pictures of all kinds of sizes and channels, surfaces that are flat, rough and steep.

@@ -36,7 +36,7 @@ struct ViewSources {
 // Reads one picture for many views. Bicubic (Catmull-Rom, the borders repeated) where all 16 pixels
 // around are of the sample's surface, else the mean of those of the four around that are, weighted
 // as bilinearly; where none is, the one of the four that is nearest to it in disparity. An object
-// is used by one thread at a time.
+// is used by many threads.
 class ViewWarp {
  public:
   virtual ~ViewWarp() = default;
