@@ -118,16 +118,8 @@ void PaintAlone(const DisparityMap& map, const std::vector<int>& alone,
   }
 }
 
-// A sample with its background, whose disparity is given.
-CompactView::Hidden HiddenBy(const HoleFiller::Sample& hole, const HoleFiller::Sample& background,
-                             float disparity, const Eigen::Vector2d& shift, std::size_t index) {
-  return {static_cast<std::int32_t>(index),
-          static_cast<float>(background.x - hole.x + shift.x() * disparity),
-          static_cast<float>(background.y - hole.y + shift.y() * disparity), disparity};
-}
-
 void FindSources(const DisparityMap& map, DisparityBuffer buffer, CompactView* view) {
-  HoleFiller filler(buffer, view->shift);
+  HoleFiller filler(map, buffer, view->shift);
   const std::vector<HoleFiller::Sample>& holes = filler.holes();
   view->hidden.reserve(holes.size());
   if (holes.size() == map.disparity.size()) {  // looks past the picture: the centre stands in
@@ -136,9 +128,10 @@ void FindSources(const DisparityMap& map, DisparityBuffer buffer, CompactView* v
     }
   } else {
     for (const HoleFiller::Sample& hole : holes) {
-      const HoleFiller::Sample from = filler.Background(hole.x, hole.y);
-      view->hidden.push_back(HiddenBy(hole, from, buffer.at(from.x, from.y), view->shift,
-                                      buffer.Index(hole.x, hole.y)));
+      const HoleFiller::Source from = filler.Background(hole.x, hole.y);
+      view->hidden.push_back({static_cast<std::int32_t>(buffer.Index(hole.x, hole.y)),
+                              static_cast<float>(from.way_x), static_cast<float>(from.way_y),
+                              from.disparity});
     }
   }
   view->disparity = std::move(buffer).TakeDisparity();

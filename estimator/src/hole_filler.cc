@@ -2,6 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "cell_disparity.h"
+#include "lanes.h"
+#include "surface_taps.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -16,10 +23,36 @@ std::array<HoleFiller::Sample, 4> Neighbours(const HoleFiller::Sample& of) {
   return {{{of.x + 1, of.y}, {of.x - 1, of.y}, {of.x, of.y + 1}, {of.x, of.y - 1}}};
 }
 
+// Least and most, of several lanes at once.
+std::pair<double, double> RangeOf(const std::vector<float>& values) {
+  std::array<float, kLanes> least{}, most{};
+  least.fill(values.front());
+  most.fill(values.front());
+  std::size_t i = 0;
+  for (; i + kLanes <= values.size(); i += kLanes) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      least[lane] = Least(least[lane], values[i + lane]);
+      most[lane] = Most(most[lane], values[i + lane]);
+    }
+  }
+  for (; i < values.size(); ++i) {
+    least[0] = Least(least[0], values[i]);
+    most[0] = Most(most[0], values[i]);
+  }
+  return {static_cast<double>(*std::min_element(least.begin(), least.end())),
+          static_cast<double>(*std::max_element(most.begin(), most.end()))};
+}
+
 }  // namespace
 
-HoleFiller::HoleFiller(const DisparityBuffer& buffer, const Eigen::Vector2d& direction)
-    : buffer_(buffer), direction_(direction / direction.cwiseAbs().maxCoeff()) {
+HoleFiller::HoleFiller(const DisparityMap& map, const DisparityBuffer& buffer,
+                       const Eigen::Vector2d& shift)
+    : map_(map),
+      buffer_(buffer),
+      shift_(shift),
+      px_per_unit_(shift.cwiseAbs().maxCoeff()),
+      direction_(shift / px_per_unit_),
+      same_surface_(static_cast<float>(SurfaceTolerance(map))) {
   for (int y = 0; y < buffer.height_px(); ++y) {
     const float* const row = buffer.row(y);
     int count = 0;
@@ -30,26 +63,67 @@ HoleFiller::HoleFiller(const DisparityBuffer& buffer, const Eigen::Vector2d& dir
       --count;
     }
   }
+  if (holes_.empty()) return;
+  const auto [low, high] = RangeOf(map.disparity);
+  // Those that are longer than the picture lead out of it.
+  const double longest = std::max(map.width_px, map.height_px);
+  first_step_ = std::clamp(std::floor(px_per_unit_ * low), -longest, longest);
+  last_step_ = std::clamp(std::floor(px_per_unit_ * high) + 1, -longest, longest);
 }
 
-HoleFiller::Sample HoleFiller::Background(int x, int y) {
-  const std::optional<Found> ahead = Walk(x, y, 1);
-  const std::optional<Found> back = Walk(x, y, -1);
-  if (!ahead && !back) return Closest(x, y);
-  if (!ahead) return back->sample;
-  if (!back) return ahead->sample;
+HoleFiller::Source HoleFiller::Background(int x, int y) {
+  const Sample hole{x, y};
+  std::optional<Found> ahead = Walk(x, y, 1);
+  std::optional<Found> back = Walk(x, y, -1);
+  if (const std::optional<Sample> last = LastBefore(x, y)) {
+    const float disparity = map_.disparity[buffer_.Index(last->x, last->y)];
+    const auto is_its_surface = [&](const std::optional<Found>& found) {
+      return found &&
+             std::abs(buffer_.at(found->sample.x, found->sample.y) - disparity) <= same_surface_;
+    };
+    const bool take_ahead = is_its_surface(ahead), take_back = is_its_surface(back);
+    if (!take_ahead && !take_back) {
+      return {static_cast<double>(last->x - x), static_cast<double>(last->y - y), disparity};
+    }
+    const bool ahead_is_closer = take_ahead && (!take_back || ahead->steps <= back->steps);
+    return SourceAt(hole, ahead_is_closer ? ahead->sample : back->sample);
+  }
+  if (!ahead && !back) return SourceAt(hole, Closest(x, y));
+  if (!ahead) return SourceAt(hole, back->sample);
+  if (!back) return SourceAt(hole, ahead->sample);
   const float ahead_disparity = buffer_.at(ahead->sample.x, ahead->sample.y);
   const float back_disparity = buffer_.at(back->sample.x, back->sample.y);
-  if (ahead_disparity == back_disparity) {
-    return ahead->steps <= back->steps ? ahead->sample : back->sample;
+  const bool take_ahead = ahead_disparity == back_disparity ? ahead->steps <= back->steps
+                                                            : ahead_disparity < back_disparity;
+  return SourceAt(hole, take_ahead ? ahead->sample : back->sample);
+}
+
+HoleFiller::Source HoleFiller::SourceAt(const Sample& hole, const Sample& covered) const {
+  const float disparity = buffer_.at(covered.x, covered.y);
+  return {covered.x - hole.x + shift_.x() * disparity, covered.y - hole.y + shift_.y() * disparity,
+          disparity};
+}
+
+HoleFiller::Sample HoleFiller::At(int x, int y, int steps) const {
+  return {Floor(x + steps * direction_.x() + 0.5), Floor(y + steps * direction_.y() + 0.5)};
+}
+
+// The ray of the sample goes over the centre view's pixel at n steps where its own disparity is n
+// over the px per unit: from the far end on, it is behind the pixels, up to the one whose disparity
+// is below that. Beyond that pixel, away from the viewer, it is hidden from the centre for good.
+std::optional<HoleFiller::Sample> HoleFiller::LastBefore(int x, int y) const {
+  const int last = static_cast<int>(last_step_);
+  for (int steps = static_cast<int>(first_step_); steps <= last; ++steps) {
+    const Sample at = At(x, y, steps);
+    if (!buffer_.IsInside(at.x, at.y)) continue;
+    if (px_per_unit_ * map_.disparity[buffer_.Index(at.x, at.y)] < steps) return at;
   }
-  return ahead_disparity < back_disparity ? ahead->sample : back->sample;
+  return std::nullopt;
 }
 
 std::optional<HoleFiller::Found> HoleFiller::Walk(int x, int y, int sense) const {
   for (int steps = 1;; ++steps) {
-    const Sample at{Floor(x + sense * steps * direction_.x() + 0.5),
-                    Floor(y + sense * steps * direction_.y() + 0.5)};
+    const Sample at = At(x, y, sense * steps);
     if (!buffer_.IsInside(at.x, at.y)) return std::nullopt;
     if (buffer_.IsCovered(at.x, at.y)) return Found{at, steps};
   }

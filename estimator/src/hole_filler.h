@@ -7,26 +7,31 @@
 #include <vector>
 
 #include "disparity_buffer.h"
+#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 
-// The samples that nothing covers: each takes over a covered one.
+// The samples of a view that nothing covers: what stands behind.
 class HoleFiller {
  public:
   struct Sample {
     int x = 0, y = 0;
   };
+  // The way from the sample to a place in the centre view, px, and the disparity there.
+  struct Source {
+    double way_x = 0, way_y = 0;
+    float disparity = 0;
+  };
 
-  // `direction`: of the displacement between views, not (0, 0).
-  HoleFiller(const DisparityBuffer& buffer, const Eigen::Vector2d& direction);
+  // `map` is the centre view's, `buffer` what the view shows of it, `shift` the view's way from it,
+  // px per unit of disparity, not (0, 0). Map and buffer must outlive it.
+  HoleFiller(const DisparityMap& map, const DisparityBuffer& buffer, const Eigen::Vector2d& shift);
 
   // Row by row.
   const std::vector<Sample>& holes() const { return holes_; }
 
-  // The farther of the first covered samples on both sides along the direction; of two equally far
-  // ones the closer. Where there is none, the covered sample closest by steps along rows and
-  // columns. At least one sample must be covered.
-  Sample Background(int x, int y);
+  // As RenderDisparity has it. At least one sample must be covered.
+  Source Background(int x, int y);
 
  private:
   struct Found {
@@ -34,12 +39,22 @@ class HoleFiller {
     int steps = 0;
   };
 
+  Sample At(int x, int y, int steps) const;
   std::optional<Found> Walk(int x, int y, int sense) const;
+  std::optional<Sample> LastBefore(int x, int y) const;
+  Source SourceAt(const Sample& hole, const Sample& covered) const;
   Sample Closest(int x, int y);
   void SpreadCovered();
 
+  const DisparityMap& map_;
   const DisparityBuffer& buffer_;
-  const Eigen::Vector2d direction_;
+  const Eigen::Vector2d shift_;
+  const double px_per_unit_;         // of the larger part of the shift
+  const Eigen::Vector2d direction_;  // of the shift, the larger part 1
+  const float same_surface_;         // in the unit of the map
+  // Whole steps from the sample along the direction outside of which a ray is before, or behind,
+  // all of the map.
+  double first_step_ = 0, last_step_ = 0;
   std::vector<Sample> holes_;
   // Index of a covered sample for each hole and for those beside it; empty until it is needed.
   std::vector<int> closest_;

@@ -135,30 +135,74 @@ std::vector<Sample> Closest(const Canvas& canvas) {
   return closest;
 }
 
+// Of a sample that is not covered.
+struct Behind {
+  double source_x = 0, source_y = 0, disparity = 0;
+};
+
+// Where a step along the displacement leads to from a sample.
+Sample Stepped(const Eigen::Vector2d& step, int x, int y, double steps) {
+  return {static_cast<int>(std::floor(x + steps * step.x() + 0.5)),
+          static_cast<int>(std::floor(y + steps * step.y() + 0.5))};
+}
+
+// The pixel of the centre view after which the ray of a sample is hidden for good: of those that it
+// passes before, the one at which it is farthest away. (-1, -1): none.
+Sample LastPassed(const DisparityMap& map, const Eigen::Vector2d& shift, int x, int y) {
+  const double per_unit = shift.cwiseAbs().maxCoeff();
+  const int most = std::max(map.width_px, map.height_px);
+  Sample last{-1, -1};
+  // Nearer than all of the map it passes nothing.
+  const double nearest = *std::max_element(map.disparity.begin(), map.disparity.end());
+  for (int steps = most; steps >= -most; --steps) {
+    if (steps - 1 > per_unit * nearest) continue;
+    const auto [xx, yy] = Stepped(shift / per_unit, x, y, steps);
+    if (xx < 0 || yy < 0 || xx >= map.width_px || yy >= map.height_px) continue;
+    if (steps > per_unit * map.disparity[At(xx, yy, map.width_px)]) last = {xx, yy};
+  }
+  return last;
+}
+
 // What a sample that is not covered takes over.
-Sample Background(const Canvas& canvas, const Eigen::Vector2d& shift,
+Behind Background(const DisparityMap& map, const Canvas& canvas, const Eigen::Vector2d& shift,
                   const std::vector<Sample>& closest, int x, int y) {
-  const Eigen::Vector2d step = shift / shift.cwiseAbs().maxCoeff();
-  Sample found = closest[At(x, y, canvas.width)];
-  double farthest = kInfinity;
-  int fewest = std::numeric_limits<int>::max();
+  struct End {
+    Sample sample;
+    int steps;
+    double disparity;
+  };
+  std::vector<End> ends;
   for (const int sense : {1, -1}) {
     for (int n = 1;; ++n) {
-      const int xx = static_cast<int>(std::floor(x + sense * n * step.x() + 0.5));
-      const int yy = static_cast<int>(std::floor(y + sense * n * step.y() + 0.5));
+      const auto [xx, yy] = Stepped(shift / shift.cwiseAbs().maxCoeff(), x, y, sense * n);
       if (!canvas.IsInside(xx, yy)) break;
       if (!canvas.IsCovered(xx, yy)) continue;
-      const auto there =
-          static_cast<double>(static_cast<float>(canvas.disparity[At(xx, yy, canvas.width)]));
-      if (there < farthest || (there == farthest && n < fewest)) {
-        farthest = there;
-        fewest = n;
-        found = {xx, yy};
-      }
+      const auto there = static_cast<float>(canvas.disparity[At(xx, yy, canvas.width)]);
+      ends.push_back({{xx, yy}, n, double{there}});
       break;
     }
   }
-  return found;
+  const Sample last = LastPassed(map, shift, x, y);
+  if (last.first >= 0) {
+    const double disparity = map.disparity[At(last.first, last.second, map.width_px)];
+    const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
+    ends.erase(std::remove_if(
+                   ends.begin(), ends.end(),
+                   [&](const End& end) { return std::abs(end.disparity - disparity) > tolerance; }),
+               ends.end());
+    if (ends.empty()) {
+      return {static_cast<double>(last.first), static_cast<double>(last.second), disparity};
+    }
+    for (End& end : ends) end.disparity = 0;  // the closer one, then
+  }
+  Sample found = closest[At(x, y, canvas.width)];
+  if (!ends.empty()) {
+    found = std::min_element(ends.begin(), ends.end(), [](const End& one, const End& other) {
+              return std::pair(one.disparity, one.steps) < std::pair(other.disparity, other.steps);
+            })->sample;
+  }
+  const double disparity = canvas.disparity[At(found.first, found.second, canvas.width)];
+  return {found.first + shift.x() * disparity, found.second + shift.y() * disparity, disparity};
 }
 
 std::array<double, 4> CatmullRom(double f) {
@@ -178,19 +222,20 @@ ViewDisparity PlainView(const DisparityMap& map, double a, double b) {
   Canvas canvas(width, map.height_px);
   Draw(map, shift, &canvas);
   const std::vector<Sample> closest = Closest(canvas);
+  const bool nothing_covered = closest.front().first < 0;
   for (int y = 0; y < map.height_px; ++y) {
     for (int x = 0; x < width; ++x) {
       const std::size_t i = At(x, y, width);
-      Sample shown{x, y};
+      const double drawn = canvas.disparity[i];
+      Behind shown{x + shift.x() * drawn, y + shift.y() * drawn, drawn};
       if (!canvas.IsCovered(x, y)) {
         view.seen[i] = Seen::kHidden;
-        shown = Background(canvas, shift, closest, x, y);
-        if (shown.first < 0) continue;
+        if (nothing_covered) continue;
+        shown = Background(map, canvas, shift, closest, x, y);
       }
-      const double disparity = canvas.disparity[At(shown.first, shown.second, width)];
-      view.disparity[i] = static_cast<float>(disparity);
-      view.source_x[i] = static_cast<float>(shown.first - x + shift.x() * disparity);
-      view.source_y[i] = static_cast<float>(shown.second - y + shift.y() * disparity);
+      view.disparity[i] = static_cast<float>(shown.disparity);
+      view.source_x[i] = static_cast<float>(shown.source_x - x);
+      view.source_y[i] = static_cast<float>(shown.source_y - y);
     }
   }
   return view;

@@ -87,10 +87,15 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // disparities differ by at most .2 px per view step is two triangles at (x - a d, y - b d), and
 // every pixel of the other cells a square of +-.5 px; the nearest wins. Px per view step are those
 // of the larger of the two steps. Samples that nothing covers are hidden, those beyond the border
-// of the centre picture as well: they walk both ways along the displacement (a step.x, b step.y) to
-// the first covered sample and take the farther of the two, or the only one; where there is none,
-// the closest in any direction; where nothing of the picture is in the view, the centre view's own
-// sample. (0, 0) gives the map itself. Throws Error if the map has holes.
+// of the centre picture as well. The ray of such a sample x goes over the centre view's pixel at
+// x + D (a step.x, b step.y) at the disparity D, from near to far, looked at in whole px of the
+// larger part: the last pixel before which it passes belongs to the edge behind which it is hidden
+// from the centre, and that pixel's surface (to .3 px per view step) stands behind. They walk both
+// ways along the displacement to the first covered sample and take the closer one that shows this
+// surface; where neither does, the pixel itself. A ray that passes before none takes the farther of
+// the two, or the only one; where there is none, the closest in any direction; where nothing of the
+// picture is in the view, the centre view's own sample. (0, 0) gives the map itself. Throws Error
+// if the map has holes.
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
 // RenderDisparity for many views of one map: what all of them need is found once. Read by many
