@@ -148,12 +148,14 @@ typename SceneRadiance<Real>::Run SceneBandRun<Real>::RunFor(const SceneOptions&
 
 template <typename Real>
 double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const SceneBand& band,
-                                   Start start, Radiance* radiance) const {
+                                   Start start, Radiance* radiance) {
   const bool whole = band.rows() == photograph.height_px;
-  DisparityMap disparity = whole ? input_.disparity : CutRows(input_.disparity, band.from, band.to);
+  if (!whole) band_disparity_ = CutRows(input_.disparity, band.from, band.to);
   if (input_.grid) {
-    disparity = PhotographDisparity(disparity, LandingStepPx(*input_.camera, *input_.grid));
+    band_disparity_ = PhotographDisparity(whole ? input_.disparity : band_disparity_,
+                                          LandingStepPx(*input_.camera, *input_.grid));
   }
+  const DisparityMap& disparity = whole && !input_.grid ? input_.disparity : band_disparity_;
   const std::optional<model::LinearPicture> cut =
       whole ? std::nullopt : std::optional(CutRows(photograph, band.from, band.to));
   const model::LinearPicture& rows = cut ? *cut : photograph;
@@ -163,7 +165,7 @@ double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const
     ReturnFreedMemory(options_.memory_limit_mib);
   }
   const double seconds = SecondsSince(begin);
-  radiance->Prepare(rows, std::move(disparity), band);
+  radiance->Prepare(rows, disparity, band);
   return seconds;
 }
 

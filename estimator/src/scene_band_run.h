@@ -45,9 +45,10 @@ class SceneBandRun {
   double StrengthFor(const model::LinearPicture& photograph, const std::vector<SceneBand>& bands);
   typename Radiance::Run RunFor(const SceneOptions& options) const;
   enum class Start { kNone, kFound };
-  // Returns the seconds of the iterations at half the size, where they are asked for.
+  // Returns the seconds of the iterations at half the size, where they are asked for. One radiance
+  // at a time: it reads the band's disparity from here.
   double Prepare(const model::LinearPicture& photograph, const SceneBand& band, Start start,
-                 Radiance* radiance) const;
+                 Radiance* radiance);
   // Absent if one of them takes more memory than it may.
   std::optional<SolvedScene> SolveIn(int count, const model::LinearPicture& photograph,
                                      bool wants_confidence, SceneMaps* maps);
@@ -63,6 +64,7 @@ class SceneBandRun {
   const int reach_px_, iterations_;
   IterationProgress* progress_;
   SceneSummary* summary_;
+  DisparityMap band_disparity_;  // unless it is the input's
   double mean_slope_ = 0;
   double bytes_per_pixel_ = 0;  // of H, the most that is known
   std::optional<Sample> sample_;

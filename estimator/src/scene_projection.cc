@@ -41,6 +41,13 @@ std::vector<float> HiddenShare(const ViewFan& fan, std::size_t pixels) {
   return {share.begin(), share.end()};
 }
 
+// Which is the map itself.
+void DropCentre(ViewFan* fan) {
+  const auto is_centre = [](const FanView& view) { return view.a == 0 && view.b == 0; };
+  fan->views.erase(std::remove_if(fan->views.begin(), fan->views.end(), is_centre),
+                   fan->views.end());
+}
+
 }  // namespace
 
 template <typename Real>
@@ -158,18 +165,25 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
 
   std::vector<unsigned char> is_product(projection.pixels(), 0);
   if (has_products) {
-    const FanAxes axes = AxesOf(fan, disparity, u_count, v_count, options.threads);
+    FanAxes axes = AxesOf(fan, disparity, u_count, v_count, options.threads);
     is_product =
         IsProduct(fan, axes, disparity, options.tolerance_px, plain.is_product, options.threads);
     for (const Product& product : products) {
-      projection.terms.push_back({FilterOf<Real>(axes.across, kernels::Axis::kAcross, disparity,
-                                                 product.across, options.between, options.threads),
-                                  FilterOf<Real>(axes.down, kernels::Axis::kDown, disparity,
-                                                 product.down, options.between, options.threads)});
+      projection.terms.emplace_back();
+      auto& term = projection.terms.back();
+      term.across = FilterOf<Real>(axes.across, kernels::Axis::kAcross, disparity, product.across,
+                                   options.between, options.threads);
+      // The last one's axes are not read again, and make room for its other filter.
+      if (&product == &products.back()) axes.across = {};
+      term.down = FilterOf<Real>(axes.down, kernels::Axis::kDown, disparity, product.down,
+                                 options.between, options.threads);
     }
   }
   projection.rows = RunsOf<Real>(fan, disparity, is_product, options.threads);
-  if (options.fan) projection.fan = std::move(fan);
+  if (options.fan) {
+    DropCentre(&fan);
+    projection.fan = std::move(fan);
+  }
   return projection;
 }
 

@@ -40,7 +40,7 @@ class SceneProjection {
   std::vector<float> hidden_share;
   // Share of the aperture that sees each point of the centre view; only where it was asked for.
   std::vector<float> seen_share;
-  ViewFan fan;  // likewise
+  ViewFan fan;  // likewise; without the centre
 
   // Both set their results.
   void Apply(const Real* x, int channels, Real* y) const;

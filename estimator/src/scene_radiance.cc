@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "coarse_start.h"
@@ -92,23 +93,23 @@ void SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
 }
 
 template <typename Real>
-void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph, DisparityMap disparity,
-                                  const SceneBand& band) {
+void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph,
+                                  const DisparityMap& disparity, const SceneBand& band) {
   band_ = band;
-  disparity_ = std::move(disparity);
+  disparity_ = &disparity;
   ProjectionOptions projection;
   projection.threads = run_.threads;
   projection.between = run_.options.cubic ? Between::kCubic : Between::kLinear;
   projection.seen_share = run_.confidence;
   projection.fan = run_.fan;
   projection.progress = [this] { run_.progress->Tell(); };
-  projection_ = MakeSceneProjection<Real>(disparity_, run_.input.weights, projection);
+  projection_ = MakeSceneProjection<Real>(disparity, run_.input.weights, projection);
   ReturnFreedMemory(run_.options.memory_limit_mib);
 
   data_ = DataTermOf(projection_, photograph, run_.threads);
   slope_squared_ = SlopeSquared(photograph);
   data_.weight = DataWeights(slope_squared_, projection_.hidden_share, run_.options.hidden_weights);
-  data_.squared_row = SquaredRows<Real>(disparity_, run_.input.weights);
+  data_.squared_row = SquaredRows<Real>(disparity, run_.input.weights);
 }
 
 template <typename Real>
@@ -126,7 +127,7 @@ SignalSum SceneRadiance<Real>::Signal() const {
 template <typename Real>
 model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   const SceneOptions& options = run_.options;
-  SceneSystem<Real> system(data_, run_.backend);
+  std::optional<SceneSystem<Real>> system(std::in_place, data_, run_.backend);
   std::vector<Real> radiance = start_.values.empty() ? data_.photograph : Planar<Real>(start_);
   start_ = {};
   RadianceLimits limits;
@@ -139,21 +140,23 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
     summary->strength = StrengthForNoise(options.prior, sigma, data_, slope_squared_);
   }
   if (options.strength_rule == StrengthRule::kGcv) {
-    const StrengthSearch search = SearchStrength(SolvedFirst(options.prior), summary->strength,
-                                                 data_, slope_squared_, limits, &system, &radiance);
+    const StrengthSearch search =
+        SearchStrength(SolvedFirst(options.prior), summary->strength, data_, slope_squared_, limits,
+                       &*system, &radiance);
     summary->strength = search.strength;
     summary->iterations = search.iterations;
   }
   const RadianceOutcome outcome =
       options.prior == Prior::kPatches
           ? SolveWithPatches({summary->strength, sigma, run_.input.transfer}, data_, slope_squared_,
-                             limits, &system, &radiance)
-          : SolveRadiance(options.prior, summary->strength, data_, slope_squared_, limits, &system,
+                             limits, &*system, &radiance)
+          : SolveRadiance(options.prior, summary->strength, data_, slope_squared_, limits, &*system,
                           &radiance);
   summary->iterations += outcome.iterations;
   summary->reweightings = outcome.reweightings;
   summary->converged = outcome.converged;
   summary->relative_residual = outcome.relative_residual;
+  system.reset();  // makes room
   residual_ = StoredResidualOf(data_, radiance, run_.input.transfer, first_row(), last_row());
   summary->residual_rms = residual_.rms;
   FillShares(summary);
@@ -164,12 +167,12 @@ template <typename Real>
 void SceneRadiance<Real>::AddMaps(SceneMaps* maps) const {
   AddRows(residual_.mean, &maps->residual);
   AddRows(projection_.hidden_share, &maps->hidden_share);
-  AddRows(BlurSigmaPx(disparity_, run_.input.weights), &maps->blur_sigma_px);
+  AddRows(BlurSigmaPx(*disparity_, run_.input.weights), &maps->blur_sigma_px);
 }
 
 template <typename Real>
 void SceneRadiance<Real>::AddConfidence(std::vector<Confidence>* of_points) const {
-  const std::vector<float> sigma_px = BlurSigmaPx(disparity_, run_.input.weights);
+  const std::vector<float> sigma_px = BlurSigmaPx(*disparity_, run_.input.weights);
   for (std::size_t i = PixelOfRow(first_row()); i < PixelOfRow(last_row()); ++i) {
     of_points->push_back(ConfidenceOfPoint(static_cast<double>(projection_.seen_share[i]),
                                            static_cast<double>(sigma_px[i])));
@@ -178,7 +181,7 @@ void SceneRadiance<Real>::AddConfidence(std::vector<Confidence>* of_points) cons
 
 template <typename Real>
 std::size_t SceneRadiance<Real>::PixelOfRow(int row) const {
-  return static_cast<std::size_t>(row) * static_cast<std::size_t>(disparity_.width_px);
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(disparity_->width_px);
 }
 
 template <typename Real>
@@ -191,7 +194,7 @@ void SceneRadiance<Real>::AddRows(const std::vector<float>& plane, std::vector<f
 template <typename Real>
 std::vector<Real> SceneRadiance<Real>::SlopeSquared(const model::LinearPicture& photograph) const {
   if (!run_.options.slope_weights) {
-    return std::vector<Real>(disparity_.disparity.size(),
+    return std::vector<Real>(disparity_->disparity.size(),
                              static_cast<Real>(run_.mean_slope * run_.mean_slope));
   }
   const std::vector<double> slopes =

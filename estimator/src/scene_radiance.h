@@ -47,8 +47,8 @@ class SceneRadiance {
   // Prepare, so that H of both sizes is never held at once; without it the photograph is the start.
   void FindStart(const model::LinearPicture& photograph, const DisparityMap& disparity);
   // H, I and the weights, from the rows of the band: the photograph without fall-off, and the
-  // disparity of its pixels.
-  void Prepare(const model::LinearPicture& photograph, DisparityMap disparity,
+  // disparity of its pixels, which must live as long.
+  void Prepare(const model::LinearPicture& photograph, const DisparityMap& disparity,
                const SceneBand& band);
   double operator_bytes() const { return OperatorBytes(0, projection_.height_px); }
   // Of the band's result.
@@ -76,7 +76,7 @@ class SceneRadiance {
 
   const Run run_;
   SceneBand band_;
-  DisparityMap disparity_;
+  const DisparityMap* disparity_ = nullptr;
   SceneProjection<Real> projection_;
   DataTerm<Real> data_;
   std::vector<Real> slope_squared_;

@@ -88,6 +88,7 @@ template <typename Real>
 CgOutcome SceneSystem<Real>::SolveRenewed(const CgLimits& limits, const Renew& renew,
                                           std::vector<Real>* x) {
   steps_->Start(*x);
+  *x = {};  // which the steps have now
   const CgOutcome outcome = Iterate(limits, renew);
   *x = steps_->Radiance();
   return outcome;
