@@ -159,12 +159,11 @@ double SceneBandRun<Real>::Prepare(const model::LinearPicture& photograph, const
   const std::optional<model::LinearPicture> cut =
       whole ? std::nullopt : std::optional(CutRows(photograph, band.from, band.to));
   const model::LinearPicture& rows = cut ? *cut : photograph;
-  const auto begin = Clock::now();
+  double seconds = 0;
   if (start == Start::kFound) {
-    radiance->FindStart(rows, disparity);
+    seconds = radiance->FindStart(rows, disparity);
     ReturnFreedMemory(options_.memory_limit_mib);
   }
-  const double seconds = SecondsSince(begin);
   radiance->Prepare(rows, disparity, band);
   return seconds;
 }

@@ -63,9 +63,9 @@ double MeanSlope(const model::LinearPicture& photograph, const model::TransferCu
 }
 
 template <typename Real>
-void SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
-                                    const DisparityMap& disparity) {
-  if (std::min(photograph.width_px, photograph.height_px) < 2 * kLeastCoarsePx) return;
+double SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
+                                      const DisparityMap& disparity) {
+  if (std::min(photograph.width_px, photograph.height_px) < 2 * kLeastCoarsePx) return 0;
   EstimateInput half;
   half.picture = HalfSize(photograph);
   half.disparity = HalfSize(disparity);
@@ -88,8 +88,10 @@ void SceneRadiance<Real>::FindStart(const model::LinearPicture& photograph,
   SceneRadiance coarse(run);
   const int height_px = half.picture.height_px;
   coarse.Prepare(half.picture, half.disparity, {0, height_px, 0, height_px});
+  const auto prepared = Clock::now();
   SceneSummary unused;
   start_ = WithDetail(photograph, half.picture, coarse.Solve(&unused));
+  return SecondsSince(prepared);
 }
 
 template <typename Real>

@@ -45,7 +45,8 @@ class SceneRadiance {
 
   // Where the iteration starts: the estimate at half the size, but of small pictures. Before
   // Prepare, so that H of both sizes is never held at once; without it the photograph is the start.
-  void FindStart(const model::LinearPicture& photograph, const DisparityMap& disparity);
+  // Returns the seconds that it took without those for H.
+  double FindStart(const model::LinearPicture& photograph, const DisparityMap& disparity);
   // H, I and the weights, from the rows of the band: the photograph without fall-off, and the
   // disparity of its pixels, which must live as long.
   void Prepare(const model::LinearPicture& photograph, const DisparityMap& disparity,

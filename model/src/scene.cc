@@ -237,9 +237,8 @@ LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transf
 
 StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits) {
   const double full_scale = FullScale(bits);
-  return StoredBy(picture, bits, [&](float light) {
-    return RoundedLevel(transfer.Encode(light), full_scale);
-  });
+  return StoredBy(picture, bits,
+                  [&](float light) { return RoundedLevel(transfer.Encode(light), full_scale); });
 }
 
 StoredPicture ToStored(const LinearPicture& picture, const StoredLevels& levels) {

@@ -18,9 +18,9 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 const std::vector<TransferCurve>& Curves() {
-  static const std::vector<TransferCurve> curves = {
-      TransferCurve::Linear(), TransferCurve::Srgb(), TransferCurve::Gamma(2.2),
-      TransferCurve::Gamma(0.45)};
+  static const std::vector<TransferCurve> curves = {TransferCurve::Linear(), TransferCurve::Srgb(),
+                                                    TransferCurve::Gamma(2.2),
+                                                    TransferCurve::Gamma(0.45)};
   return curves;
 }
 
@@ -58,8 +58,16 @@ TEST(StoredLevels, ChangeWhereTheCurveRoundsToTheNext) {
 
 TEST(StoredLevels, OfAnyLight) {
   std::mt19937 random(5);
-  std::vector<float> light = {0,     -0.0F,     1,          std::nextafter(1.0F, 0.0F), 1.5F, -0.2F,
-                              kNan,  kInfinity, -kInfinity, std::numeric_limits<float>::min(),
+  std::vector<float> light = {0,
+                              -0.0F,
+                              1,
+                              std::nextafter(1.0F, 0.0F),
+                              1.5F,
+                              -0.2F,
+                              kNan,
+                              kInfinity,
+                              -kInfinity,
+                              std::numeric_limits<float>::min(),
                               std::numeric_limits<float>::denorm_min()};
   // As many in each octave, and evenly.
   std::uniform_real_distribution<float> octaves(-45, 1), even(0, 1.01F);
