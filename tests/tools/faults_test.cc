@@ -256,7 +256,7 @@ TEST_F(Faults, TooLittleMemoryIsToldAndTakesNothingAway) {
   // From what does not even hold the libraries to what does; whether the program gets as far as its
   // own code is the system's.
   bool was_told = false;
-  for (int mebibytes = 200; mebibytes <= 520; mebibytes += 40) {
+  for (int mebibytes = 80; mebibytes <= 520; mebibytes += 20) {
     SCOPED_TRACE(mebibytes);
     const Contents before = ContentsOf(job.output);
     Arguments words = {THICKLENS_PROGRAM};

@@ -136,7 +136,7 @@ cv::Mat RandomPicture(cv::Size size, int type, std::uint64_t seed) {
 }
 
 TEST(PngPixels, WrittenAreReadByOpenCv) {
-  for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3}) {
+  for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4}) {
     for (const PngPacking packing :
          {PngPacking::kFast, PngPacking::kRepetitions, PngPacking::kSmall}) {
       SCOPED_TRACE(type);

@@ -17,8 +17,8 @@ model::StoredPicture ToStoredPicture(const cv::Mat& picture);
 // The first three of four channels; others as they are. Alpha says nothing about light.
 model::StoredPicture WithoutAlpha(const model::StoredPicture& picture);
 
-// A PNG file of 1 or 3 channels, 8 or 16 bit. Compressed lightly: the noise of a photograph hardly
-// gets smaller, but takes much longer, by trying harder.
+// A PNG file of 1, 3 or 4 channels, 8 or 16 bit. Compressed lightly: the noise of a photograph
+// hardly gets smaller, but takes much longer, by trying harder.
 std::string EncodePng(const model::StoredPicture& picture);
 // Bytes as they are, in one channel. Throws Error if they are not rows of that width.
 std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px);

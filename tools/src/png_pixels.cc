@@ -115,7 +115,9 @@ std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing) {
   header.width = static_cast<std::uint32_t>(whole.cols);
   header.height = static_cast<std::uint32_t>(whole.rows);
   header.bit_depth = whole.depth() == CV_16U ? 16 : 8;
-  header.color_type = whole.channels() == 1 ? SPNG_COLOR_TYPE_GRAYSCALE : SPNG_COLOR_TYPE_TRUECOLOR;
+  header.color_type = whole.channels() == 1   ? SPNG_COLOR_TYPE_GRAYSCALE
+                      : whole.channels() == 3 ? SPNG_COLOR_TYPE_TRUECOLOR
+                                              : SPNG_COLOR_TYPE_TRUECOLOR_ALPHA;
   const Effort effort = EffortOf(packing);
   int error = context == nullptr ? SPNG_EMEM : SPNG_OK;
   for (const auto& [option, value] :

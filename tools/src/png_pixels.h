@@ -17,7 +17,7 @@ enum class PngPacking {
   kSmall,        // as far as it goes
 };
 
-// 8 or 16 bits, 1 or 3 (RGB) channels. Throws Error if there is no memory for it.
+// 8 or 16 bits; 1, 3 (RGB) or 4 (RGBA) channels. Throws Error if there is no memory for it.
 std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing);
 
 }  // namespace thicklens::tools
