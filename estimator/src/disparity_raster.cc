@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -118,8 +119,9 @@ void PaintAlone(const DisparityMap& map, const std::vector<int>& alone,
   }
 }
 
-void FindSources(const DisparityMap& map, DisparityBuffer buffer, CompactView* view) {
-  HoleFiller filler(map, buffer, view->shift);
+void FindSources(const DisparityMap& map, const SupportedPixels& supported, DisparityBuffer buffer,
+                 CompactView* view) {
+  HoleFiller filler(map, supported, buffer, view->shift);
   const std::vector<HoleFiller::Sample>& holes = filler.holes();
   view->hidden.reserve(holes.size());
   if (holes.size() == map.disparity.size()) {  // looks past the picture: the centre stands in
@@ -163,6 +165,7 @@ DisparityRenderer::DisparityRenderer(const DisparityMap& map) : map_(map) {
   for (std::size_t i = 0; i < is_alone.size(); ++i) {
     if (is_alone[i]) alone_.push_back(static_cast<int>(i));
   }
+  supported_ = std::make_shared<const SupportedPixels>(FindSupported(map, is_surface_));
 }
 
 CompactView DisparityRenderer::RenderCompact(double a, double b) const {
@@ -180,7 +183,7 @@ CompactView DisparityRenderer::RenderCompact(double a, double b) const {
   DisparityBuffer buffer(map_.width_px, map_.height_px);
   PaintSurfaces(map_, is_surface_, view.shift, &buffer);
   PaintAlone(map_, alone_, view.shift, &buffer);
-  FindSources(map_, std::move(buffer), &view);
+  FindSources(map_, *supported_, std::move(buffer), &view);
   return view;
 }
 

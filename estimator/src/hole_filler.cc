@@ -4,10 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
-#include "cell_disparity.h"
-#include "lanes.h"
 #include "surface_taps.h"
 
 namespace thicklens::estimator {
@@ -23,31 +20,54 @@ std::array<HoleFiller::Sample, 4> Neighbours(const HoleFiller::Sample& of) {
   return {{{of.x + 1, of.y}, {of.x - 1, of.y}, {of.x, of.y + 1}, {of.x, of.y - 1}}};
 }
 
-// Least and most, of several lanes at once.
-std::pair<double, double> RangeOf(const std::vector<float>& values) {
-  std::array<float, kLanes> least{}, most{};
-  least.fill(values.front());
-  most.fill(values.front());
-  std::size_t i = 0;
-  for (; i + kLanes <= values.size(); i += kLanes) {
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      least[lane] = Least(least[lane], values[i + lane]);
-      most[lane] = Most(most[lane], values[i + lane]);
-    }
-  }
-  for (; i < values.size(); ++i) {
-    least[0] = Least(least[0], values[i]);
-    most[0] = Most(most[0], values[i]);
-  }
-  return {static_cast<double>(*std::min_element(least.begin(), least.end())),
-          static_cast<double>(*std::max_element(most.begin(), most.end()))};
+// The whole numbers n of [first, last] at which floor(x + n step + 1/2) may be 0 to count - 1.
+void CutSteps(double x, double step, int count, int* first, int* last) {
+  if (step == 0) return;
+  const double at_start = (-0.5 - x) / step, at_end = (count - 0.5 - x) / step;
+  *first = static_cast<int>(std::max<double>(*first, std::floor(std::min(at_start, at_end))));
+  *last = static_cast<int>(std::min<double>(*last, std::ceil(std::max(at_start, at_end))));
 }
 
 }  // namespace
 
-HoleFiller::HoleFiller(const DisparityMap& map, const DisparityBuffer& buffer,
-                       const Eigen::Vector2d& shift)
+SupportedPixels FindSupported(const DisparityMap& map, const std::vector<char>& is_surface) {
+  const int width_px = map.width_px, height_px = map.height_px;
+  const auto width = static_cast<std::size_t>(width_px);
+  SupportedPixels supported;
+  std::vector<char>& is_supported = supported.is_supported;
+  is_supported.assign(map.disparity.size(), 0);
+  // Three of a pixel's neighbours are in each of its cells.
+  for (std::size_t i = 0; i < is_surface.size(); ++i) {
+    if (is_surface[i] == 0) continue;
+    is_supported[i] = is_supported[i + 1] = 1;
+    is_supported[i + width] = is_supported[i + width + 1] = 1;
+  }
+  const auto same_surface = static_cast<float>(SurfaceTolerance(map));
+  const int needed = std::min(width_px, height_px) == 1 ? 1 : 2;
+  std::size_t i = 0;
+  for (int y = 0; y < height_px; ++y) {
+    for (int x = 0; x < width_px; ++x, ++i) {
+      const float disparity = map.disparity[i];
+      if (is_supported[i] == 0) {
+        int found = -1;  // itself
+        for (int v = std::max(y - 1, 0); v <= std::min(y + 1, height_px - 1); ++v) {
+          const float* const row = map.disparity.data() + static_cast<std::size_t>(v) * width;
+          for (int u = std::max(x - 1, 0); u <= std::min(x + 1, width_px - 1); ++u)
+            found += std::abs(row[u] - disparity) <= same_surface ? 1 : 0;
+        }
+        if (found < needed) continue;
+        is_supported[i] = 1;
+      }
+      supported.lowest = std::min(supported.lowest.value_or(disparity), disparity);
+    }
+  }
+  return supported;
+}
+
+HoleFiller::HoleFiller(const DisparityMap& map, const SupportedPixels& supported,
+                       const DisparityBuffer& buffer, const Eigen::Vector2d& shift)
     : map_(map),
+      supported_(supported),
       buffer_(buffer),
       shift_(shift),
       px_per_unit_(shift.cwiseAbs().maxCoeff()),
@@ -63,12 +83,10 @@ HoleFiller::HoleFiller(const DisparityMap& map, const DisparityBuffer& buffer,
       --count;
     }
   }
-  if (holes_.empty()) return;
-  const auto [low, high] = RangeOf(map.disparity);
   // Those that are longer than the picture lead out of it.
   const double longest = std::max(map.width_px, map.height_px);
-  first_step_ = std::clamp(std::floor(px_per_unit_ * low), -longest, longest);
-  last_step_ = std::clamp(std::floor(px_per_unit_ * high) + 1, -longest, longest);
+  first_step_ =
+      std::clamp(std::floor(px_per_unit_ * supported.lowest.value_or(0)), -longest, longest);
 }
 
 HoleFiller::Source HoleFiller::Background(int x, int y) {
@@ -110,13 +128,19 @@ HoleFiller::Sample HoleFiller::At(int x, int y, int steps) const {
 
 // The ray of the sample goes over the centre view's pixel at n steps where its own disparity is n
 // over the px per unit: from the far end on, it is behind the pixels, up to the one whose disparity
-// is below that. Beyond that pixel, away from the viewer, it is hidden from the centre for good.
+// is below that. Beyond that pixel, away from the viewer, it is hidden from the centre for good. A
+// pixel without support is no surface to pass in front of.
 std::optional<HoleFiller::Sample> HoleFiller::LastBefore(int x, int y) const {
-  const int last = static_cast<int>(last_step_);
-  for (int steps = static_cast<int>(first_step_); steps <= last; ++steps) {
+  if (!supported_.lowest) return std::nullopt;
+  int first = static_cast<int>(first_step_);
+  int last = std::max(map_.width_px, map_.height_px);
+  CutSteps(x, direction_.x(), buffer_.width_px(), &first, &last);
+  CutSteps(y, direction_.y(), buffer_.height_px(), &first, &last);
+  for (int steps = first; steps <= last; ++steps) {
     const Sample at = At(x, y, steps);
     if (!buffer_.IsInside(at.x, at.y)) continue;
-    if (px_per_unit_ * map_.disparity[buffer_.Index(at.x, at.y)] < steps) return at;
+    const std::size_t i = buffer_.Index(at.x, at.y);
+    if (supported_.is_supported[i] != 0 && px_per_unit_ * map_.disparity[i] < steps) return at;
   }
   return std::nullopt;
 }

@@ -11,6 +11,16 @@
 
 namespace thicklens::estimator {
 
+// What the centre view can be said to show for the holes of other views: pixels that are of a
+// surface with two of their neighbours (one in a picture a single pixel wide or high). Others may
+// be errors of the depth, before which rays would seem to pass.
+struct SupportedPixels {
+  std::vector<char> is_supported;
+  std::optional<float> lowest;  // of their disparities
+};
+// `is_surface`: of the cell below and to the right of each pixel, no jump.
+SupportedPixels FindSupported(const DisparityMap& map, const std::vector<char>& is_surface);
+
 // The samples of a view that nothing covers: what stands behind.
 class HoleFiller {
  public:
@@ -24,8 +34,9 @@ class HoleFiller {
   };
 
   // `map` is the centre view's, `buffer` what the view shows of it, `shift` the view's way from it,
-  // px per unit of disparity, not (0, 0). Map and buffer must outlive it.
-  HoleFiller(const DisparityMap& map, const DisparityBuffer& buffer, const Eigen::Vector2d& shift);
+  // px per unit of disparity, not (0, 0). All but the shift must outlive it.
+  HoleFiller(const DisparityMap& map, const SupportedPixels& supported,
+             const DisparityBuffer& buffer, const Eigen::Vector2d& shift);
 
   // Row by row.
   const std::vector<Sample>& holes() const { return holes_; }
@@ -47,14 +58,14 @@ class HoleFiller {
   void SpreadCovered();
 
   const DisparityMap& map_;
+  const SupportedPixels& supported_;
   const DisparityBuffer& buffer_;
   const Eigen::Vector2d shift_;
   const double px_per_unit_;         // of the larger part of the shift
   const Eigen::Vector2d direction_;  // of the shift, the larger part 1
   const float same_surface_;         // in the unit of the map
-  // Whole steps from the sample along the direction outside of which a ray is before, or behind,
-  // all of the map.
-  double first_step_ = 0, last_step_ = 0;
+  // Whole steps from the sample along the direction: before these a ray is behind all of the map.
+  double first_step_ = 0;
   std::vector<Sample> holes_;
   // Index of a covered sample for each hole and for those beside it; empty until it is needed.
   std::vector<int> closest_;

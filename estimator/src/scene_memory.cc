@@ -20,7 +20,7 @@ constexpr double kRenderedBytes = kFloat + 1 + 8;
 constexpr double kSmallBytes = 8 << 20;
 
 // Of all views in the making: the surfaces of the disparity.
-constexpr double kRendererBytes = 2;
+constexpr double kRendererBytes = 3;
 
 }  // namespace
 

@@ -47,6 +47,10 @@ std::unique_ptr<OpenClQueue> OpenClQueue::Clone() const {
   return std::make_unique<OpenClQueue>(device_, program_, memory_);
 }
 
+void OpenClQueue::Finish() {
+  Guarded(*device_, "queue", [&] { return queue_.finish(); });
+}
+
 void OpenClQueue::Settle() noexcept {
   try {
     queue_.finish();

@@ -28,6 +28,8 @@ class OpenClQueue {
   // Another queue on the same device and program, with its own kernels.
   std::unique_ptr<OpenClQueue> Clone() const;
 
+  // Waits until all that was sent is there for other queues as well.
+  void Finish();
   // Waits until nothing works in memory that is lent, whatever became of it.
   void Settle() noexcept;
   // Whether the device can have that much in one piece.

@@ -80,7 +80,9 @@ class OpenClWarp : public ViewWarp {
         picture_(picture),
         pixels_(Copied(queue_.get(), "picture of surfaces", PixelsOf(picture))),
         disparity_(Copied(queue_.get(), "disparity of a picture", *picture.disparity)),
-        ranges_(Copied(queue_.get(), "ranges of disparities", PairsOf(ranges))) {}
+        ranges_(Copied(queue_.get(), "ranges of disparities", PairsOf(ranges))) {
+    queue_->Finish();  // the queues that read the picture know nothing of this one's order
+  }
 
   void Warp(const ViewSources& view, std::vector<float>* values) override {
     CheckView(picture_, view);
@@ -88,7 +90,7 @@ class OpenClWarp : public ViewWarp {
                                     picture_.tolerance,
                                     static_cast<cl_float>(picture_.width_px + picture_.height_px)};
     // In place of an empty list, which OpenCL cannot have.
-    static const std::vector<HiddenSample> no_sample(1);
+    const std::vector<HiddenSample> no_sample(1);
     const std::vector<HiddenSample>& hidden = view.hidden->empty() ? no_sample : *view.hidden;
     const auto hidden_count = static_cast<int>(view.hidden->size());
     values->resize(picture_.values->size());

@@ -145,8 +145,8 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
     STORE_LANES((WHOLE)(row * picture.width_px) + sample_x, sample);
     const FLOATS seen =
         LoadSamples(view_disparity + (size_t)row * picture.width_px + first, count);
-    source_x = mad((FLOATS)shift.s0, seen, shift.s2 * seen);
-    source_y = mad((FLOATS)shift.s1, seen, shift.s3 * seen);
+    source_x = fma((FLOATS)shift.s0, seen, shift.s2 * seen);
+    source_y = fma((FLOATS)shift.s1, seen, shift.s3 * seen);
     STORE_LANES(seen, sample_disparity);
   } else {
     const int first = ((int)get_global_id(0) - items_in_row * picture.height_px) * LANES;

@@ -146,18 +146,30 @@ Sample Stepped(const Eigen::Vector2d& step, int x, int y, double steps) {
           static_cast<int>(std::floor(y + steps * step.y() + 0.5))};
 }
 
+// Whether two of the pixels around it are of its surface; one, where there is but a line of pixels.
+bool IsOfASurface(const DisparityMap& map, int x, int y) {
+  const double here = map.disparity[At(x, y, map.width_px)];
+  const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
+  int found = 0;
+  for (int v = y - 1; v <= y + 1; ++v) {
+    for (int u = x - 1; u <= x + 1; ++u) {
+      if (u < 0 || v < 0 || u >= map.width_px || v >= map.height_px || (u == x && v == y)) continue;
+      if (std::abs(map.disparity[At(u, v, map.width_px)] - here) <= tolerance) ++found;
+    }
+  }
+  return found >= std::min({2, map.width_px, map.height_px});
+}
+
 // The pixel of the centre view after which the ray of a sample is hidden for good: of those that it
-// passes before, the one at which it is farthest away. (-1, -1): none.
+// passes before, and that are of a surface, the one at which it is farthest away. (-1, -1): none.
 Sample LastPassed(const DisparityMap& map, const Eigen::Vector2d& shift, int x, int y) {
   const double per_unit = shift.cwiseAbs().maxCoeff();
   const int most = std::max(map.width_px, map.height_px);
   Sample last{-1, -1};
-  // Nearer than all of the map it passes nothing.
-  const double nearest = *std::max_element(map.disparity.begin(), map.disparity.end());
   for (int steps = most; steps >= -most; --steps) {
-    if (steps - 1 > per_unit * nearest) continue;
     const auto [xx, yy] = Stepped(shift / per_unit, x, y, steps);
     if (xx < 0 || yy < 0 || xx >= map.width_px || yy >= map.height_px) continue;
+    if (!IsOfASurface(map, xx, yy)) continue;
     if (steps > per_unit * map.disparity[At(xx, yy, map.width_px)]) last = {xx, yy};
   }
   return last;

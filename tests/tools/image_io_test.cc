@@ -51,7 +51,8 @@ TEST_P(PngRoundTrip, KeepsEveryValue) {
 
 INSTANTIATE_TEST_SUITE_P(ChannelsAndBits, PngRoundTrip,
                          ::testing::Values(std::array<int, 2>{1, 8}, std::array<int, 2>{1, 16},
-                                           std::array<int, 2>{3, 8}, std::array<int, 2>{3, 16}));
+                                           std::array<int, 2>{3, 8}, std::array<int, 2>{3, 16},
+                                           std::array<int, 2>{4, 8}, std::array<int, 2>{4, 16}));
 
 // A round trip alone would not see red and blue exchanged twice: OpenCV's own order is BGR.
 TEST(DecodePicture, GivesRedFirst) {
@@ -94,6 +95,16 @@ TEST(DecodePicture, RefusesATruncatedPng) {
 TEST(DecodePicture, RefusesFloats) {
   EXPECT_THAT(MessageOf(Encoded(cv::Mat(4, 4, CV_32F, cv::Scalar(0.5)), ".tiff")),
               AllOf(HasSubstr("8 or 16 bits"), HasSubstr("32 bits, float")));
+}
+
+// Not in the words of what fails inside.
+TEST(DecodePicture, SaysWhatIsExpectedOfABrokenFile) {
+  for (const std::string extension : {".ppm", ".bmp"}) {
+    std::string bytes = Encoded(cv::Mat(40, 40, CV_8UC3, cv::Scalar(1, 2, 3)), extension);
+    bytes.resize(bytes.size() / 2);
+    EXPECT_THAT(MessageOf(bytes), HasSubstr("cannot be decoded as a picture")) << extension;
+    EXPECT_THAT(MessageOf(bytes), HasSubstr("is expected")) << extension;
+  }
 }
 
 TEST(ReadPictureFile, NamesTheMissingFile) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <spng.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -178,13 +179,51 @@ TEST(PngPixels, TellWhatIsWrong) {
   EXPECT_NE(why, "");
 }
 
+std::string BigEndian(std::size_t value) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 0xFFU);
+  return bytes;
+}
+
+std::string Chunk(const std::string& type, const std::string& content) {
+  const std::string checked = type + content;
+  const uLong checksum =
+      crc32(0, reinterpret_cast<const Bytef*>(checked.data()), static_cast<uInt>(checked.size()));
+  return BigEndian(content.size()) + checked + BigEndian(checksum);
+}
+
+constexpr std::size_t kAfterHeader = 33;
+
 TEST(PngPixels, RefusesSidesThatNoPictureHas) {
-  std::string bytes = EncodePngPixels(RandomPicture({8, 8}, CV_8UC1, 6), PngPacking::kFast);
-  std::vector<unsigned char> wide(bytes.begin(), bytes.end());
-  for (const std::size_t at : {17U, 21U}) wide[at] = 1;  // 65544 x 65544 px, the checksum wrong
-  std::string why;
-  EXPECT_TRUE(DecodePngPixels({wide.begin(), wide.end()}, &why).empty());
-  EXPECT_NE(why, "");
+  const std::string bytes = EncodePngPixels(RandomPicture({8, 8}, CV_8UC1, 6), PngPacking::kFast);
+  for (const std::size_t side : {std::size_t{65536}, std::size_t{1} << 21}) {
+    std::string header = bytes.substr(16, 13);
+    header.replace(0, 8, BigEndian(side) + BigEndian(side));
+    const std::string large =
+        bytes.substr(0, 8) + Chunk("IHDR", header) + bytes.substr(kAfterHeader);
+    std::string why;
+    EXPECT_TRUE(DecodePngPixels(large, &why).empty());
+    EXPECT_TRUE(why.find("more than") != std::string::npos ||
+                why.find("width") != std::string::npos)
+        << why;
+  }
+}
+
+// Texts that unpack to a lot, many of them, empty ones, and a palette that is but a suggestion.
+TEST(PngPixels, AreReadWhateverStandsBesideThem) {
+  const cv::Mat picture = RandomPicture({9, 5}, CV_8UC3, 8);
+  const std::string bytes = EncodePngPixels(picture, PngPacking::kFast);
+  std::string many;
+  for (int i = 0; i < 20000; ++i) many += Chunk("tEXt", std::string("a\0b", 3));
+  const std::string large(std::size_t{70} << 20, 'x');
+  for (const std::string& beside :
+       {many, Chunk("tEXt", std::string("a\0", 2) + large), Chunk("eXIf", ""), Chunk("PLTE", "ab"),
+        Chunk("iCCP", "nothing"), Chunk("tIME", "x")}) {
+    std::string with = bytes;
+    with.insert(kAfterHeader, beside);
+    std::string why;
+    EXPECT_TRUE(AreEqual(DecodePngPixels(with, &why), picture)) << beside.substr(4, 4) << why;
+  }
 }
 
 }  // namespace

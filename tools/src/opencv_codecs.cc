@@ -20,9 +20,8 @@ const OpenCvCodecs* Load() {
   if (entry != nullptr) return entry();
   const char* const why = dlerror();
   throw Error(
-      fmt::format("{}: the part of the program that reads JPEG, TIFF, EXR, BMP and PNM files and "
-                  "writes JPEG cannot be loaded{}{}; it must lie where thicklens was built or "
-                  "installed, or the picture be a PNG file",
+      fmt::format("what reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG, {}, cannot be "
+                  "loaded{}{}: is it where thicklens was built or installed?",
                   kLibrary, why == nullptr ? "" : ": ", why == nullptr ? "" : why));
 }
 

@@ -8,11 +8,15 @@
 namespace thicklens::tools {
 namespace {
 
-// OpenCV keeps colours as BGR; the project as RGB.
+// OpenCV keeps colours as BGR; the project as RGB. Of depths that nobody asked for it is not known
+// how to; they are told by their type.
 cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
-  if (picture.channels() != 3 && picture.channels() != 4) return picture;
+  const int channels = picture.channels(), depth = picture.depth();
+  const bool has_colours = channels == 3 || channels == 4;
+  const bool is_known = depth == CV_8U || depth == CV_16U || depth == CV_32F;
+  if (picture.empty() || !has_colours || !is_known) return picture;
   cv::Mat swapped;
-  cv::cvtColor(picture, swapped, picture.channels() == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
+  cv::cvtColor(picture, swapped, channels == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
   return swapped;
 }
 

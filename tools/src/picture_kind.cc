@@ -313,7 +313,13 @@ cv::Mat DecodeUnchanged(const std::string& bytes, const std::string& name,
   RequireWholePng(bytes, name);
   RequirePossibleSize(bytes, *kind, name);
   if (*kind == PictureKind::kPng) return DecodePngPixels(bytes, why);
-  return LoadedOpenCvCodecs().decode(bytes, why);
+  const OpenCvCodecs* codecs = nullptr;
+  try {
+    codecs = &LoadedOpenCvCodecs();
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", name, error.what()));
+  }
+  return codecs->decode(bytes, why);
 }
 
 }  // namespace thicklens::tools

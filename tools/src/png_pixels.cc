@@ -14,10 +14,9 @@
 namespace thicklens::tools {
 namespace {
 
-// What a picture may have at most; sides and texts beyond are a broken header.
+// What a picture may have at most; more is a broken header.
 constexpr std::uint32_t kMostSidePx = 1 << 20;
 constexpr double kMostPixels = 1 << 30;
-constexpr std::size_t kMostChunkBytes = std::size_t{64} << 20;
 
 struct FreeContext {
   void operator()(spng_ctx* context) const { spng_ctx_free(context); }
@@ -35,6 +34,30 @@ struct Decoding {
   int channels = 1;
   int depth = CV_8U;
 };
+
+// The file without what does not say how its pixels look: texts, which unpack to anything,
+// profiles, and a palette that is only suggested. As it is, where it is no whole PNG file.
+std::string WithoutTexts(const std::string& bytes) {
+  constexpr std::size_t kSignature = 8, kFrame = 12;  // length, type, checksum
+  constexpr std::size_t kColourTypeAt = 25;
+  if (bytes.size() <= kColourTypeAt) return bytes;
+  const bool is_indexed = bytes[kColourTypeAt] == SPNG_COLOR_TYPE_INDEXED;
+  std::string kept = bytes.substr(0, kSignature);
+  for (std::size_t at = kSignature; at < bytes.size();) {
+    if (bytes.size() - at < kFrame) return bytes;
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      length = length << 8 | static_cast<std::uint8_t>(bytes[at + i]);
+    if (bytes.size() - at - kFrame < length) return bytes;
+    const std::string type = bytes.substr(at + 4, 4);
+    const bool is_critical = (static_cast<std::uint8_t>(type[0]) & 0x20U) == 0;
+    if (type == "tRNS" || (is_critical && (type != "PLTE" || is_indexed)))
+      kept.append(bytes, at, kFrame + length);
+    at += kFrame + length;
+    if (type == "IEND") break;
+  }
+  return kept;
+}
 
 Decoding DecodingOf(const spng_ihdr& header, bool has_transparency) {
   const int depth = header.bit_depth == 16 ? CV_16U : CV_8U;
@@ -75,6 +98,7 @@ Effort EffortOf(PngPacking packing) {
 }  // namespace
 
 cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
+  const std::string pixels = WithoutTexts(bytes);
   const Context context(spng_ctx_new(0));
   int error = context == nullptr ? SPNG_EMEM : SPNG_OK;
   const auto works = [&](int code) {
@@ -84,8 +108,7 @@ cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
   spng_ihdr header{};
   cv::Mat picture;
   if (error == SPNG_OK && works(spng_set_image_limits(context.get(), kMostSidePx, kMostSidePx)) &&
-      works(spng_set_chunk_limits(context.get(), kMostChunkBytes, kMostChunkBytes)) &&
-      works(spng_set_png_buffer(context.get(), bytes.data(), bytes.size())) &&
+      works(spng_set_png_buffer(context.get(), pixels.data(), pixels.size())) &&
       works(spng_get_ihdr(context.get(), &header))) {
     if (static_cast<double>(header.width) * header.height > kMostPixels) {
       *why = fmt::format("{}x{} px are more than the {:.0f} that a picture may have", header.width,

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "thicklens/kernels/view_warp.h"
@@ -63,8 +64,8 @@ struct ViewDisparity {
   std::vector<float> disparity;  // in the unit of the DisparityMap
   std::vector<Seen> seen;
   // Where in the centre view the sample's source is, px: sample + (source_x, source_y). For kSeen
-  // the displacement is disparity * (a step.x, b step.y); for kHidden it leads to the source of the
-  // background sample that fills it: that sample's own displacement, and the way to that sample.
+  // the displacement is disparity * (a step.x, b step.y); for kHidden it leads to the background:
+  // the source of the sample that shows it, or a pixel of the centre view.
   // May lead outside of the picture by rounding; readers cut it.
   std::vector<float> source_x, source_y;
 };
@@ -90,13 +91,15 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // of the centre picture as well. The ray of such a sample x goes over the centre view's pixel at
 // x + D (a step.x, b step.y) at the disparity D, from near to far, looked at in whole px of the
 // larger part: the last pixel before which it passes belongs to the edge behind which it is hidden
-// from the centre, and that pixel's surface (to .3 px per view step) stands behind. They walk both
-// ways along the displacement to the first covered sample and take the closer one that shows this
-// surface; where neither does, the pixel itself. A ray that passes before none takes the farther of
-// the two, or the only one; where there is none, the closest in any direction; where nothing of the
-// picture is in the view, the centre view's own sample. (0, 0) gives the map itself. Throws Error
-// if the map has holes.
+// from the centre, and that pixel's surface (to .3 px per view step) stands behind. Pixels of whose
+// surface there are no two beside them do not count. They walk both ways along the displacement to
+// the first covered sample and take the closer one that shows this surface; where neither does, the
+// pixel itself. A ray that passes before none takes the farther of the two, or the only one; where
+// there is none, the closest in any direction; where nothing of the picture is in the view, the
+// centre view's own sample. (0, 0) gives the map itself. Throws Error if the map has holes.
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
+
+struct SupportedPixels;  // hole_filler.h
 
 // RenderDisparity for many views of one map: what all of them need is found once. Read by many
 // threads.
@@ -113,6 +116,7 @@ class DisparityRenderer {
   const DisparityMap& map_;
   std::vector<char> is_surface_;  // of the cell below and to the right of each pixel: no jump
   std::vector<int> alone_;        // indices of the pixels at a jump, which are squares
+  std::shared_ptr<const SupportedPixels> supported_;
 };
 
 // The picture warped to that view by its depth (with the blurred photograph: depth-image-based
