@@ -85,14 +85,14 @@ HoleFiller::HoleFiller(const DisparityMap& map, const SupportedPixels& supported
   }
   // Those that are longer than the picture lead out of it.
   const double longest = std::max(map.width_px, map.height_px);
-  first_step_ =
-      std::clamp(std::floor(px_per_unit_ * supported.lowest.value_or(0)), -longest, longest);
+  first_step_ = static_cast<int>(
+      std::clamp(std::floor(px_per_unit_ * supported.lowest.value_or(0)), -longest, longest));
 }
 
 HoleFiller::Source HoleFiller::Background(int x, int y) {
   const Sample hole{x, y};
-  std::optional<Found> ahead = Walk(x, y, 1);
-  std::optional<Found> back = Walk(x, y, -1);
+  const std::optional<Found> ahead = Walk(x, y, 1);
+  const std::optional<Found> back = Walk(x, y, -1);
   if (const std::optional<Sample> last = LastBefore(x, y)) {
     const float disparity = map_.disparity[buffer_.Index(last->x, last->y)];
     const auto is_its_surface = [&](const std::optional<Found>& found) {
@@ -132,7 +132,7 @@ HoleFiller::Sample HoleFiller::At(int x, int y, int steps) const {
 // pixel without support is no surface to pass in front of.
 std::optional<HoleFiller::Sample> HoleFiller::LastBefore(int x, int y) const {
   if (!supported_.lowest) return std::nullopt;
-  int first = static_cast<int>(first_step_);
+  int first = first_step_;
   int last = std::max(map_.width_px, map_.height_px);
   CutSteps(x, direction_.x(), buffer_.width_px(), &first, &last);
   CutSteps(y, direction_.y(), buffer_.height_px(), &first, &last);

@@ -65,7 +65,7 @@ class HoleFiller {
   const Eigen::Vector2d direction_;  // of the shift, the larger part 1
   const float same_surface_;         // in the unit of the map
   // Whole steps from the sample along the direction: before these a ray is behind all of the map.
-  double first_step_ = 0;
+  int first_step_ = 0;
   std::vector<Sample> holes_;
   // Index of a covered sample for each hole and for those beside it; empty until it is needed.
   std::vector<int> closest_;

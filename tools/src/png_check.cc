@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 
 #include "thicklens/error.h"
 
@@ -15,7 +16,8 @@ namespace {
 constexpr char kSignature[] = "\x89PNG\r\n\x1A\n";
 constexpr std::size_t kSignatureBytes = 8;
 constexpr std::size_t kLengthBytes = 4, kTypeBytes = 4, kCrcBytes = 4;
-constexpr std::size_t kBitsAt = 24;  // in the first chunk, IHDR
+constexpr std::size_t kFrame = kLengthBytes + kTypeBytes + kCrcBytes;
+constexpr std::size_t kBitsAt = 24, kColourTypeAt = 25;  // in the first chunk, IHDR
 
 bool IsPng(const std::string& bytes) {
   return bytes.compare(0, kSignatureBytes, kSignature, kSignatureBytes) == 0;
@@ -46,6 +48,15 @@ std::uint32_t Crc(const std::string& bytes, std::size_t begin, std::size_t end) 
   return ~crc;
 }
 
+// The bytes of the content of the chunk that begins there; absent if the file ends before the
+// chunk.
+std::optional<std::size_t> ContentBytes(const std::string& bytes, std::size_t at) {
+  const std::size_t left = bytes.size() - at;
+  if (left < kFrame) return std::nullopt;
+  const std::size_t length = BigEndian(bytes, at);
+  return left - kFrame < length ? std::nullopt : std::optional(length);
+}
+
 std::string BigEndianBytes(std::uint32_t value) {
   std::string bytes;
   for (int shift = 24; shift >= 0; shift -= 8)
@@ -58,16 +69,14 @@ std::string BigEndianBytes(std::uint32_t value) {
 void RequireWholePng(const std::string& bytes, const std::string& name) {
   if (!IsPng(bytes)) return;
   for (std::size_t at = kSignatureBytes;;) {
-    const std::size_t left = bytes.size() - at;
-    constexpr std::size_t kFrame = kLengthBytes + kTypeBytes + kCrcBytes;
-    const std::size_t length = left >= kFrame ? BigEndian(bytes, at) : 0;
-    if (left < kFrame || left - kFrame < length) {
+    const std::optional<std::size_t> length = ContentBytes(bytes, at);
+    if (!length) {
       throw Error(
           fmt::format("{}: broken PNG: it ends after {} bytes, in the middle of the picture", name,
                       bytes.size()));
     }
     const std::size_t type_at = at + kLengthBytes;
-    const std::size_t crc_at = type_at + kTypeBytes + length;
+    const std::size_t crc_at = type_at + kTypeBytes + *length;
     if (Crc(bytes, type_at, crc_at) != BigEndian(bytes, crc_at)) {
       throw Error(
           fmt::format("{}: broken PNG: the checksum of the chunk at byte {} is wrong", name, at));
@@ -75,6 +84,24 @@ void RequireWholePng(const std::string& bytes, const std::string& name) {
     if (bytes.compare(type_at, kTypeBytes, "IEND") == 0) return;
     at = crc_at + kCrcBytes;
   }
+}
+
+std::string WithoutPngTexts(const std::string& bytes) {
+  if (!IsPng(bytes) || bytes.size() <= kColourTypeAt) return bytes;
+  constexpr char kIndexed = 3;
+  std::string kept(bytes, 0, kSignatureBytes);
+  for (std::size_t at = kSignatureBytes; at < bytes.size();) {
+    const std::optional<std::size_t> length = ContentBytes(bytes, at);
+    if (!length) return bytes;
+    const std::string type(bytes, at + kLengthBytes, kTypeBytes);
+    constexpr unsigned kAncillary = 0x20;
+    const bool is_critical = (static_cast<std::uint8_t>(type[0]) & kAncillary) == 0;
+    const bool is_suggested = type == "PLTE" && bytes[kColourTypeAt] != kIndexed;
+    if (type == "tRNS" || (is_critical && !is_suggested)) kept.append(bytes, at, kFrame + *length);
+    if (type == "IEND") break;
+    at += kFrame + *length;
+  }
+  return kept;
 }
 
 int PngBits(const std::string& bytes) {

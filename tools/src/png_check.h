@@ -6,9 +6,14 @@
 namespace thicklens::tools {
 
 // Throws Error that begins with `name` if the bytes are a PNG file that ends early or of which a
-// chunk is damaged; other files pass. To be called before such a file is decoded: libpng tells what
-// it finds on stderr, in its own words and without the file's name.
+// chunk is damaged; other files pass. To be called before such a file is decoded: decoders do not
+// know the file's name, nor where the chunk is.
 void RequireWholePng(const std::string& bytes, const std::string& name);
+
+// A PNG file without what does not say how its pixels look: texts, which unpack to anything,
+// profiles, and a palette that is only suggested. Other files, and those that end early, as they
+// are.
+std::string WithoutPngTexts(const std::string& bytes);
 
 // Bits a value of a PNG file; 0 for other files.
 int PngBits(const std::string& bytes);

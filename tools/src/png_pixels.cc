@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <memory>
 
+#include "png_check.h"
 #include "thicklens/error.h"
 
 namespace thicklens::tools {
@@ -35,30 +36,6 @@ struct Decoding {
   int depth = CV_8U;
 };
 
-// The file without what does not say how its pixels look: texts, which unpack to anything,
-// profiles, and a palette that is only suggested. As it is, where it is no whole PNG file.
-std::string WithoutTexts(const std::string& bytes) {
-  constexpr std::size_t kSignature = 8, kFrame = 12;  // length, type, checksum
-  constexpr std::size_t kColourTypeAt = 25;
-  if (bytes.size() <= kColourTypeAt) return bytes;
-  const bool is_indexed = bytes[kColourTypeAt] == SPNG_COLOR_TYPE_INDEXED;
-  std::string kept = bytes.substr(0, kSignature);
-  for (std::size_t at = kSignature; at < bytes.size();) {
-    if (bytes.size() - at < kFrame) return bytes;
-    std::size_t length = 0;
-    for (std::size_t i = 0; i < 4; ++i)
-      length = length << 8 | static_cast<std::uint8_t>(bytes[at + i]);
-    if (bytes.size() - at - kFrame < length) return bytes;
-    const std::string type = bytes.substr(at + 4, 4);
-    const bool is_critical = (static_cast<std::uint8_t>(type[0]) & 0x20U) == 0;
-    if (type == "tRNS" || (is_critical && (type != "PLTE" || is_indexed)))
-      kept.append(bytes, at, kFrame + length);
-    at += kFrame + length;
-    if (type == "IEND") break;
-  }
-  return kept;
-}
-
 Decoding DecodingOf(const spng_ihdr& header, bool has_transparency) {
   const int depth = header.bit_depth == 16 ? CV_16U : CV_8U;
   const int with_alpha = depth == CV_16U ? SPNG_FMT_RGBA16 : SPNG_FMT_RGBA8;
@@ -82,7 +59,7 @@ struct Effort {
   int filters, level, strategy;
 };
 
-// Measured on views, photographs and confidences: of 16 bits noise is all that compression meets.
+// Of 16 bits noise is all that compression meets.
 Effort EffortOf(PngPacking packing) {
   switch (packing) {
     case PngPacking::kFast:
@@ -98,7 +75,7 @@ Effort EffortOf(PngPacking packing) {
 }  // namespace
 
 cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
-  const std::string pixels = WithoutTexts(bytes);
+  const std::string pixels = WithoutPngTexts(bytes);
   const Context context(spng_ctx_new(0));
   int error = context == nullptr ? SPNG_EMEM : SPNG_OK;
   const auto works = [&](int code) {

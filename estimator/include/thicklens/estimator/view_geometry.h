@@ -92,11 +92,12 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // x + D (a step.x, b step.y) at the disparity D, from near to far, looked at in whole px of the
 // larger part: the last pixel before which it passes belongs to the edge behind which it is hidden
 // from the centre, and that pixel's surface (to .3 px per view step) stands behind. Pixels of whose
-// surface there are no two beside them do not count. They walk both ways along the displacement to
-// the first covered sample and take the closer one that shows this surface; where neither does, the
-// pixel itself. A ray that passes before none takes the farther of the two, or the only one; where
-// there is none, the closest in any direction; where nothing of the picture is in the view, the
-// centre view's own sample. (0, 0) gives the map itself. Throws Error if the map has holes.
+// surface there are no two beside them do not count. The samples walk both ways along the
+// displacement to the first covered sample and take the closer one that shows this surface; where
+// neither does, the pixel itself. A ray that passes before none takes the farther of the two, or
+// the only one; where there is none, the closest in any direction; where nothing of the picture is
+// in the view, the centre view's own sample. (0, 0) gives the map itself. Throws Error if the map
+// has holes.
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
 struct SupportedPixels;  // hole_filler.h
