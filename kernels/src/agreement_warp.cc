@@ -48,8 +48,14 @@ void CompareWarp(Backend* device, Worst* worst) {
           if (i % 2 == 0) hidden.back().source_x = 1;
           seen[i] = std::numeric_limits<float>::quiet_NaN();
         }
+        std::vector<MixedSample> mixed;
+        for (std::size_t i = 1; i < seen.size(); i += 4) {
+          mixed.push_back({static_cast<std::int32_t>(i),
+                           {0, source_x[i], source_y[i], (*surface)[i]},
+                           static_cast<float>(numbers.Between(0, 1))});
+        }
         const ViewSources view{&seen, static_cast<float>(shift_x), static_cast<float>(shift_y),
-                               &hidden};
+                               &hidden, &mixed};
         std::vector<float> of_device, of_twin;
         found->Warp(view, &of_device);
         right->Warp(view, &of_twin);

@@ -111,12 +111,13 @@ cl::Event OpenClQueue::SendHome(const std::string& what, const cl::Buffer& buffe
   });
 }
 
-DeviceArray::DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes)
+DeviceArray::DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes,
+                         Holds holds)
     : queue_(queue),
       what_(what),
       data_(data),
       bytes_(bytes),
-      buffer_(queue->NewBuffer(what, data, bytes, true, true)) {}
+      buffer_(queue->NewBuffer(what, data, bytes, holds == Holds::kData, true)) {}
 
 void DeviceArray::BringHome() {
   const cl::Event sent = queue_->SendHome(what_, buffer_, data_, bytes_);

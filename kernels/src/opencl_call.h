@@ -63,7 +63,12 @@ class OpenClQueue {
 // and is not to be touched before BringHome.
 class DeviceArray {
  public:
-  DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes);
+  enum class Holds {
+    kData,     // what is at home
+    kNothing,  // until a kernel has written every element
+  };
+  DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes,
+              Holds holds = Holds::kData);
   // Waits for calls that still work in it: an error may have come between.
   ~DeviceArray() { queue_->Settle(); }
   DeviceArray(const DeviceArray&) = default;
@@ -138,7 +143,8 @@ class OpenClCall {
 
   // Returns when all is done and the outputs are at home.
   void Run(std::size_t items);
-  // Returns at once; what is called or read later waits. All arrays must be on the device.
+  // Returns at once; what is called or read later waits. No array may be an output, and inputs must
+  // stay until the queue is done.
   void Enqueue(std::size_t items);
   // Of so many items.
   std::size_t Groups(std::size_t items) const;

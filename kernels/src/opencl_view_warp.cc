@@ -60,6 +60,7 @@ cl_float4 ShiftOf(const ViewSources& view) {
 }
 
 static_assert(sizeof(HiddenSample) == 16, "Hidden in warp.cl");
+static_assert(sizeof(MixedSample) == 24, "Mixed in warp.cl");
 
 // Least, largest, pixel by pixel.
 std::vector<float> PairsOf(const TapRanges& ranges) {
@@ -95,6 +96,8 @@ class OpenClWarp : public ViewWarp {
     const auto hidden_count = static_cast<int>(view.hidden->size());
     values->resize(picture_.values->size());
     std::unique_ptr<OpenClQueue> queue = TakeQueue();
+    DeviceArray made(queue.get(), "view", values->data(), values->size() * sizeof(float),
+                     DeviceArray::Holds::kNothing);
     OpenClCall(queue.get(), "WarpView")
         .Value(surfaces)
         .OnDevice(pixels_)
@@ -104,8 +107,19 @@ class OpenClWarp : public ViewWarp {
         .Value(ShiftOf(view))
         .Input("hidden samples of a view", hidden)
         .Value(static_cast<cl_int>(hidden_count))
-        .Output("view", values)
-        .Run(ItemsOf(picture_.width_px) * Index(picture_.height_px) + ItemsOf(hidden_count));
+        .OnDevice(made)
+        .Enqueue(ItemsOf(picture_.width_px) * Index(picture_.height_px) + ItemsOf(hidden_count));
+    if (view.mixed != nullptr && !view.mixed->empty()) {
+      OpenClCall(queue.get(), "MixSamples")
+          .Value(surfaces)
+          .OnDevice(pixels_)
+          .OnDevice(disparity_)
+          .Input("mixed samples of a view", *view.mixed)
+          .Value(static_cast<cl_int>(view.mixed->size()))
+          .OnDevice(made)
+          .Enqueue(view.mixed->size());
+    }
+    made.BringHome();
     const std::lock_guard<std::mutex> lock(mutex_);
     spare_queues_.push_back(std::move(queue));
   }

@@ -57,16 +57,15 @@ class ReferenceWarp : public ViewWarp {
     for (const HiddenSample& hidden : *view.hidden) {
       ReadSample(Index(hidden.index), hidden.source_x, hidden.source_y, hidden.disparity, values);
     }
+    if (view.mixed == nullptr) return;
+    for (const MixedSample& mixed : *view.mixed) MixInto(mixed, values);
   }
 
  private:
   void ReadSample(std::size_t sample, float source_x, float source_y, float disparity,
                   std::vector<float>* values) const {
-    const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
-    const int x = static_cast<int>(sample % Index(picture_.width_px));
-    const int y = static_cast<int>(sample / Index(picture_.width_px));
-    const Place across = PlaceAt(x, source_x, picture_.width_px, limit_px);
-    const Place down = PlaceAt(y, source_y, picture_.height_px, limit_px);
+    const SourcePlace source = PlaceOf(sample, source_x, source_y);
+    const Place &across = source.across, &down = source.down;
     const std::size_t there = At(across.pixel, down.pixel);
     const bool cubic = IsOnSurface(ranges_.lowest[there], disparity) &&
                        IsOnSurface(ranges_.highest[there], disparity);
@@ -74,6 +73,27 @@ class ReferenceWarp : public ViewWarp {
       (*values)[sample * Index(picture_.channels) + Index(channel)] =
           cubic ? Cubic(across, down, channel) : Linear(across, down, disparity, channel);
     }
+  }
+
+  void MixInto(const MixedSample& mixed, std::vector<float>* values) const {
+    const std::size_t sample = Index(mixed.index);
+    const SourcePlace source = PlaceOf(sample, mixed.other.source_x, mixed.other.source_y);
+    for (int channel = 0; channel < picture_.channels; ++channel) {
+      float& value = (*values)[sample * Index(picture_.channels) + Index(channel)];
+      const float other = Linear(source.across, source.down, mixed.other.disparity, channel);
+      value += mixed.share * (other - value);
+    }
+  }
+
+  struct SourcePlace {
+    Place across, down;
+  };
+  SourcePlace PlaceOf(std::size_t sample, float source_x, float source_y) const {
+    const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
+    const int x = static_cast<int>(sample % Index(picture_.width_px));
+    const int y = static_cast<int>(sample / Index(picture_.width_px));
+    return {PlaceAt(x, source_x, picture_.width_px, limit_px),
+            PlaceAt(y, source_y, picture_.height_px, limit_px)};
   }
 
   std::size_t At(int x, int y) const {
@@ -147,6 +167,26 @@ void CheckPicture(const SurfacePicture& picture) {
   }
 }
 
+namespace {
+
+void CheckMixed(const std::vector<MixedSample>& mixed, std::size_t pixels) {
+  std::int32_t before = -1;  // else two items of a device would write one sample
+  for (const MixedSample& one : mixed) {
+    if (one.index <= before || Index(one.index) >= pixels) {
+      throw Error(
+          fmt::format("mixed sample of a view has the index {} after {}: indices must grow "
+                      "from 0 to {} at most",
+                      one.index, before, pixels - 1));
+    }
+    before = one.index;
+    if (one.share >= 0 && one.share <= 1) continue;
+    throw Error(fmt::format("mixed sample {} of a view has the share {}: it must be 0 to 1",
+                            one.index, one.share));
+  }
+}
+
+}  // namespace
+
 void CheckView(const SurfacePicture& picture, const ViewSources& view) {
   CheckCount("disparity of a view", view.disparity, PixelsOf(picture));
   for (const double shift : {view.shift_x, view.shift_y}) {
@@ -167,6 +207,7 @@ void CheckView(const SurfacePicture& picture, const ViewSources& view) {
                     "seen: it must be NaN there",
                     hidden.index, seen));
   }
+  if (view.mixed != nullptr) CheckMixed(*view.mixed, PixelsOf(picture));
 }
 
 TapRanges TapRangesOf(const SurfacePicture& picture) {

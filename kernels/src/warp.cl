@@ -30,6 +30,13 @@ typedef struct {
   float source_x, source_y, disparity;
 } Hidden;
 
+// MixedSample.
+typedef struct {
+  int index;
+  Hidden other;
+  float share;
+} Mixed;
+
 // The pixels before the places of samples on a line, and the rests of the ways to the next.
 WHOLE PixelsBefore(WHOLE sample, FLOATS source, int count, float limit_px, FLOATS* rest) {
   const FLOATS way = clamp(source, -limit_px, limit_px);
@@ -216,6 +223,42 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
       StoreChannels(share.s0 * tap[0] + share.s1 * tap[1] + share.s2 * tap[stride] +
                         share.s3 * tap[stride + 1],
                     picture.channels - c, to + c);
+    }
+  }
+}
+
+// One item a sample whose pixel two surfaces share; after WarpView.
+kernel void MixSamples(const Surfaces picture, global const float* pixels,
+                       global const float* disparity, global const Mixed* mixed, const int count,
+                       global float* values) {
+  if ((int)get_global_id(0) >= count) return;
+  const Mixed one = mixed[get_global_id(0)];
+  const float source_x = clamp(one.other.source_x, -picture.limit_px, picture.limit_px);
+  const float source_y = clamp(one.other.source_y, -picture.limit_px, picture.limit_px);
+  const int at_x = one.index % picture.width_px + (int)floor(source_x);
+  const int at_y = one.index / picture.width_px + (int)floor(source_y);
+  const int x = clamp(at_x, 0, picture.width_px - 1);
+  const int y = clamp(at_y, 0, picture.height_px - 1);
+  const float rest_x = at_x == x && x < picture.width_px - 1 ? source_x - floor(source_x) : 0;
+  const float rest_y = at_y == y && y < picture.height_px - 1 ? source_y - floor(source_y) : 0;
+  const float4 share = Shares(picture, disparity, x, y, rest_x, rest_y, one.other.disparity);
+  const int stride = picture.width_px + 3;
+  const int plane = stride * (picture.height_px + 3);
+  const int there = (y + 1) * stride + x + 1;
+  global float* to = values + (size_t)one.index * picture.channels;
+  if (picture.channels == 1) {
+    global const float* tap = pixels + there;
+    const float value = dot(share, (float4)(tap[0], tap[1], tap[stride], tap[stride + 1]));
+    *to += one.share * (value - *to);
+    return;
+  }
+  global const float4* tap = (global const float4*)pixels + there;
+  for (int c = 0; c < picture.channels; c += 4, tap += plane) {
+    const float4 value = share.s0 * tap[0] + share.s1 * tap[1] + share.s2 * tap[stride] +
+                         share.s3 * tap[stride + 1];
+    const float of_four[4] = {value.s0, value.s1, value.s2, value.s3};
+    for (int n = 0; n < min(4, picture.channels - c); ++n) {
+      to[c + n] += one.share * (of_four[n] - to[c + n]);
     }
   }
 }

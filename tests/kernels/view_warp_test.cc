@@ -59,7 +59,8 @@ class ViewWarpTest : public ::testing::TestWithParam<Form> {
   std::vector<float> Warp(int channels = 1) {
     picture_ = {kW, kH, channels, &values_, &disparity_, 0.3F};
     std::vector<float> values;
-    NewWarp(GetParam(), picture_)->Warp({&of_view_, shift_x_, shift_y_, &hidden_}, &values);
+    NewWarp(GetParam(), picture_)
+        ->Warp({&of_view_, shift_x_, shift_y_, &hidden_, &mixed_}, &values);
     return values;
   }
   void Hide(std::size_t i, float source_x, float source_y) {
@@ -92,6 +93,7 @@ class ViewWarpTest : public ::testing::TestWithParam<Form> {
   std::vector<float> of_view_ = std::vector<float>(kPixels, 0.0F);
   double shift_x_ = 0, shift_y_ = 0;
   std::vector<HiddenSample> hidden_;
+  std::vector<MixedSample> mixed_;
   SurfacePicture picture_;
 };
 INSTANTIATE_TEST_SUITE_P(Twin, ViewWarpTest, ::testing::Values(Form::kTwin));
@@ -138,6 +140,40 @@ TEST_P(ViewWarpTest, ReadsHiddenSamplesWhereTheyAre) {
   EXPECT_EQ(warped[At(1, 0)], values_[At(2, 0)]);
   EXPECT_EQ(warped[At(5, 5)], values_[At(6, 5)]);
   EXPECT_EQ(warped[At(10, 8)], values_[At(11, 8)]);
+}
+
+TEST_P(ViewWarpTest, MixesWhatStandsAtAnotherPlaceIntoASample) {
+  for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
+  Flatten(2);
+  disparity_[At(9, 6)] = 0;
+  shift_x_ = 0.5;  // one pixel
+  Hide(At(4, 5), 5, 1);
+  hidden_.back().disparity = 0;
+  const auto mix = [&](std::size_t at, float source_x, float source_y, float disparity,
+                       float share) {
+    mixed_.push_back({static_cast<std::int32_t>(at), {0, source_x, source_y, disparity}, share});
+  };
+  mix(At(0, 0), 3.25F, 2.5F, 2, 0.25F);  // linear between four
+  mix(At(2, 2), -400, 3, 2, 1);          // cut to the picture
+  mix(At(4, 5), 1, 0, 2, 0.75F);         // into a hidden one
+  mix(At(8, 6), 0.5F, 0, 0, 0.5F);       // the one of two that is of its surface
+  mix(At(11, 8), 0.5F, 0.5F, 2, 0);      // nothing
+  const std::vector<float> plain = [&] {
+    const std::vector<MixedSample> mixed = std::exchange(mixed_, {});
+    std::vector<float> values = Warp();
+    mixed_ = mixed;
+    return values;
+  }();
+  std::vector<float> expected = plain;
+  const auto share = [&](std::size_t at, float other, float of_it) {
+    expected[at] = (1 - of_it) * plain[at] + of_it * other;
+  };
+  const auto w = static_cast<float>(kW);
+  share(At(0, 0), 3.25F + 2.5F * w, 0.25F);
+  share(At(2, 2), values_[At(0, 5)], 1);
+  share(At(4, 5), values_[At(5, 5)], 0.75F);
+  share(At(8, 6), values_[At(9, 6)], 0.5F);
+  EXPECT_THAT(Warp(), ::testing::Pointwise(FloatNear(1e-5F), expected));
 }
 
 // Rounded to float, the shift would lead a digit short of the pixel, which is of another surface,
@@ -238,6 +274,16 @@ TEST_P(ViewWarpTest, RefusesWhatDoesNotFit) {
   hidden_ = {{5, 0, 0, 0}};
   EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("hidden sample 5 of a view is of disparity 0"));
   hidden_.clear();
+  for (const std::int32_t index : {-1, 7, 108}) {
+    mixed_ = {{7, {}, 0.5F}, {index, {}, 0.5F}};
+    EXPECT_THAT(ErrorOf([&] { Warp(); }),
+                HasSubstr(std::to_string(index) + " after 7: indices must grow from 0 to 107"));
+  }
+  for (const float share : {-0.1F, 1.1F, kNone}) {
+    mixed_ = {{7, {}, share}};
+    EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("mixed sample 7 of a view has the share"));
+  }
+  mixed_.clear();
   shift_y_ = kNone;
   EXPECT_THAT(ErrorOf([&] { Warp(); }), HasSubstr("shift of a view is nan"));
   shift_y_ = 0;
@@ -257,7 +303,7 @@ TEST_P(ViewWarpTest, IsUsedByManyThreads) {
   for (std::size_t t = 0; t < kThreads; ++t) {
     threads.emplace_back([&, t] {  // each so many pixels to the right
       for (int i = 0; i < 20; ++i) {
-        warp->Warp({&of_view_, static_cast<double>(t), 0, &hidden_}, &warped[t]);
+        warp->Warp({&of_view_, static_cast<double>(t), 0, &hidden_, nullptr}, &warped[t]);
       }
     });
   }
@@ -305,6 +351,7 @@ TEST_P(DeviceWarpTest, IsThatOfTheTwin) {
     }
     const SurfacePicture picture{c.width, c.height, c.channels, &values, &disparity, 0.3F};
     const auto of_view = numbers(pixels, -0.5F, 1.5F);
+    const auto shares = numbers(pixels, 0, 1);
     for (const float reach : {0.0F, 3.0F, 300.0F}) {
       const auto shift = numbers(2, -reach, reach);
       const auto source_x = numbers(pixels, -reach, reach);
@@ -319,7 +366,12 @@ TEST_P(DeviceWarpTest, IsThatOfTheTwin) {
             hidden.push_back({i, source_x[n], source_y[n], seen[n]});
             seen[n] = kNone;
           }
-          const ViewSources view{&seen, shift[0], shift[1], &hidden};
+          std::vector<MixedSample> mixed;
+          for (int i = every % 5; i < pixels; i += 2 + every % 3) {
+            const std::size_t n = static_cast<std::size_t>(pixels - 1 - i);
+            mixed.push_back({i, {0, source_x[n], source_y[n], (*surface)[n]}, shares[n]});
+          }
+          const ViewSources view{&seen, shift[0], shift[1], &hidden, &mixed};
           std::vector<float> found, right;
           NewWarp(GetParam(), picture)->Warp(view, &found);
           NewWarp(Form::kTwin, picture)->Warp(view, &right);

@@ -23,6 +23,15 @@ struct HiddenSample {
   float disparity = 0;               // of that
 };
 
+// A sample whose pixel two surfaces share: it shows (1 - share) of what it would without, and
+// `share` of what stands at another place, the mean of those of the four pixels around that are of
+// the surface there.
+struct MixedSample {
+  std::int32_t index = 0;
+  HiddenSample other;  // its index: of the sample whose way to a source is taken
+  float share = 0;     // 0 to 1
+};
+
 // Where the samples of a view read the picture, cut to it. What is seen follows from its disparity,
 // so that a view is one number a sample and a list, and no more than that has to go to a device.
 struct ViewSources {
@@ -31,6 +40,7 @@ struct ViewSources {
   const std::vector<float>* disparity = nullptr;
   double shift_x = 0, shift_y = 0;                    // px per unit of disparity
   const std::vector<HiddenSample>* hidden = nullptr;  // those that are NaN, each once
+  const std::vector<MixedSample>* mixed = nullptr;    // by index, each once; null: none
 };
 
 // Reads one picture for many views. Bicubic (Catmull-Rom, the borders repeated) where all 16 pixels
