@@ -13,6 +13,7 @@
 #include "cell_row.h"
 #include "disparity_buffer.h"
 #include "hole_filler.h"
+#include "mixed_samples.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/view_geometry.h"
 
@@ -184,6 +185,7 @@ CompactView DisparityRenderer::RenderCompact(double a, double b) const {
   PaintSurfaces(map_, is_surface_, view.shift, &buffer);
   PaintAlone(map_, alone_, view.shift, &buffer);
   FindSources(map_, *supported_, std::move(buffer), &view);
+  view.mixed = FindMixedSamples(map_, alone_, view);
   return view;
 }
 
@@ -193,10 +195,16 @@ ViewDisparity DisparityRenderer::Render(double a, double b) const {
   return view;
 }
 
+const CompactView::Hidden& CompactView::HiddenAt(std::size_t i) const {
+  return *std::lower_bound(hidden.begin(), hidden.end(), i,
+                           [](const Hidden& h, std::size_t at) { return Index(h.index) < at; });
+}
+
 void Expand(const CompactView& compact, ViewDisparity* view) {
   view->width_px = compact.width_px;
   view->height_px = compact.height_px;
   view->disparity = compact.disparity;
+  view->mixed = compact.mixed;
   view->seen.assign(view->disparity.size(), Seen::kSeen);
   view->source_x.resize(view->disparity.size());
   view->source_y.resize(view->disparity.size());

@@ -89,16 +89,27 @@ class Gatherer {
   Part reached_;
 };
 
-const CompactView::Hidden& HiddenAt(const CompactView& view, std::size_t i) {
-  return *std::lower_bound(
-      view.hidden.begin(), view.hidden.end(), i,
-      [](const CompactView::Hidden& h, std::size_t at) { return Index(h.index) < at; });
-}
-
 int Floor(float x) {
   const int toward_zero = static_cast<int>(x);
   return toward_zero - (static_cast<float>(toward_zero) > x ? 1 : 0);
 }
+
+// Finds the mixed samples of a view, asked for by growing indices.
+class MixedCursor {
+ public:
+  explicit MixedCursor(const std::vector<CompactView::Mixed>& mixed)
+      : next_(mixed.data()), end_(mixed.data() + mixed.size()) {}
+
+  // Null: it is none.
+  const CompactView::Mixed* At(std::size_t i) {
+    while (next_ != end_ && Index(next_->index) < i) ++next_;
+    return next_ != end_ && Index(next_->index) == i ? next_ : nullptr;
+  }
+
+ private:
+  const CompactView::Mixed* next_;
+  const CompactView::Mixed* end_;
+};
 
 // A ray of the pixel (x, y).
 struct FanRay {
@@ -165,23 +176,33 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
   const auto near = static_cast<float>(tolerance);
   const auto limit_px = static_cast<float>(map.width_px + map.height_px);
   Gatherer<Real> gatherer(stride_px, map.height_px);
+  std::vector<MixedCursor> next_mixed;
+  for (const FanView& view : fan.views) next_mixed.emplace_back(view.sees.mixed);
   for (int y = first_row; y < last_row; ++y) {
     for (int x = 0; x < fan.width_px; ++x) {
       const std::size_t i = Index(y) * Index(fan.width_px) + Index(x);
       if (is_product[i] != 0) continue;
-      for (const FanView& of_fan : fan.views) {
+      for (std::size_t n = 0; n < fan.views.size(); ++n) {
+        const FanView& of_fan = fan.views[n];
         const CompactView& view = of_fan.sees;
         FanRay ray;
         ray.weight = of_fan.weight;
         ray.disparity = view.disparity[i];
         if (std::isnan(ray.disparity)) {
-          const CompactView::Hidden& hidden = HiddenAt(view, i);
+          const CompactView::Hidden& hidden = view.HiddenAt(i);
           ray.source_x = hidden.source_x;
           ray.source_y = hidden.source_y;
           ray.disparity = hidden.disparity;
         } else {
           ray.source_x = static_cast<float>(view.shift.x() * ray.disparity);
           ray.source_y = static_cast<float>(view.shift.y() * ray.disparity);
+        }
+        if (const CompactView::Mixed* mixed = next_mixed[n].At(i)) {
+          const double share = ray.weight * static_cast<double>(mixed->share);
+          ray.weight -= share;
+          AddTaps(map, tolerance, x, y,
+                  {mixed->other.source_x, mixed->other.source_y, mixed->other.disparity, share},
+                  &gatherer);
         }
         if (!AddFourTaps(map, near, limit_px, x, y, ray, &gatherer)) {
           AddTaps(map, tolerance, x, y, ray, &gatherer);

@@ -308,7 +308,24 @@ model::LinearPicture PictureWarper::Warp(const ViewDisparity& view) const {
     row.Split(view.source_x.data() + first, view.source_y.data() + first, y, map_.height_px);
     WarpRow(row, warped.values.data() + first * Index(channels_));
   }
+  MixIn(view.mixed, &warped);
   return warped;
+}
+
+void PictureWarper::MixIn(const std::vector<kernels::MixedSample>& mixed,
+                          model::LinearPicture* warped) const {
+  const auto limit_px = static_cast<float>(map_.width_px + map_.height_px);
+  std::vector<float> value(Index(channels_));
+  for (const kernels::MixedSample& sample : mixed) {
+    const int x = sample.index % map_.width_px, y = sample.index / map_.width_px;
+    std::int32_t x0 = 0, y0 = 0;
+    float fx = 0, fy = 0;
+    SplitSources(&sample.other.source_x, 1, x, 1, map_.width_px - 1, limit_px, &x0, &fx);
+    SplitSources(&sample.other.source_y, 1, y, 0, map_.height_px - 1, limit_px, &y0, &fy);
+    Bilinear(x0, y0, fx, fy, sample.other.disparity, value.data());
+    float* const to = warped->values.data() + Index(sample.index) * Index(channels_);
+    for (int c = 0; c < channels_; ++c) to[c] += sample.share * (value[Index(c)] - to[c]);
+  }
 }
 
 void PictureWarper::Warp(const CompactView& view, model::LinearPicture* warped) const {
@@ -338,6 +355,7 @@ void PictureWarper::Warp(const CompactView& view, model::LinearPicture* warped) 
     row.Split(row.way_x.data(), row.way_y.data(), y, map_.height_px);
     WarpRow(row, warped->values.data() + first * Index(channels_));
   }
+  MixIn(view.mixed, warped);
 }
 
 model::LinearPicture WarpPicture(const model::LinearPicture& picture, const DisparityMap& map,

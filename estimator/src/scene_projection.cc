@@ -37,6 +37,12 @@ std::vector<float> HiddenShare(const ViewFan& fan, std::size_t pixels) {
   for (const FanView& view : fan.views) {
     for (const CompactView::Hidden& hidden : view.sees.hidden)
       share[static_cast<std::size_t>(hidden.index)] += view.weight;
+    for (const CompactView::Mixed& mixed : view.sees.mixed) {
+      const auto i = static_cast<std::size_t>(mixed.index);
+      const double hidden_before = std::isnan(view.sees.disparity[i]) ? 1 : 0;
+      const double other_hidden = mixed.other.index == mixed.index ? 0 : 1;
+      share[i] += view.weight * static_cast<double>(mixed.share) * (other_hidden - hidden_before);
+    }
   }
   return {share.begin(), share.end()};
 }
@@ -168,6 +174,11 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
     FanAxes axes = AxesOf(fan, disparity, u_count, v_count, options.threads);
     is_product =
         IsProduct(fan, axes, disparity, options.tolerance_px, plain.is_product, options.threads);
+    for (const FanView& view : fan.views) {
+      for (const CompactView::Mixed& mixed : view.sees.mixed) {
+        is_product[static_cast<std::size_t>(mixed.index)] = 0;
+      }
+    }
     for (const Product& product : products) {
       projection.terms.emplace_back();
       auto& term = projection.terms.back();

@@ -16,7 +16,8 @@ namespace thicklens::estimator {
 // H of a scene whose points look the same from everywhere: from the radiance r of the points that
 // the centre view shows to the photograph, each pixel a mean of what the views see through it:
 //   (H r)(x) = sum_k w_k r(x + s_k(x)), s_k the way from the view's sample to its source
-// (ViewDisparity), by the bilinear taps of the source that lie on its surface. Rows sum to 1.
+// (ViewDisparity), by the bilinear taps of the source that lie on its surface, and of mixed samples
+// by those of both surfaces. Rows sum to 1.
 // A pixel whose fan meets one surface only is computed by filters down and across the picture,
 // which take the fan for a product of its axes (weights that are no product are a sum of such, by
 // singular values), and which may read bicubic, as views are shown; a pixel where that would
@@ -36,7 +37,8 @@ class SceneProjection {
   int threads = 1;
   std::vector<Term> terms;  // none: every pixel has a row
   kernels::PixelRuns<Real> rows;
-  // Share of the aperture that sees each pixel through samples hidden from the centre view, 0 to 1.
+  // Share of the aperture that sees each pixel through samples hidden from the centre view, or
+  // through the share of samples that is, 0 to 1.
   std::vector<float> hidden_share;
   // Share of the aperture that sees each point of the centre view; only where it was asked for.
   std::vector<float> seen_share;

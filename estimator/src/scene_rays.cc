@@ -60,7 +60,9 @@ ViewRays<Real>::ViewRays(const DisparityMap& map, const std::vector<float>& lowe
         plain = highest[cell] - d <= room && d - lowest[cell] <= room;
       }
       if (!plain) {
-        AddOdd(map, tolerance, view, i);
+        odd_.push_back(OddRayOf(map, tolerance, i,
+                                {0, view.source_x[i], view.source_y[i], view.disparity[i]}));
+        disparity_[i] = 0;
         continue;
       }
       const bool goes_on = runs_.size() > run_start_.back() &&
@@ -72,17 +74,19 @@ ViewRays<Real>::ViewRays(const DisparityMap& map, const std::vector<float>& lowe
   }
   run_start_.push_back(runs_.size());
   odd_start_.push_back(odd_.size());
+  AddMixed(map, tolerance, view);
   runs_.shrink_to_fit();
   odd_.shrink_to_fit();
 }
 
 template <typename Real>
-void ViewRays<Real>::AddOdd(const DisparityMap& map, double tolerance, const ViewDisparity& view,
-                            std::size_t i) {
-  const std::size_t x = i % Index(map.width_px), y = i / Index(map.width_px);
+typename ViewRays<Real>::OddRay ViewRays<Real>::OddRayOf(
+    const DisparityMap& map, double tolerance, std::size_t sample,
+    const kernels::HiddenSample& source) const {
+  const std::size_t x = sample % Index(map.width_px), y = sample / Index(map.width_px);
   const SurfaceTaps taps =
-      TapsAt(map, tolerance, static_cast<double>(x) + static_cast<double>(view.source_x[i]),
-             static_cast<double>(y) + static_cast<double>(view.source_y[i]), view.disparity[i]);
+      TapsAt(map, tolerance, static_cast<double>(x) + static_cast<double>(source.source_x),
+             static_cast<double>(y) + static_cast<double>(source.source_y), source.disparity);
   OddRay ray;
   ray.x = static_cast<std::int32_t>(x);
   ray.pixel.fill(static_cast<std::int32_t>(taps.pixel[0]));
@@ -90,8 +94,22 @@ void ViewRays<Real>::AddOdd(const DisparityMap& map, double tolerance, const Vie
     ray.pixel[t] = static_cast<std::int32_t>(taps.pixel[t]);
     ray.weight[t] = static_cast<Real>(taps.weight[t]);
   }
-  odd_.push_back(ray);
-  disparity_[i] = 0;
+  return ray;
+}
+
+template <typename Real>
+void ViewRays<Real>::AddMixed(const DisparityMap& map, double tolerance,
+                              const ViewDisparity& view) {
+  mixed_.reserve(view.mixed.size());
+  mixed_start_.assign(Index(map.height_px) + 1, view.mixed.size());
+  std::size_t row = 0;
+  for (const kernels::MixedSample& mixed : view.mixed) {
+    const std::size_t sample = Index(mixed.index);
+    while (row <= sample / Index(map.width_px)) mixed_start_[row++] = mixed_.size();
+    MixedRay ray{OddRayOf(map, tolerance, sample, mixed.other), 1 - static_cast<Real>(mixed.share)};
+    for (Real& weight : ray.other.weight) weight *= static_cast<Real>(mixed.share);
+    mixed_.push_back(ray);
+  }
 }
 
 template <typename Real>
@@ -113,10 +131,22 @@ void ViewRays<Real>::Warp(int row, const Real* picture, Real* warped) const {
     for (std::size_t t = 0; t < 4; ++t) sum += ray.weight[t] * picture[ray.pixel[t]];
     warped[ray.x] = sum;
   }
+  for (std::size_t n = mixed_start_[Index(row)]; n < mixed_start_[Index(row) + 1]; ++n) {
+    const OddRay& other = mixed_[n].other;
+    Real sum = mixed_[n].rest * warped[other.x];
+    for (std::size_t t = 0; t < 4; ++t) sum += other.weight[t] * picture[other.pixel[t]];
+    warped[other.x] = sum;
+  }
 }
 
 template <typename Real>
-void ViewRays<Real>::Spread(int row, const Real* values, Real* picture) const {
+void ViewRays<Real>::Spread(int row, Real* values, Real* picture) const {
+  for (std::size_t n = mixed_start_[Index(row)]; n < mixed_start_[Index(row) + 1]; ++n) {
+    const OddRay& other = mixed_[n].other;
+    for (std::size_t t = 0; t < 4; ++t)
+      picture[other.pixel[t]] += other.weight[t] * values[other.x];
+    values[other.x] *= mixed_[n].rest;
+  }
   SpreadRow(RowOf(row), values, picture + Index(row) * Index(width_px_));
   for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
     const OddRay& ray = odd_[n];
@@ -128,7 +158,8 @@ template <typename Real>
 double ViewRays<Real>::bytes() const {
   return static_cast<double>(disparity_.capacity() * sizeof(Real) +
                              runs_.capacity() * sizeof(RayRun) + odd_.capacity() * sizeof(OddRay) +
-                             2 * run_start_.capacity() * sizeof(std::size_t));
+                             mixed_.capacity() * sizeof(MixedRay) +
+                             3 * run_start_.capacity() * sizeof(std::size_t));
 }
 
 template <typename Real>

@@ -28,8 +28,8 @@ class ViewRays {
 
   // warped(x) = sum_taps t(x, p) picture(p) of one row, by the taps of SurfaceTaps.
   void Warp(int row, const Real* picture, Real* warped) const;
-  // The transpose, added to the picture.
-  void Spread(int row, const Real* values, Real* picture) const;
+  // The transpose, added to the picture. Leaves other values behind.
+  void Spread(int row, Real* values, Real* picture) const;
 
   double bytes() const;
 
@@ -40,7 +40,14 @@ class ViewRays {
     std::array<std::int32_t, 4> pixel{};
     std::array<Real, 4> weight{};
   };
-  void AddOdd(const DisparityMap& map, double tolerance, const ViewDisparity& view, std::size_t i);
+  // A ray of which `rest` is left: it reads another place too.
+  struct MixedRay {
+    OddRay other;
+    Real rest = 0;
+  };
+  OddRay OddRayOf(const DisparityMap& map, double tolerance, std::size_t sample,
+                  const kernels::HiddenSample& source) const;
+  void AddMixed(const DisparityMap& map, double tolerance, const ViewDisparity& view);
   RayRow<Real> RowOf(int row) const;
 
   int width_px_ = 0;
@@ -48,7 +55,8 @@ class ViewRays {
   std::vector<Real> disparity_;
   std::vector<RayRun> runs_;
   std::vector<OddRay> odd_;
-  std::vector<std::size_t> run_start_, odd_start_;  // of each row, and the end
+  std::vector<MixedRay> mixed_;
+  std::vector<std::size_t> run_start_, odd_start_, mixed_start_;  // of each row, and the end
 };
 
 // H in scene-ray form: R(p, k) is the radiance of the scene point that the pixel p of the centre

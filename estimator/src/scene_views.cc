@@ -35,7 +35,7 @@ class Spare {
 };
 
 kernels::ViewSources SourcesOf(const CompactView& view) {
-  return {&view.disparity, view.shift.x(), view.shift.y(), &view.hidden};
+  return {&view.disparity, view.shift.x(), view.shift.y(), &view.hidden, &view.mixed};
 }
 
 // Views of one picture, on a device or on the processor; by many threads.

@@ -51,7 +51,8 @@ double BytesOf(const ViewFan& fan) {
   std::size_t bytes = 0;
   for (const FanView& view : fan.views) {
     bytes += view.sees.disparity.capacity() * sizeof(float) +
-             view.sees.hidden.capacity() * sizeof(CompactView::Hidden);
+             view.sees.hidden.capacity() * sizeof(CompactView::Hidden) +
+             view.sees.mixed.capacity() * sizeof(CompactView::Mixed);
   }
   return static_cast<double>(bytes);
 }

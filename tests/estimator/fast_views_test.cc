@@ -67,8 +67,38 @@ std::vector<float> DeviceTwinWarp(const model::LinearPicture& picture, const Dis
   std::vector<float> values;
   kernels::NewReferenceWarp({picture.width_px, picture.height_px, picture.channels, &picture.values,
                              &map.disparity, static_cast<float>(SurfaceTolerance(map))})
-      ->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden}, &values);
+      ->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden, &view.mixed}, &values);
   return values;
+}
+
+// The share of a sample that another surface has, and of what disparity that is; a share of 0:
+// none.
+kernels::MixedSample MixedAt(const ViewDisparity& view, std::size_t i) {
+  for (const kernels::MixedSample& mixed : view.mixed) {
+    if (static_cast<std::size_t>(mixed.index) == i) return mixed;
+  }
+  return {};
+}
+
+// Shares just below the least that counts are not told from those just above it, nor two surfaces
+// of the same share.
+void ExpectMixedAlike(const ViewDisparity& view, const ViewDisparity& plain, double tolerance) {
+  constexpr double kRounding = 2e-5, kLeastShare = 0.01;
+  int alike = 0;
+  for (std::size_t i = 0; i < view.seen.size(); ++i) {
+    const kernels::MixedSample found = MixedAt(view, i), expected = MixedAt(plain, i);
+    if (found.share == 0 || expected.share == 0) {
+      ASSERT_LT(found.share + expected.share, kLeastShare + kRounding) << "sample " << i;
+      continue;
+    }
+    ASSERT_NEAR(found.share, expected.share, kRounding) << "sample " << i;
+    if (std::abs(found.other.disparity - expected.other.disparity) > tolerance) continue;
+    ++alike;
+    EXPECT_EQ(found.other.index == found.index, expected.other.index == expected.index);
+    EXPECT_NEAR(found.other.source_x, expected.other.source_x, tolerance + 1e-5);
+    EXPECT_NEAR(found.other.source_y, expected.other.source_y, tolerance + 1e-5);
+  }
+  EXPECT_GE(alike, 0.95 * static_cast<double>(plain.mixed.size()));
 }
 
 // The same sources, each in the list.
@@ -195,6 +225,7 @@ TEST_P(TwinTest, RendersWhatThePlainTwinDoes) {
     const double px_per_unit = std::max(std::abs(a * map.step.x()), std::abs(b * map.step.y()));
     ExpectNear("x", view.source_x, plain.source_x, width, tolerance * px_per_unit + 1e-6);
     ExpectNear("y", view.source_y, plain.source_y, width, tolerance * px_per_unit + 1e-6);
+    ExpectMixedAlike(view, plain, tolerance);
   }
 }
 

@@ -644,24 +644,68 @@ TEST(WarpPicture, FollowsASineTexture) {
   }
 }
 
-TEST(WarpPicture, NeverMixesSurfaces) {
+// A sample is a square; so much of it as the rectangle covers is the rectangle's.
+TEST(WarpPicture, MixesSurfacesByTheAreaThatEachCovers) {
   const TwoLayers scene;
   const DisparityMap map = scene.Map();
   const model::LinearPicture picture = PictureOf(
       TwoLayers::kWidth, TwoLayers::kHeight, 3,
       [&](int x, int y, int c) { return scene.IsNear(x, y) ? 0.9 - 0.1 * c : 0.1 + 0.05 * c; });
-  for (const auto& [a, b] : {std::pair{2.0, 0.0}, {-1.0, 3.0}, {1.5, -2.2}}) {
+  const auto overlap = [](double at, double first, double last) {
+    return std::max(0.0, std::min(at + 0.5, last + 0.5) - std::max(at - 0.5, first - 0.5));
+  };
+  int mixed = 0;
+  for (const auto& [a, b] : {std::pair{2.0, 0.0}, {-1.0, 3.0}, {1.5, -2.2}, {-0.3, 0.4}}) {
     const model::LinearPicture warped = WarpPicture(picture, map, RenderDisparity(map, a, b));
     for (int y = 0; y < TwoLayers::kHeight; ++y) {
       for (int x = 0; x < TwoLayers::kWidth; ++x) {
-        const bool near = scene.NearCovers(x, y, a, b);
+        const double near = overlap(x + a * scene.near_px, scene.left, scene.right) *
+                            overlap(y + b * scene.near_px, scene.top, scene.bottom);
+        if (near > 0.01 && near < 0.99) ++mixed;
+        // Less than a hundredth is left out.
+        const double tolerance =
+            near == 0 || near > 0.9999 || (near > 0.0101 && near < 0.9899) ? 1e-5 : 0.01;
         for (int c = 0; c < 3; ++c) {
-          ASSERT_NEAR(warped.at(x, y, c), near ? 0.9 - 0.1 * c : 0.1 + 0.05 * c, 1e-6)
+          const double expected = near * (0.9 - 0.1 * c) + (1 - near) * (0.1 + 0.05 * c);
+          ASSERT_NEAR(warped.at(x, y, c), expected, tolerance)
               << x << ", " << y << " of view " << a << ", " << b;
         }
       }
     }
   }
+  EXPECT_GT(mixed, 100);
+}
+
+// A hole may be behind: what is hidden at its sample stands there for it.
+TEST(RenderDisparity, MixesInTheHiddenBackgroundWhereNothingElseIsBehind) {
+  const TwoLayers scene;
+  const double a = 2.2;  // what is near moves 4.18 px to the left, what is far 1.32 to the right
+  const ViewDisparity view = RenderDisparity(scene.Map(), a, 0);
+  int found = 0;
+  for (const kernels::MixedSample& mixed : view.mixed) {
+    const auto i = static_cast<std::size_t>(mixed.index);
+    const int x = mixed.index % TwoLayers::kWidth;
+    if (x < 20) continue;  // the left edge, before background that is seen
+    if (mixed.index / TwoLayers::kWidth != 15) continue;
+    ++found;
+    // 26.5 - 4.18 = 22.32: the sample at 22 is covered but for .18 px.
+    EXPECT_EQ(x, 22);
+    EXPECT_NEAR(mixed.share, 0.18, 1e-5);
+    EXPECT_NEAR(view.disparity[i], scene.near_px, 1e-6);
+    EXPECT_EQ(view.seen[i + 1], Seen::kHidden);
+    EXPECT_EQ(mixed.other.index, mixed.index + 1);
+    // There the rectangle is what the centre view shows, so that the neighbour's place is read.
+    EXPECT_EQ(mixed.other.source_x, view.source_x[i + 1] + 1);
+    EXPECT_EQ(mixed.other.disparity, view.disparity[i + 1]);
+  }
+  EXPECT_EQ(found, 1);
+}
+
+double SharedAt(const ViewDisparity& view, std::size_t i) {
+  for (const kernels::MixedSample& mixed : view.mixed) {
+    if (static_cast<std::size_t>(mixed.index) == i) return double{mixed.share};
+  }
+  return 0;
 }
 
 // The texture of the wall is linear: taps of the wall on both sides give it exactly; where the
@@ -690,10 +734,11 @@ TEST(WarpPicture, UsesTheTapsOfTheSurfaceAlone) {
     const bool right_is_near = scene.IsNear(std::ceil(source), y);
     const bool left_is_near = scene.IsNear(std::floor(source), y);
     cut += right_is_near || left_is_near ? 1 : 0;
-    const double expected = wall(right_is_near  ? std::floor(source)
-                                 : left_is_near ? std::ceil(source)
-                                                : source);
-    EXPECT_NEAR(warped.at(x, y, 0), expected, 1e-6) << x;
+    const double of_wall = wall(right_is_near  ? std::floor(source)
+                                : left_is_near ? std::ceil(source)
+                                               : source);
+    const double near = SharedAt(view, At(x, y, TwoLayers::kWidth));
+    EXPECT_NEAR(warped.at(x, y, 0), (1 - near) * of_wall + near * 5, 1e-6) << x;
   }
   EXPECT_GT(cut, 0);
   EXPECT_GT(hidden, 3);

@@ -68,17 +68,24 @@ struct ViewDisparity {
   // the source of the sample that shows it, or a pixel of the centre view.
   // May lead outside of the picture by rounding; readers cut it.
   std::vector<float> source_x, source_y;
+  // Samples whose pixels two surfaces share, by index: above is what has the sample's middle.
+  std::vector<kernels::MixedSample> mixed;
 };
 
 // ViewDisparity in a third of the memory: the way to the source of what is seen follows from its
 // disparity.
 struct CompactView {
   using Hidden = kernels::HiddenSample;
+  using Mixed = kernels::MixedSample;
   int width_px = 0;
   int height_px = 0;
   Eigen::Vector2d shift{0, 0};   // px per unit of disparity
   std::vector<float> disparity;  // NaN: hidden
   std::vector<Hidden> hidden;    // by index
+  std::vector<Mixed> mixed;      // by index
+
+  // Of a sample that is hidden.
+  const Hidden& HiddenAt(std::size_t index) const;
 };
 
 // Sets `view`, in the memory that it has where that is enough.
@@ -98,6 +105,18 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // the only one; where there is none, the closest in any direction; where nothing of the picture is
 // in the view, the centre view's own sample. (0, 0) gives the map itself. Throws Error if the map
 // has holes.
+// So far a sample shows what its middle does. At the edge of a surface its pixel shows two: with
+// (x, y) its source on a surface of disparity D, that one covers of it the share
+//   sum over the four pixels q around (x, y) that are of the surface (|D_q - D| <= .3 px per view
+//   step) of (1 - |x - q_x|) (1 - |y - q_y|),
+// the area on which squares of the size of a pixel overlap. Where a pixel at a jump lands less than
+// 1 px beside a sample both ways, the sample is `mixed`: with that pixel's surface, by its share, if
+// it is nearer than what the sample shows; with what is behind, by what is left, if it is the
+// surface that the sample shows. Behind is what the first of the eight samples around (sides before
+// corners) shows that is farther: one that is seen and whose surface the centre view has here as
+// well; else one that is seen, at its own source; else one that is hidden. A hidden sample that
+// nothing nearer shares has the share of its own surface that is seen after all. Of several the
+// largest share counts; less than .01 does not. Derived here.
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
 struct SupportedPixels;  // hole_filler.h
@@ -123,7 +142,7 @@ class DisparityRenderer {
 // The picture warped to that view by its depth (with the blurred photograph: depth-image-based
 // rendering, DIBR). Bicubic (Catmull-Rom) where all 16 taps agree with the sample's disparity to
 // .3 px per view step, else bilinear from the taps that do, renormalised; hidden samples take their
-// background source's value.
+// background source's value; of mixed samples the share of the other surface is bilinear.
 model::LinearPicture WarpPicture(const model::LinearPicture& picture, const DisparityMap& map,
                                  const ViewDisparity& view);
 
@@ -145,6 +164,7 @@ class PictureWarper {
   };
   struct TapRow;
 
+  void MixIn(const std::vector<kernels::MixedSample>& mixed, model::LinearPicture* warped) const;
   void CopyPixels(const model::LinearPicture& picture);
   void FindRanges();
   void WarpRow(const TapRow& row, float* warped) const;
