@@ -4,17 +4,6 @@ namespace thicklens::estimator {
 namespace {
 
 template <typename Real>
-inline __attribute__((always_inline)) void Products(Real weight, const float* __restrict factors,
-                                                    const Real* __restrict x, std::size_t count,
-                                                    Real* __restrict y) {
-  if (factors == nullptr) {
-    for (std::size_t i = 0; i < count; ++i) y[i] += weight * x[i];
-  } else {
-    for (std::size_t i = 0; i < count; ++i) y[i] += weight * static_cast<Real>(factors[i]) * x[i];
-  }
-}
-
-template <typename Real>
 inline __attribute__((always_inline)) void Links(Real gamma, const LinkRun<Real>& run) {
   const Real* __restrict here = run.here;
   const Real* __restrict near = run.near;
@@ -49,12 +38,6 @@ inline __attribute__((always_inline)) void Links(Real gamma, const LinkRun<Real>
 bool HasAvx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
 
 template <typename Real>
-__attribute__((target("avx2,fma"))) void ProductsAvx2(Real weight, const float* factors,
-                                                      const Real* x, std::size_t count, Real* y) {
-  Products(weight, factors, x, count, y);
-}
-
-template <typename Real>
 __attribute__((target("avx2,fma"))) void LinksAvx2(Real gamma, const LinkRun<Real>& run) {
   Links(gamma, run);
 }
@@ -64,14 +47,6 @@ __attribute__((target("avx2,fma"))) void LinksAvx2(Real gamma, const LinkRun<Rea
 }  // namespace
 
 template <typename Real>
-void AddProducts(Real weight, const float* factors, const Real* x, std::size_t count, Real* y) {
-#if defined(__x86_64__)
-  if (HasAvx2()) return ProductsAvx2(weight, factors, x, count, y);
-#endif
-  Products(weight, factors, x, count, y);
-}
-
-template <typename Real>
 void AddLinks(Real gamma, const LinkRun<Real>& run) {
 #if defined(__x86_64__)
   if (HasAvx2()) return LinksAvx2(gamma, run);
@@ -79,8 +54,6 @@ void AddLinks(Real gamma, const LinkRun<Real>& run) {
   Links(gamma, run);
 }
 
-template void AddProducts(float, const float*, const float*, std::size_t, float*);
-template void AddProducts(double, const float*, const double*, std::size_t, double*);
 template void AddLinks(float, const LinkRun<float>&);
 template void AddLinks(double, const LinkRun<double>&);
 

@@ -5,11 +5,7 @@
 
 namespace thicklens::estimator {
 
-// The innermost loops over the rays of a light field.
-
-// y[i] += weight * factors[i] * x[i]; factors may be null: 1.
-template <typename Real>
-void AddProducts(Real weight, const float* factors, const Real* x, std::size_t count, Real* y);
+// The innermost loop of D on the grid.
 
 // Neighbouring rays of a view, each linked to the rays of the next view at both sides of the place
 // that shows its point: (D L)_i = (1 - w_i) near[i] + w_i far[i] - here[i],

@@ -1,10 +1,10 @@
 #ifndef THICKLENS_ESTIMATOR_SRC_GRID_PHOTOGRAPH_H_
 #define THICKLENS_ESTIMATOR_SRC_GRID_PHOTOGRAPH_H_
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
+#include "photograph_loops.h"
 #include "thicklens/kernels/kernels.h"
 
 namespace thicklens::estimator {
@@ -15,12 +15,6 @@ struct LandingRect {
   int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 LandingRect LandingIn(const kernels::BlockGeometry& picture, int k, int l);
-
-// A pixel gets `share` of the ray nearest to the pixel that is `offset` beside it.
-struct RayTap {
-  int offset = 0;
-  double share = 0;  // 0: nothing
-};
 
 // H on the grid, for a whole picture: from the rays of a light field of one channel, views
 // (l * u_count + k) * t_count * s_count + t * s_count + s, to the photograph,
@@ -33,6 +27,8 @@ class GridPhotograph {
   // `irradiance`: of each view's samples; empty: 1. The block is the whole picture.
   GridPhotograph(const kernels::BlockGeometry& picture, std::vector<std::vector<float>> irradiance,
                  int threads);
+  GridPhotograph(const GridPhotograph&) = delete;
+  GridPhotograph& operator=(const GridPhotograph&) = delete;
 
   std::size_t pixels() const { return static_cast<std::size_t>(picture_.pixels()); }
 
@@ -44,21 +40,26 @@ class GridPhotograph {
   double bytes() const;
 
  private:
-  // Calls visit(weight, x, count, sample): `count` pixels of the row y from x on get weight times
-  // the samples of the view from `sample` on.
-  template <typename Visit>
-  void ForRow(int k, int l, const RayTap& in_y, int y, const Visit& visit) const;
-  const float* IrradianceFrom(int view, std::size_t sample) const;
-  void SetInverseSums();
+  std::size_t view_size() const {
+    return static_cast<std::size_t>(picture_.s_count) * static_cast<std::size_t>(picture_.t_count);
+  }
+  // Of the photograph with a frame of one pixel.
+  std::size_t framed_width() const { return static_cast<std::size_t>(picture_.width_px) + 2; }
+  void SetTaps();
+  // Adds to rows `first` to `last` - 1 of the photograph what the views of row l send there.
+  void AddViews(int l, int first, int last, const Real* rays, Real* photograph) const;
+  // Adds to the rays of a view, of the samples t from `first` to `last` - 1, what `framed` sends.
+  void AddToView(int view, int first, int last, const Real* framed, Real* rays) const;
   // Multiplies by 1/(sum of w g), 0 where that is 0.
   void Normalise(int y, const Real* from, Real* to) const;
 
   kernels::BlockGeometry picture_;
   std::vector<std::vector<float>> irradiance_;
   int threads_;
-  // 1/(sum of w g), which borders of views alone change: of each run of columns, for every run of
-  // rows.
+  // Which views have rays for a pixel, and 1/(sum of w g), borders of views alone change: of each
+  // run of columns, for every row of views, and for every run of rows.
   std::vector<int> column_ends_;
+  std::vector<std::vector<std::vector<PixelTap<Real>>>> taps_;
   std::vector<std::vector<Real>> inverse_sums_;
   std::vector<std::size_t> run_of_row_;
 };

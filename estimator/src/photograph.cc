@@ -59,15 +59,16 @@ using PictureFormer = std::function<std::vector<float>(const float* rays)>;
 // By `kernels`, or on the processor, vectorised, where it is null; both give the numbers of
 // Kernels::FormPicture. `shares`, where there are any, multiply the rays.
 PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat splat,
-                        const std::vector<std::vector<float>>& shares,
-                        kernels::Kernels<float>* kernels, int threads) {
+                        std::vector<std::vector<float>> shares, kernels::Kernels<float>* kernels,
+                        int threads) {
   if (kernels == nullptr) {
     kernels::BlockGeometry geometry = whole;
     if (splat == kernels::Splat::kNearest) {  // all of a ray: as if it landed on its pixel
       std::fill(geometry.s_fraction.begin(), geometry.s_fraction.end(), 0.0);
       std::fill(geometry.t_fraction.begin(), geometry.t_fraction.end(), 0.0);
     }
-    const auto photograph = std::make_shared<GridPhotograph<float>>(geometry, shares, threads);
+    const auto photograph =
+        std::make_shared<GridPhotograph<float>>(geometry, std::move(shares), threads);
     return [photograph](const float* rays) {
       std::vector<float> pixels(photograph->pixels());
       photograph->Apply(rays, pixels.data());
@@ -75,17 +76,18 @@ PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat spla
     };
   }
   const std::size_t view_size = Index(whole.s_count) * Index(whole.t_count);
-  return [&whole, splat, &shares, kernels, threads, view_size](const float* rays) {
-    std::vector<float> weighed(rays, rays + view_size * Index(whole.views()));
-    if (!shares.empty()) {
-      model::ParallelFor(whole.views(), threads, [&](int view) {
-        const std::vector<float>& share = shares[Index(view)];
-        float* values = weighed.data() + Index(view) * view_size;
-        for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
-      });
-    }
-    return kernels->FormPicture(whole, splat, weighed);
-  };
+  return
+      [&whole, splat, shares = std::move(shares), kernels, threads, view_size](const float* rays) {
+        std::vector<float> weighed(rays, rays + view_size * Index(whole.views()));
+        if (!shares.empty()) {
+          model::ParallelFor(whole.views(), threads, [&](int view) {
+            const std::vector<float>& share = shares[Index(view)];
+            float* values = weighed.data() + Index(view) * view_size;
+            for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];
+          });
+        }
+        return kernels->FormPicture(whole, splat, weighed);
+      };
 }
 
 // The mean of what is passed over the rays of each pixel. Throws Error where there are rays and
@@ -163,7 +165,7 @@ model::LinearPicture Photograph(const model::LightField& light_field,
     MultiplyInto(passed, &share_of_rays);
   }
 
-  const PictureFormer form = NewFormer(whole, splat, share_of_rays, kernels, threads);
+  const PictureFormer form = NewFormer(whole, splat, std::move(share_of_rays), kernels, threads);
   model::LinearPicture photograph{
       light_field.s_count, light_field.t_count, light_field.channels, {}};
   for (int channel = 0; channel < light_field.channels; ++channel) {

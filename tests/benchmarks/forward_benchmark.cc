@@ -3,9 +3,12 @@
 // tables, the picture that it reads and the one that it writes, once each) and compares with the
 // triad's, which is what this machine's memory gives two threads. Steps and H on an OpenCL device
 // compare by time; where the device is the processor, so does column CPU, of the process's threads.
+// And H of a whole light field (FormNative, as `thicklens bench source --table 2` times it): the
+// least it must move are the light field, which it reads, and the picture, which it writes.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -17,8 +20,10 @@
 #include "scene_data.h"
 #include "scene_priors.h"
 #include "scene_projection.h"
+#include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/kernels/radiance_steps.h"
+#include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/parallel.h"
 
@@ -110,6 +115,19 @@ void ForwardNative(benchmark::State& state) {
   Report(&state, problem.LeastBytes());
 }
 
+// 640 x 480 px, rays that land 0 or .37 px further from view to view: of a view one sample goes
+// into a pixel, or four do.
+void FormNative(benchmark::State& state) {
+  model::LightField field = model::MakeLightField(640, 480, kViews, kViews, 1);
+  std::fill(field.values.begin(), field.values.end(), 0.5F);
+  field.landing_step_px.setConstant(static_cast<double>(state.range(0)) / 100);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        Photograph(field, field.weights, nullptr, nullptr, nullptr, kThreads).values.data());
+  }
+  Report(&state, sizeof(float) * static_cast<double>(field.values.size() + field.view_size()));
+}
+
 // With the pictures on the device.
 void ForwardOpenCl(benchmark::State& state) {
   const Problem& problem = TheProblem();
@@ -160,6 +178,7 @@ void Usual(benchmark::internal::Benchmark* benchmark) {
   benchmark->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
 }
 BENCHMARK(Triad)->Apply(Usual);
+BENCHMARK(FormNative)->Arg(0)->Arg(37)->Apply(Usual);
 BENCHMARK(ForwardNative)->Apply(Usual);
 BENCHMARK(ForwardOpenCl)->Apply(Usual);
 BENCHMARK(StepNative)->Apply(Usual);
