@@ -19,6 +19,8 @@ constexpr int kMostBandRows = 128, kFewestBandRows = 8;
 constexpr std::size_t kMostBandBytes = 320 * 1024;
 // Rows of rays that one thread adds to together.
 constexpr int kMostRayRows = 256;
+// To start a thread for less takes longer than it saves.
+constexpr std::size_t kLeastBytesOfThread = 3 * 1024 * 1024;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
@@ -27,19 +29,24 @@ int BandRows(std::size_t bytes_of_row) {
   return static_cast<int>(std::clamp<std::size_t>(rows, kFewestBandRows, kMostBandRows));
 }
 
-// Calls work(first, last) for bands of `rows`, as many for each thread and none of more than
-// `most_rows`.
+struct Rows {
+  int count = 0;
+  int most = 0;  // that one thread takes together
+  std::size_t bytes = 0;
+};
+
+// Calls work(first, last) for bands of the rows, as many for each thread.
 template <typename Work>
-void ForBands(int rows, int most_rows, int threads, const Work& work) {
+void ForBands(const Rows& rows, int threads, const Work& work) {
   const int resolved = model::ResolveThreads(threads);
-  const int rounds = (rows + most_rows * resolved - 1) / (most_rows * resolved);
-  const int bands = std::min(rows, rounds * resolved);
-  model::ParallelFor(bands, threads, [&](int band) {
-    const auto border = [&](int i) {
-      return static_cast<int>(static_cast<std::int64_t>(rows) * i / bands);
-    };
-    work(border(band), border(band + 1));
-  });
+  const int rounds = (rows.count + rows.most * resolved - 1) / (rows.most * resolved);
+  const int bands = std::min(rows.count, rounds * resolved);
+  const auto begin = [&](int band) {
+    return static_cast<int>(static_cast<std::int64_t>(rows.count) * band / bands);
+  };
+  const std::size_t useful = 1 + rows.bytes / kLeastBytesOfThread;
+  model::ParallelFor(bands, static_cast<int>(std::min(Index(resolved), useful)),
+                     [&](int band) { work(begin(band), begin(band + 1)); });
 }
 
 // A pixel gets `share` of the ray nearest to the pixel that is `offset` beside it.
@@ -195,7 +202,8 @@ void GridPhotograph<Real>::AddViews(int l, int first, int last, const Real* rays
 template <typename Real>
 void GridPhotograph<Real>::Apply(const Real* rays, Real* photograph) const {
   const std::size_t width = Index(picture_.width_px);
-  ForBands(picture_.height_px, BandRows(width * sizeof(Real)), threads_, [&](int first, int last) {
+  const Rows of_picture{picture_.height_px, BandRows(width * sizeof(Real)), bytes_of_rays()};
+  ForBands(of_picture, threads_, [&](int first, int last) {
     std::fill(photograph + Index(first) * width, photograph + Index(last) * width, Real{0});
     for (int l = 0; l < picture_.v_count; ++l) AddViews(l, first, last, rays, photograph);
     for (int y = first; y < last; ++y) {
@@ -237,7 +245,8 @@ template <typename Real>
 void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) const {
   // Black all around, so that rays at the border need no loop of their own.
   std::vector<Real> framed(framed_width() * Index(picture_.height_px + 2));
-  ForBands(picture_.height_px, kMostBandRows, threads_, [&](int first, int last) {
+  const Rows of_picture{picture_.height_px, kMostBandRows, framed.size() * sizeof(Real)};
+  ForBands(of_picture, threads_, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
       Normalise(y, photograph + Index(y) * Index(picture_.width_px),
                 framed.data() + Index(y + 1) * framed_width() + 1);
@@ -245,7 +254,8 @@ void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) con
   });
   // No two bands share a ray.
   const int t_count = picture_.t_count;
-  ForBands(picture_.views() * t_count, kMostRayRows, threads_, [&](int first, int last) {
+  const Rows of_views{picture_.views() * t_count, kMostRayRows, bytes_of_rays()};
+  ForBands(of_views, threads_, [&](int first, int last) {
     for (int view = first / t_count; view * t_count < last; ++view) {
       AddToView(view, std::max(0, first - view * t_count), std::min(t_count, last - view * t_count),
                 framed.data(), rays);

@@ -43,6 +43,9 @@ class GridPhotograph {
   std::size_t view_size() const {
     return static_cast<std::size_t>(picture_.s_count) * static_cast<std::size_t>(picture_.t_count);
   }
+  std::size_t bytes_of_rays() const {
+    return static_cast<std::size_t>(picture_.views()) * view_size() * sizeof(Real);
+  }
   // Of the photograph with a frame of one pixel.
   std::size_t framed_width() const { return static_cast<std::size_t>(picture_.width_px) + 2; }
   void SetTaps();
