@@ -110,8 +110,8 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 //   sum over the four pixels q around (x, y) that are of the surface (|D_q - D| <= .3 px per view
 //   step) of (1 - |x - q_x|) (1 - |y - q_y|),
 // the area on which squares of the size of a pixel overlap. Where a pixel at a jump lands less than
-// 1 px beside a sample both ways, the sample is `mixed`: with that pixel's surface, by its share, if
-// it is nearer than what the sample shows; with what is behind, by what is left, if it is the
+// 1 px beside a sample both ways, the sample is `mixed`: with that pixel's surface, by its share,
+// if it is nearer than what the sample shows; with what is behind, by what is left, if it is the
 // surface that the sample shows. Behind is what the first of the eight samples around (sides before
 // corners) shows that is farther: one that is seen and whose surface the centre view has here as
 // well; else one that is seen, at its own source; else one that is hidden. A hidden sample that
