@@ -130,11 +130,42 @@ class Mixer {
 // nearer.
 bool IsBefore(const Candidate& a, const Candidate& b) {
   const auto key = [](const Candidate& candidate) {
-    return std::tuple(candidate.mixed.index, candidate.is_same_surface, -candidate.mixed.share,
+    return std::tuple(candidate.is_same_surface, -candidate.mixed.share,
                       -candidate.mixed.other.disparity);
   };
   return key(a) < key(b);
 }
+
+// The first of the candidates of each sample.
+class FirstCandidates {
+ public:
+  explicit FirstCandidates(std::size_t samples) : place_(samples, kNone) {}
+
+  void Add(const Candidate& candidate) {
+    std::int32_t& place = place_[Index(candidate.mixed.index)];
+    if (place == kNone) {
+      place = static_cast<std::int32_t>(candidates_.size());
+      candidates_.push_back(candidate);
+    } else if (IsBefore(candidate, candidates_[Index(place)])) {
+      candidates_[Index(place)] = candidate;
+    }
+  }
+
+  std::vector<kernels::MixedSample> ByIndex() const {
+    std::vector<kernels::MixedSample> mixed;
+    mixed.reserve(candidates_.size());
+    for (const std::int32_t place : place_) {
+      if (place != kNone) mixed.push_back(candidates_[Index(place)].mixed);
+    }
+    return mixed;
+  }
+
+ private:
+  static constexpr std::int32_t kNone = -1;
+
+  std::vector<std::int32_t> place_;  // among the candidates, of each sample
+  std::vector<Candidate> candidates_;
+};
 
 }  // namespace
 
@@ -143,7 +174,8 @@ std::vector<kernels::MixedSample> FindMixedSamples(const DisparityMap& map,
                                                    const CompactView& view) {
   const Mixer mixer(map, view);
   const std::size_t width = Index(map.width_px);
-  std::vector<Candidate> candidates;
+  if (at_jump.empty()) return {};
+  FirstCandidates candidates(view.disparity.size());
   for (const int index : at_jump) {
     const std::size_t i = Index(index);
     const float disparity = map.disparity[i];
@@ -153,19 +185,10 @@ std::vector<kernels::MixedSample> FindMixedSamples(const DisparityMap& map,
     const int left = static_cast<int>(std::floor(x)), above = static_cast<int>(std::floor(y));
     for (const Step& step : {Step{0, 0}, Step{1, 0}, Step{0, 1}, Step{1, 1}}) {
       const auto candidate = mixer.At(left + step.x, above + step.y, disparity);
-      if (candidate) candidates.push_back(*candidate);
+      if (candidate) candidates.Add(*candidate);
     }
   }
-  std::sort(candidates.begin(), candidates.end(), IsBefore);
-  std::vector<kernels::MixedSample> mixed;
-  mixed.reserve(candidates.size());
-  for (const Candidate& candidate : candidates) {
-    if (mixed.empty() || mixed.back().index != candidate.mixed.index) {
-      mixed.push_back(candidate.mixed);
-    }
-  }
-  mixed.shrink_to_fit();
-  return mixed;
+  return candidates.ByIndex();
 }
 
 }  // namespace thicklens::estimator
