@@ -74,7 +74,7 @@ void ViewOpenCl(benchmark::State& state) {
                                       &scene.picture.values, &scene.map.disparity, 0.3F});
   std::array<std::vector<float>, kViews> values;
   const auto make = [&](int i) {
-    warp->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden},
+    warp->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden, &view.mixed},
                &values[static_cast<std::size_t>(i)]);
   };
   for (int i = 0; i < kViews; ++i) make(i);  // a first call compiles

@@ -41,7 +41,8 @@ ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts);
 // the place where it meets the photograph. Throws Error for inputs that do not fit.
 std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads);
 
-// Of the rays of one view, whose disparity was rendered, from that of the points.
+// Of the rays of one view, whose disparity was rendered, from that of the points; of a mixed sample
+// that of what its middle shows.
 std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
                                       const CompactView& view);
 

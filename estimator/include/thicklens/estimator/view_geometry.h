@@ -72,8 +72,8 @@ struct ViewDisparity {
   std::vector<kernels::MixedSample> mixed;
 };
 
-// ViewDisparity in a third of the memory: the way to the source of what is seen follows from its
-// disparity.
+// ViewDisparity in less memory (a third, where few samples are hidden or mixed): the way to the
+// source of what is seen follows from its disparity.
 struct CompactView {
   using Hidden = kernels::HiddenSample;
   using Mixed = kernels::MixedSample;
@@ -109,14 +109,16 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // (x, y) its source on a surface of disparity D, that one covers of it the share
 //   sum over the four pixels q around (x, y) that are of the surface (|D_q - D| <= .3 px per view
 //   step) of (1 - |x - q_x|) (1 - |y - q_y|),
-// the area on which squares of the size of a pixel overlap. Where a pixel at a jump lands less than
-// 1 px beside a sample both ways, the sample is `mixed`: with that pixel's surface, by its share,
-// if it is nearer than what the sample shows; with what is behind, by what is left, if it is the
-// surface that the sample shows. Behind is what the first of the eight samples around (sides before
-// corners) shows that is farther: one that is seen and whose surface the centre view has here as
-// well; else one that is seen, at its own source; else one that is hidden. A hidden sample that
-// nothing nearer shares has the share of its own surface that is seen after all. Of several the
-// largest share counts; less than .01 does not. Derived here.
+// the area on which squares of the size of a pixel overlap; the border of the map is repeated.
+// Where a pixel at a jump lands less than 1 px beside a sample both ways, the sample is `mixed`:
+// with that pixel's surface, by its share, if it is nearer than what the sample shows; with what is
+// behind, by what is left, if it is of the surface that the sample shows (to .3 px per view step).
+// Behind is what the first of the eight samples around (sides before corners) shows that is
+// farther: one that is seen and whose surface the centre view has here as well; else one that is
+// seen, at its own source; else one that is hidden, by its way to a source where that leads to its
+// surface from here as well, else at its own source. A hidden sample that nothing nearer shares has
+// the share of its own surface that is seen after all. Of several the largest share counts, of the
+// same the nearer; less than .01 does not. Derived here.
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
 struct SupportedPixels;  // hole_filler.h
