@@ -10,6 +10,7 @@
 #include "ray_landing.h"
 #include "residual_guard.h"
 #include "run_cost.h"
+#include "scene_relief.h"
 #include "thicklens/error.h"
 
 namespace thicklens::estimator {
@@ -92,6 +93,7 @@ SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, bo
     mean_slope_ = MeanSlope(photograph, input_.transfer,
                             BandsOf(height_px, options_.least_bands, BandMarginPx(reach_px_)));
   }
+  if (options_.prior == Prior::kPatches) relief_slope_ = ReliefSlope(input_.disparity);
   int count = std::min(options_.least_bands, height_px);
   if (options_.memory_limit_mib) {
     bytes_per_pixel_ = memory_.LargestBytesPerPixel();
@@ -142,6 +144,7 @@ typename SceneRadiance<Real>::Run SceneBandRun<Real>::RunFor(const SceneOptions&
   run.threads = summary_->threads;
   run.noise_sigma = summary_->noise_sigma;
   run.mean_slope = mean_slope_;
+  run.relief_slope = relief_slope_;
   run.progress = progress_;
   return run;
 }

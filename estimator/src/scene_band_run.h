@@ -65,6 +65,7 @@ class SceneBandRun {
   IterationProgress* progress_;
   SceneSummary* summary_;
   DisparityMap band_disparity_;  // unless it is the input's
+  double relief_slope_ = 0;      // of patches
   double mean_slope_ = 0;
   double bytes_per_pixel_ = 0;  // of H, the most that is known
   std::optional<Sample> sample_;

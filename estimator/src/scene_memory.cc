@@ -89,8 +89,9 @@ double SceneMemory::SetupBytes(double pixels) const {
 // planes are weights, slopes, diagonals, the prior. A device has the same again, and its programs.
 double SceneMemory::SolveBytes(double pixels) const {
   constexpr double kPictures = 12, kPlanes = 7, kProgramBytes = 16 << 20;
-  // The target, here and in the system; the strengths, and weights in double.
-  constexpr double kPatchPictures = 2, kPatchPlanes = 4;
+  // The target, here and in the system, the shading of the relief, and the photograph without it;
+  // the strengths, weights in double, and what of the data goes with that photograph.
+  constexpr double kPatchPictures = 4, kPatchPlanes = 6;
   constexpr double kSharesBytes = 2 * kFloat;  // hidden, seen
   const double pictures = kPictures + (patches_ ? kPatchPictures : 0);
   const double planes = kPlanes + (patches_ ? kPatchPlanes : 0);

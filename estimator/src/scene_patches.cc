@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstddef>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
 
+#include "scene_relief.h"
 #include "stored_slope.h"
 #include "thicklens/kernels/patch_filter.h"
 
@@ -22,10 +24,26 @@ constexpr double kPull = 0.15;
 constexpr double kThresholdPower = 0.6;
 constexpr double kPullPower = 2 * (1 - kThresholdPower);  // as (noise/threshold)^2
 
+// What the shading takes part in, in stored values: s G; nothing where there is no relief.
+template <typename Real>
+class StoredShading {
+ public:
+  StoredShading(const std::vector<Real>& shading, const std::vector<Real>& slope_squared)
+      : shading_(shading), slope_squared_(slope_squared) {}
+  Real operator()(std::size_t i) const {
+    return shading_.empty() ? Real{0}
+                            : shading_[i] * std::sqrt(slope_squared_[i % slope_squared_.size()]);
+  }
+
+ private:
+  const std::vector<Real>& shading_;
+  const std::vector<Real>& slope_squared_;
+};
+
 // v of a radiance.
 template <typename Real>
 std::vector<Real> Filtered(const PatchPrior& prior, const DataTerm<Real>& data,
-                           const std::vector<Real>& radiance) {
+                           const std::vector<Real>& radiance, const StoredShading<Real>& shading) {
   const double threshold = kThreshold / 255 * std::pow(255 * prior.noise_sigma, kThresholdPower);
   std::vector<Real> values(radiance.size());
   const auto convert = [&](const auto& one) {
@@ -38,10 +56,14 @@ std::vector<Real> Filtered(const PatchPrior& prior, const DataTerm<Real>& data,
     });
   };
   const StoredValueTable table(prior.transfer);
-  convert([&](std::size_t i) { return table.Encode(static_cast<float>(radiance[i])); });
+  convert([&](std::size_t i) {
+    return static_cast<Real>(table.Encode(static_cast<float>(radiance[i]))) - shading(i);
+  });
   values = kernels::FilterPatches(data.width_px, data.height_px, data.channels, values, threshold,
                                   data.threads);
-  convert([&](std::size_t i) { return prior.transfer.Decode(static_cast<double>(values[i])); });
+  convert([&](std::size_t i) {
+    return prior.transfer.Decode(static_cast<double>(values[i] + shading(i)));
+  });
   return values;
 }
 
@@ -71,49 +93,165 @@ std::vector<Real> LocalVariation(const DataTerm<Real>& data, const std::vector<R
   return shares;
 }
 
+namespace {
+
+// The steps of one solution, each with what iterations are left.
+template <typename Real>
+class PatchRun {
+ public:
+  PatchRun(const PatchPrior& prior, const DataTerm<Real>& data,
+           const std::vector<Real>& slope_squared, const RadianceLimits& limits,
+           kernels::Backend* backend)
+      : prior_(prior),
+        data_(data),
+        slope_squared_(slope_squared),
+        left_(limits),
+        backend_(backend) {}
+
+  void SolveVariation(const DataTerm<Real>& data, const std::vector<Real>& slopes,
+                      SceneSystem<Real>* system, std::vector<Real>* radiance) {
+    const RadianceOutcome outcome = SolveRadiance(Prior::kTotalVariation, prior_.strength, data,
+                                                  slopes, left_, system, radiance);
+    whole_.reweightings += outcome.reweightings;
+    Count(outcome.iterations);
+  }
+
+  // G, and r becomes r - G as the photograph has it: where u starts.
+  std::vector<Real> TakeShading(std::vector<Real>* radiance) {
+    const Relief<Real> relief = ReliefOf<Real>(*prior_.disparity, prior_.relief_slope);
+    const std::vector<Real> estimated = Estimated(relief.normals, *radiance);
+    ReliefShading<Real> shading =
+        FitShading(relief, estimated, *radiance, data_.width_px, data_.height_px, data_.threads);
+    for (std::size_t i = 0; i < radiance->size(); ++i) (*radiance)[i] -= shading.already[i];
+    return std::move(shading.sharp);
+  }
+
+  // The last: r near v. `radiance` and the data are without the shading.
+  void SolveNearFiltered(const DataTerm<Real>& data, const std::vector<Real>& shading,
+                         SceneSystem<Real>* system, std::vector<Real>* radiance) {
+    QuadraticPrior<Real> near_filtered;
+    near_filtered.target = *radiance;
+    AddTo(shading, 1, &near_filtered.target);
+    near_filtered.target =
+        Filtered(prior_, data, near_filtered.target, StoredShading(shading, slope_squared_));
+    AddTo(shading, -1, &near_filtered.target);
+    near_filtered.pull = slope_squared_;
+    const double share = kPull * std::pow(255 * prior_.noise_sigma, kPullPower);
+    for (Real& pull : near_filtered.pull) pull *= static_cast<Real>(share);
+    system->SetPrior(near_filtered);
+    *radiance = std::move(near_filtered.target);
+    Count(system->Solve(CgOfWhatIsLeft(), radiance).iterations);
+    whole_.relative_residual = system->RelativeResidual(*radiance);
+    whole_.converged = whole_.relative_residual <= left_.tolerance;
+  }
+
+  const RadianceOutcome& whole() const { return whole_; }
+
+  static void AddTo(const std::vector<Real>& shading, Real sign, std::vector<Real>* radiance) {
+    for (std::size_t i = 0; i < shading.size(); ++i) (*radiance)[i] += sign * shading[i];
+  }
+
+ private:
+  // What the quadratic that touches the total variation at `radiance` makes of planes that H shows,
+  // as many at a time as the photograph has channels.
+  std::vector<Real> Estimated(const std::vector<Real>& planes, const std::vector<Real>& radiance) {
+    std::vector<Real> estimated;
+    const std::size_t count = planes.size() / data_.pixels();
+    const QuadraticPrior<Real> touching = Touching(radiance);
+    DataTerm<Real> of_planes = data_;
+    for (std::size_t first = 0; first < count; first += static_cast<std::size_t>(data_.channels)) {
+      of_planes.channels =
+          static_cast<int>(std::min(count - first, static_cast<std::size_t>(data_.channels)));
+      const auto from = planes.begin() + static_cast<std::ptrdiff_t>(first * data_.pixels());
+      std::vector<Real> some(
+          from, from + static_cast<std::ptrdiff_t>(of_planes.pixels()) * of_planes.channels);
+      of_planes.photograph.resize(some.size());
+      data_.projection.apply(some.data(), of_planes.channels, of_planes.photograph.data());
+      SceneSystem<Real> system(of_planes, backend_);
+      system.SetPrior(touching);
+      Count(system.Solve(CgOfWhatIsLeft(), &some).iterations);
+      estimated.insert(estimated.end(), some.begin(), some.end());
+    }
+    return estimated;
+  }
+
+  QuadraticPrior<Real> Touching(const std::vector<Real>& radiance) const {
+    const auto width = static_cast<std::size_t>(data_.width_px);
+    QuadraticPrior<Real> touching;
+    touching.pull.assign(data_.pixels(), static_cast<Real>(kLeastPull));
+    touching.smoothness.resize(data_.pixels());
+    ForBands(data_.height_px, data_.threads, [&](int y0, int y1) {
+      for (std::size_t p = static_cast<std::size_t>(y0) * width;
+           p < static_cast<std::size_t>(y1) * width; ++p) {
+        double squares = 0;
+        for (std::size_t i = p; i < radiance.size(); i += data_.pixels()) {
+          const auto square = [&](std::size_t of) {
+            return std::pow(static_cast<double>(radiance[of] - radiance[i]), 2);
+          };
+          if (p % width + 1 < width) squares += square(i + 1);
+          if (p + width < data_.pixels()) squares += square(i + width);
+        }
+        const auto slope_squared = static_cast<double>(slope_squared_[p]);
+        touching.smoothness[p] =
+            static_cast<Real>(prior_.strength / 2 * slope_squared /
+                              std::sqrt(slope_squared * squares + kVariationEps * kVariationEps));
+      }
+    });
+    return touching;
+  }
+
+  CgLimits CgOfWhatIsLeft() const {
+    return {left_.tolerance, left_.max_iterations, left_.on_iteration};
+  }
+  void Count(int iterations) {
+    whole_.iterations += iterations;
+    left_.max_iterations -= iterations;
+  }
+
+  const PatchPrior& prior_;
+  const DataTerm<Real>& data_;
+  const std::vector<Real>& slope_squared_;
+  RadianceLimits left_;
+  kernels::Backend* backend_;
+  RadianceOutcome whole_;
+};
+
+}  // namespace
+
 template <typename Real>
 RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& data,
                                  const std::vector<Real>& slope_squared,
-                                 const RadianceLimits& limits, SceneSystem<Real>* system,
-                                 std::vector<Real>* radiance) {
-  RadianceLimits left = limits;
-  RadianceOutcome whole;
-  const auto solve_variation = [&](const std::vector<Real>& slopes) {
-    const RadianceOutcome outcome =
-        SolveRadiance(Prior::kTotalVariation, prior.strength, data, slopes, left, system, radiance);
-    whole.iterations += outcome.iterations;
-    whole.reweightings += outcome.reweightings;
-    left.max_iterations -= outcome.iterations;
-  };
-  solve_variation(slope_squared);
-  {
-    // Of the slopes the square: f s |dr| for s |dr|.
-    std::vector<Real> slopes = LocalVariation(data, slope_squared, *radiance, prior.noise_sigma);
-    for (std::size_t i = 0; i < slopes.size(); ++i) slopes[i] *= slopes[i] * slope_squared[i];
-    solve_variation(slopes);
+                                 const RadianceLimits& limits,
+                                 std::unique_ptr<SceneSystem<Real>> system,
+                                 kernels::Backend* backend, std::vector<Real>* radiance) {
+  PatchRun<Real> run(prior, data, slope_squared, limits, backend);
+  run.SolveVariation(data, slope_squared, system.get(), radiance);
+  std::vector<Real> shading;
+  std::optional<DataTerm<Real>> without_shading;
+  if (prior.relief_slope >= kLeastReliefSlope) {
+    system.reset();  // a device holds one at a time
+    shading = run.TakeShading(radiance);
+    without_shading = data;
+    std::vector<Real> shown(shading.size());
+    data.projection.apply(shading.data(), data.channels, shown.data());
+    PatchRun<Real>::AddTo(shown, -1, &without_shading->photograph);
+    system = std::make_unique<SceneSystem<Real>>(*without_shading, backend);
   }
-  QuadraticPrior<Real> near_filtered;
-  near_filtered.target = Filtered(prior, data, *radiance);
-  near_filtered.pull = slope_squared;
-  const double share = kPull * std::pow(255 * prior.noise_sigma, kPullPower);
-  for (Real& pull : near_filtered.pull) pull *= static_cast<Real>(share);
-  system->SetPrior(near_filtered);
-  CgLimits cg;
-  cg.tolerance = limits.tolerance;
-  cg.max_iterations = left.max_iterations;
-  cg.on_iteration = limits.on_iteration;
-  *radiance = std::move(near_filtered.target);
-  whole.iterations += system->Solve(cg, radiance).iterations;
-  whole.relative_residual = system->RelativeResidual(*radiance);
-  whole.converged = whole.relative_residual <= limits.tolerance;
-  return whole;
+  const DataTerm<Real>& rest = without_shading ? *without_shading : data;
+  // Of the slopes the square: f s |dr| for s |dr|.
+  std::vector<Real> slopes = LocalVariation(rest, slope_squared, *radiance, prior.noise_sigma);
+  for (std::size_t i = 0; i < slopes.size(); ++i) slopes[i] *= slopes[i] * slope_squared[i];
+  run.SolveVariation(rest, slopes, system.get(), radiance);
+  run.SolveNearFiltered(rest, shading, system.get(), radiance);
+  PatchRun<Real>::AddTo(shading, 1, radiance);
+  return run.whole();
 }
 
-#define THICKLENS_PATCHES(Real)                                                              \
-  template RadianceOutcome SolveWithPatches(const PatchPrior&, const DataTerm<Real>&,        \
-                                            const std::vector<Real>&, const RadianceLimits&, \
-                                            SceneSystem<Real>*, std::vector<Real>*);         \
-  template std::vector<Real> LocalVariation(const DataTerm<Real>&, const std::vector<Real>&, \
+#define THICKLENS_PATCHES(Real)                                                                  \
+  template RadianceOutcome SolveWithPatches(                                                     \
+      const PatchPrior&, const DataTerm<Real>&, const std::vector<Real>&, const RadianceLimits&, \
+      std::unique_ptr<SceneSystem<Real>>, kernels::Backend*, std::vector<Real>*);                \
+  template std::vector<Real> LocalVariation(const DataTerm<Real>&, const std::vector<Real>&,     \
                                             const std::vector<Real>&, double);
 THICKLENS_PATCHES(float)
 THICKLENS_PATCHES(double)

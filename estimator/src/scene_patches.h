@@ -1,9 +1,11 @@
 #ifndef THICKLENS_ESTIMATOR_SRC_SCENE_PATCHES_H_
 #define THICKLENS_ESTIMATOR_SRC_SCENE_PATCHES_H_
 
+#include <memory>
 #include <vector>
 
 #include "scene_priors.h"
+#include "thicklens/estimator/view_geometry.h"
 #include "thicklens/model/transfer_curve.h"
 
 namespace thicklens::estimator {
@@ -12,22 +14,30 @@ struct PatchPrior {
   double strength = 0;     // lambda of its total variation
   double noise_sigma = 0;  // of the photograph's stored values
   model::TransferCurve transfer;
+  const DisparityMap* disparity = nullptr;  // of the data's pixels
+  double relief_slope = 0;                  // c of ReliefOf; the relief counts for nothing below
+                                            // kLeastReliefSlope
 };
 
 // From `radiance` to that of Prior::kPatches:
 //   1. r of total variation of strength lambda;
-//   2. r of total variation of strength f lambda, f = (sigma_p/(.7 sigma))^1.5/2, but between 1/2
+//   2. G, the shading of the relief (see FitShading), from r and from what the quadratic that
+//      touches that prior at r makes of a photograph of the relief's normals. From here on u = r -
+//      G is solved for, of which I - H G is the photograph;
+//   3. u of total variation of strength f lambda, f = (sigma_p/(.7 sigma))^1.5/2, but between 1/2
 //      and 1: sigma_p is the rms of s (H r - I) within 4 px of p. Where H explains the photograph
 //      less of it is needed, as the patches do the rest; where it does not, at hidden things, all;
-//   3. v = FilterPatches of the stored values of r, its threshold 8.1/255 (255 sigma)^.6, and r
-//      that minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2, rho = .15 (255 sigma)^.8:
-//      half-quadratic splitting (Zoran and Weiss 2011) cut short.
-// The outcome is that of all systems together, the residual that of the last.
+//   4. v = G + FilterPatches of the stored values of r less s G, its threshold 8.1/255
+//      (255 sigma)^.6, and r that minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
+//      rho = .15 (255 sigma)^.8: half-quadratic splitting (Zoran and Weiss 2011) cut short.
+// `system`: of the data, whose backend is `backend`; is used up. The outcome is that of all systems
+// together, the residual that of the last, in u.
 template <typename Real>
 RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& data,
                                  const std::vector<Real>& slope_squared,
-                                 const RadianceLimits& limits, SceneSystem<Real>* system,
-                                 std::vector<Real>* radiance);
+                                 const RadianceLimits& limits,
+                                 std::unique_ptr<SceneSystem<Real>> system,
+                                 kernels::Backend* backend, std::vector<Real>* radiance);
 
 // f of each pixel for a radiance.
 template <typename Real>

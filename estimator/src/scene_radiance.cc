@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 #include "coarse_start.h"
@@ -129,7 +129,7 @@ SignalSum SceneRadiance<Real>::Signal() const {
 template <typename Real>
 model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   const SceneOptions& options = run_.options;
-  std::optional<SceneSystem<Real>> system(std::in_place, data_, run_.backend);
+  auto system = std::make_unique<SceneSystem<Real>>(data_, run_.backend);
   std::vector<Real> radiance = start_.values.empty() ? data_.photograph : Planar<Real>(start_);
   start_ = {};
   RadianceLimits limits;
@@ -144,16 +144,17 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   if (options.strength_rule == StrengthRule::kGcv) {
     const StrengthSearch search =
         SearchStrength(SolvedFirst(options.prior), summary->strength, data_, slope_squared_, limits,
-                       &*system, &radiance);
+                       system.get(), &radiance);
     summary->strength = search.strength;
     summary->iterations = search.iterations;
   }
   const RadianceOutcome outcome =
       options.prior == Prior::kPatches
-          ? SolveWithPatches({summary->strength, sigma, run_.input.transfer}, data_, slope_squared_,
-                             limits, &*system, &radiance)
-          : SolveRadiance(options.prior, summary->strength, data_, slope_squared_, limits, &*system,
-                          &radiance);
+          ? SolveWithPatches(
+                {summary->strength, sigma, run_.input.transfer, disparity_, run_.relief_slope},
+                data_, slope_squared_, limits, std::move(system), run_.backend, &radiance)
+          : SolveRadiance(options.prior, summary->strength, data_, slope_squared_, limits,
+                          system.get(), &radiance);
   summary->iterations += outcome.iterations;
   summary->reweightings = outcome.reweightings;
   summary->converged = outcome.converged;

@@ -34,9 +34,10 @@ class SceneRadiance {
     const SceneOptions& options;
     kernels::Backend* backend = nullptr;
     int threads = 1;
-    double noise_sigma = 0;  // of stored values
-    double mean_slope = 0;   // over the whole photograph; for options without slope weights
-    int last_iteration = 0;  // for the progress: of this band and those before it
+    double noise_sigma = 0;   // of stored values
+    double relief_slope = 0;  // of the whole depth; for patches
+    double mean_slope = 0;    // over the whole photograph; for options without slope weights
+    int last_iteration = 0;   // for the progress: of this band and those before it
     IterationProgress* progress = nullptr;
     bool confidence = false;  // is asked for
     bool fan = false;         // is to be kept

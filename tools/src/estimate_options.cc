@@ -135,10 +135,12 @@ void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
 
 void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
   command
-      ->add_option("--prior", options->prior,
-                   "Of scene: what is taken for granted of the radiance: ridge, gradient, tv "
-                   "(total variation, default) or patches (tv, and few waves in a patch: better "
-                   "where depth and camera explain the picture well, but slower)")
+      ->add_option(
+          "--prior", options->prior,
+          "Of scene: what is taken for granted of the radiance: ridge, gradient, tv "
+          "(total variation, default) or patches (tv, few waves in a patch, and folds of the "
+          "depth show in the shading: better where depth and camera explain the picture "
+          "well, but slower)")
       ->check(CLI::IsMember({"ridge", "gradient", "tv", "patches"}))
       ->type_name("NAME");
   command

@@ -17,7 +17,7 @@ enum class Prior {
   kRidge,           // it is near the photograph
   kGradient,        // it is smooth: squared differences of neighbours
   kTotalVariation,  // it is smooth between edges: absolute differences, colours together
-  kPatches,         // that, and its patches of 8 x 8 px are made of few waves
+  kPatches,         // that, its patches of 8 x 8 px are made of few waves, and relief is shaded
 };
 Prior PriorFromName(const std::string& name);  // "ridge", "gradient", "tv", "patches"; throws Error
 std::string PriorName(Prior prior);
@@ -105,7 +105,8 @@ struct SceneMaps {
 //   tv         lambda sum_p (sum over channels and both differences of s^2 |dr|^2 + eps^2)^(1/2)
 //              + 1e-6 |r|^2, eps = .004, by reweighted least squares, the weights renewed in
 //              every iteration (nonlinear conjugate gradients).
-//   patches    tv; then tv once more, up to half as strong where H r explains I; then
+//   patches    tv; then without the shading of the depth's relief, as far as it explains r: tv once
+//              more, up to half as strong where H r explains I; then
 //              .15 (255 sigma)^.8 sum s^2 |r - v|^2, v that r without the waves of its patches that
 //              noise can make (see SolveWithPatches). strength and kGcv speak of the tv.
 // Strengths for a noise of sigma in stored values (at least that of the rounding of 8 bits):
