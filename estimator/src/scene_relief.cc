@@ -279,10 +279,10 @@ ReliefShading<Real> FitShading(const Relief<Real>& relief, const std::vector<Rea
   return shading;
 }
 
-#define THICKLENS_RELIEF(Real)                                                               \
-  template struct Relief<Real>;                                                              \
-  template Relief<Real> ReliefOf(const DisparityMap&, double);                               \
-  template ReliefShading<Real> FitShading(const Relief<Real>&, const std::vector<Real>&,     \
+#define THICKLENS_RELIEF(Real)                                                           \
+  template struct Relief<Real>;                                                          \
+  template Relief<Real> ReliefOf(const DisparityMap&, double);                           \
+  template ReliefShading<Real> FitShading(const Relief<Real>&, const std::vector<Real>&, \
                                           const std::vector<Real>&, int, int, int);
 THICKLENS_RELIEF(float)
 THICKLENS_RELIEF(double)

@@ -7,11 +7,11 @@
 
 namespace thicklens::estimator {
 
-// The relief of a scene shows in its shading: the light that a surface sends on depends on which way
-// it faces, and where the light comes from far away and the paint does not change, by a linear law
-// of its normal (Lambert). So the depth tells fine folds that the photograph has lost to blur, once
-// what it shows still has told how they are lit. A guided filter (He, Sun and Tang 2010) whose guide
-// are the normals of the depth, and which learns on what both pictures show alike.
+// The relief of a scene shows in its shading: the light that a surface sends on depends on which
+// way it faces, and where the light comes from far away and the paint does not change, by a linear
+// law of its normal (Lambert). So the depth tells fine folds that the photograph has lost to blur,
+// once what it shows still has told how they are lit. A guided filter (He, Sun and Tang 2010) whose
+// guide are the normals of the depth, and which learns on what both pictures show alike.
 
 // Which way surfaces face, of each pixel.
 template <typename Real>
@@ -41,9 +41,9 @@ struct ReliefShading {
 };
 
 // The shading of a radiance r (planar, of the relief's size) that was estimated from a photograph;
-// `estimated` is what the same estimate makes of a photograph of the relief's normals. In windows of
-// 21 x 21 px, without pixels beside jumps, each colour of r is fitted by least squares as a linear
-// function of `estimated`, both less their mean over a Gaussian of 2 px:
+// `estimated` is what the same estimate makes of a photograph of the relief's normals. In windows
+// of 21 x 21 px, without pixels beside jumps, each colour of r is fitted by least squares as a
+// linear function of `estimated`, both less their mean over a Gaussian of 2 px:
 //   a = (Cov + eps Id)^-1 cov, then times R^2/(R^2 + 4 (1 - R^2)),
 // R^2 the share of the variance of all colours that the fit explains. What is lost to blur is next
 // to the finest that is left: so the fit looks at that alone, and where the depth has errors as

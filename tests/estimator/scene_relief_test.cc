@@ -90,8 +90,7 @@ std::vector<double> Blurred(const std::vector<double>& planes) {
       for (int dx = -1; dx <= 1; ++dx) {
         const int at_x = std::clamp(x + dx, 0, kWidth - 1);
         const int at_y = std::clamp(y + dy, 0, kHeight - 1);
-        blurred[i] +=
-            planes[i / kPixels * kPixels + Index(at_y) * kWidth + Index(at_x)] / 9;
+        blurred[i] += planes[i / kPixels * kPixels + Index(at_y) * kWidth + Index(at_x)] / 9;
       }
     }
   }
@@ -240,12 +239,13 @@ Scene ShadedScene(const Bumps& shading, const Bumps& relief) {
   pixels[0].texture = {kSceneWidth, kSceneHeight, 3, {}};
   for (int y = 0; y < kSceneHeight; ++y) {
     for (int x = 0; x < kSceneWidth; ++x) {
-      pixels[0].depth.values.push_back(static_cast<float>(1 / (1.0 / 650 + 2e-6 * relief.At(x, y))));
+      pixels[0].depth.values.push_back(
+          static_cast<float>(1 / (1.0 / 650 + 2e-6 * relief.At(x, y))));
       const double across = (shading.At(x + 1, y) - shading.At(x - 1, y)) / 2;
       const double down = (shading.At(x, y + 1) - shading.At(x, y - 1)) / 2;
       // Lambert: n . light, n the unit normal.
-      const double light = (0.5 * across + 0.3 * down + 0.8) /
-                           std::sqrt(across * across + down * down + 1);
+      const double light =
+          (0.5 * across + 0.3 * down + 0.8) / std::sqrt(across * across + down * down + 1);
       for (const double paint : {0.5, 0.4, 0.3}) {
         pixels[0].texture.values.push_back(
             static_cast<float>(paint * std::max(light, 0.05) * (1 + 0.2 * std::sin(0.05 * x))));
@@ -281,7 +281,8 @@ void AddDepthNoise(double sigma_px, EstimateInput* input) {
   const double step = input->disparity.step.cwiseAbs().maxCoeff();
   std::mt19937 engine(5);
   std::normal_distribution<double> normal(0, sigma_px / step);
-  for (float& disparity : input->disparity.disparity) disparity += static_cast<float>(normal(engine));
+  for (float& disparity : input->disparity.disparity)
+    disparity += static_cast<float>(normal(engine));
 }
 
 // What blur took of the shading comes back, by the depth; and another relief than that in the
