@@ -19,6 +19,10 @@ struct Corner {
 // Numbers in, numbers out: unlike std::min, loops of these become vector instructions.
 inline __attribute__((always_inline)) float Least(float a, float b) { return a < b ? a : b; }
 inline __attribute__((always_inline)) float Most(float a, float b) { return a > b ? a : b; }
+// A number from 0 to `last`, whatever x is.
+inline __attribute__((always_inline)) std::int32_t Cut(float x, std::int32_t last) {
+  return static_cast<std::int32_t>(Most(Least(x, static_cast<float>(last)), 0));
+}
 
 // Twice the signed area of p, q and the sample.
 inline __attribute__((always_inline)) float Edge(const Corner& p, const Corner& q) {

@@ -94,21 +94,25 @@ int Floor(float x) {
   return toward_zero - (static_cast<float>(toward_zero) > x ? 1 : 0);
 }
 
-// Finds the mixed samples of a view, asked for by growing indices.
-class MixedCursor {
+// Finds the samples of a list by their indices, asked for by growing ones from `first` on.
+template <typename Sample>
+class Cursor {
  public:
-  explicit MixedCursor(const std::vector<CompactView::Mixed>& mixed)
-      : next_(mixed.data()), end_(mixed.data() + mixed.size()) {}
+  Cursor(const std::vector<Sample>& samples, std::size_t first)
+      : next_(std::lower_bound(
+            samples.data(), samples.data() + samples.size(), first,
+            [](const Sample& sample, std::size_t at) { return Index(sample.index) < at; })),
+        end_(samples.data() + samples.size()) {}
 
   // Null: it is none.
-  const CompactView::Mixed* At(std::size_t i) {
+  const Sample* At(std::size_t i) {
     while (next_ != end_ && Index(next_->index) < i) ++next_;
     return next_ != end_ && Index(next_->index) == i ? next_ : nullptr;
   }
 
  private:
-  const CompactView::Mixed* next_;
-  const CompactView::Mixed* end_;
+  const Sample* next_;
+  const Sample* end_;
 };
 
 // A ray of the pixel (x, y).
@@ -176,8 +180,13 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
   const auto near = static_cast<float>(tolerance);
   const auto limit_px = static_cast<float>(map.width_px + map.height_px);
   Gatherer<Real> gatherer(stride_px, map.height_px);
-  std::vector<MixedCursor> next_mixed;
-  for (const FanView& view : fan.views) next_mixed.emplace_back(view.sees.mixed);
+  std::vector<Cursor<CompactView::Hidden>> next_hidden;
+  std::vector<Cursor<CompactView::Mixed>> next_mixed;
+  for (const FanView& view : fan.views) {
+    const std::size_t first = Index(first_row) * Index(fan.width_px);
+    next_hidden.emplace_back(view.sees.hidden, first);
+    next_mixed.emplace_back(view.sees.mixed, first);
+  }
   for (int y = first_row; y < last_row; ++y) {
     for (int x = 0; x < fan.width_px; ++x) {
       const std::size_t i = Index(y) * Index(fan.width_px) + Index(x);
@@ -189,7 +198,7 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
         ray.weight = of_fan.weight;
         ray.disparity = view.disparity[i];
         if (std::isnan(ray.disparity)) {
-          const CompactView::Hidden& hidden = view.HiddenAt(i);
+          const CompactView::Hidden& hidden = *next_hidden[n].At(i);
           ray.source_x = hidden.source_x;
           ray.source_y = hidden.source_y;
           ray.disparity = hidden.disparity;

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <optional>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "surface_taps.h"
 
@@ -37,10 +39,12 @@ class Mixer {
       : map_(map),
         view_(view),
         tolerance_(static_cast<float>(SurfaceTolerance(map))),
-        far_px_(static_cast<float>(map.width_px) + static_cast<float>(map.height_px)) {}
+        far_px_(static_cast<float>(map.width_px) + static_cast<float>(map.height_px)),
+        is_done_(view.disparity.size(), 0) {}
 
-  // The sample's pixel where one at a jump, of that disparity, lands in it.
-  std::optional<Candidate> At(int x, int y, float landing) const {
+  // The sample's pixel where one at a jump, of that disparity, lands in it. Of a sample and what is
+  // behind it only once.
+  std::optional<Candidate> At(int x, int y, float landing) {
     if (!IsInside(x, y)) return std::nullopt;
     const bool is_hidden = std::isnan(view_.disparity[At(x, y)]);
     const float shown = is_hidden ? view_.HiddenAt(At(x, y)).disparity : view_.disparity[At(x, y)];
@@ -50,6 +54,8 @@ class Mixer {
       const kernels::HiddenSample landed = On(x, y, landing);
       return Mixed(x, y, landed, Cover(x, y, landed), is_same_surface);
     }
+    // What is behind does not depend on which pixel lands.
+    if (std::exchange(is_done_[At(x, y)], 1) != 0) return std::nullopt;
     const float cover = Cover(x, y, On(x, y, shown));
     if (cover > 1 - kLeastShare) return std::nullopt;
     const std::optional<kernels::HiddenSample> behind = Behind(x, y, shown);
@@ -124,6 +130,7 @@ class Mixer {
   const CompactView& view_;
   const float tolerance_;
   const float far_px_;
+  std::vector<unsigned char> is_done_;  // of each sample: with what is behind
 };
 
 // Of one sample, another surface before its own; the larger share before others; of the same, the
@@ -172,9 +179,9 @@ class FirstCandidates {
 std::vector<kernels::MixedSample> FindMixedSamples(const DisparityMap& map,
                                                    const std::vector<int>& at_jump,
                                                    const CompactView& view) {
-  const Mixer mixer(map, view);
-  const std::size_t width = Index(map.width_px);
   if (at_jump.empty()) return {};
+  Mixer mixer(map, view);
+  const std::size_t width = Index(map.width_px);
   FirstCandidates candidates(view.disparity.size());
   for (const int index : at_jump) {
     const std::size_t i = Index(index);

@@ -8,11 +8,6 @@
 namespace thicklens::estimator {
 namespace {
 
-// A number from 0 to `last`, whatever x is.
-inline __attribute__((always_inline)) std::int32_t Cut(float x, std::int32_t last) {
-  return static_cast<std::int32_t>(Most(Least(x, static_cast<float>(last)), 0));
-}
-
 // The loop: the processor's own vector instructions come in with the caller that it is inlined
 // into. Without branches, so that they can. NaN fails every comparison, and what is cut for an
 // index is checked before it is cut.
