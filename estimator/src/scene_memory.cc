@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "run_cost.h"
+#include "scene_relief.h"
 #include "thicklens/kernels/picture_filter.h"
 #include "thicklens/model/parallel.h"
 
@@ -18,6 +19,9 @@ constexpr double kFloat = sizeof(float);
 constexpr double kRenderedBytes = kFloat + 1 + 8;
 // Code that is read in when it runs first, stacks, and all that is not as large as the picture.
 constexpr double kSmallBytes = 8 << 20;
+
+// While systems are solved: which share of the rays is hidden, and which share sees what.
+constexpr double kSharesBytes = 2 * kFloat;
 
 // Of all views in the making: the surfaces of the disparity.
 constexpr double kRendererBytes = 3;
@@ -88,14 +92,34 @@ double SceneMemory::SetupBytes(double pixels) const {
 // Beside H: pictures are the data, H^T W I, the radiance, what CG holds and what H holds inside;
 // planes are weights, slopes, diagonals, the prior. A device has the same again, and its programs.
 double SceneMemory::SolveBytes(double pixels) const {
-  constexpr double kPictures = 12, kPlanes = 7, kProgramBytes = 16 << 20;
-  // The target, here and in the system, the shading of the relief, and the photograph without it;
-  // the strengths, weights in double, and what of the data goes with that photograph.
-  constexpr double kPatchPictures = 4, kPatchPlanes = 6;
-  constexpr double kSharesBytes = 2 * kFloat;  // hidden, seen
-  const double pictures = kPictures + (patches_ ? kPatchPictures : 0);
-  const double planes = kPlanes + (patches_ ? kPatchPlanes : 0);
-  const double here = pixels * (real_ * (pictures * channels_ + planes) + kSharesBytes);
+  constexpr double kPictures = 12, kPlanes = 7;
+  const double solve = PlaneBytes(pixels, kPictures * channels_ + kPlanes);
+  return patches_ ? std::max({solve, PatchesBytes(pixels), ReliefBytes(pixels)}) : solve;
+}
+
+// The last of the systems: in addition the target, here and in the system, the shading of the
+// relief, and the photograph without it; and the strengths, weights in double, and what of the data
+// goes with that photograph.
+double SceneMemory::PatchesBytes(double pixels) const {
+  constexpr double kPictures = 12 + 4, kPlanes = 7 + 6;
+  return PlaneBytes(pixels, kPictures * channels_ + kPlanes);
+}
+
+// The system of the relief's normals: beside the photograph and the radiance three normals in place
+// of colours; and these as they are, what is smooth, and the prior and weights, which are here
+// twice. Then, without it, the fit of the shading.
+double SceneMemory::ReliefBytes(double pixels) const {
+  constexpr double kNormals = 3;
+  const double system = PlaneBytes(pixels, 12 * kNormals + 2 * channels_ + kNormals + 7 + 6);
+  const double fit =
+      pixels * (real_ * (4 * channels_ + 2 * kNormals + 7) + kSharesBytes) +
+      ShadingBytes(width_px_, static_cast<int>(pixels / width_px_), channels_, threads_, real_);
+  return std::max(system, fit);
+}
+
+double SceneMemory::PlaneBytes(double pixels, double planes) const {
+  constexpr double kProgramBytes = 16 << 20;
+  const double here = pixels * (real_ * planes + kSharesBytes);
   return keeps_.device ? 2 * here + kProgramBytes : here;
 }
 

@@ -34,6 +34,9 @@ class SceneMemory {
   double RowBytes() const;  // of a pixel that has a row of its own
   double SetupBytes(double pixels) const;
   double SolveBytes(double pixels) const;
+  double PatchesBytes(double pixels) const;
+  double ReliefBytes(double pixels) const;
+  double PlaneBytes(double pixels, double planes) const;
   double ViewsBytes() const;
 
   double before_ = 0;

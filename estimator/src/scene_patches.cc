@@ -24,7 +24,7 @@ constexpr double kPull = 0.15;
 constexpr double kThresholdPower = 0.6;
 constexpr double kPullPower = 2 * (1 - kThresholdPower);  // as (noise/threshold)^2
 
-// What the shading takes part in, in stored values: s G; nothing where there is no relief.
+// s G, the shading in stored values; 0 where there is none.
 template <typename Real>
 class StoredShading {
  public:
@@ -95,7 +95,7 @@ std::vector<Real> LocalVariation(const DataTerm<Real>& data, const std::vector<R
 
 namespace {
 
-// The steps of one solution, each with what iterations are left.
+// The steps of one solution, those of the radiance with what iterations are left.
 template <typename Real>
 class PatchRun {
  public:
@@ -105,6 +105,7 @@ class PatchRun {
       : prior_(prior),
         data_(data),
         slope_squared_(slope_squared),
+        limits_(limits),
         left_(limits),
         backend_(backend) {}
 
@@ -116,13 +117,15 @@ class PatchRun {
     Count(outcome.iterations);
   }
 
-  // G, and r becomes r - G as the photograph has it: where u starts.
+  // G, and r becomes r - G as the photograph has it: where u starts. Empty, and r as it was, if
+  // what the photograph has of the relief is not found within the limit of iterations.
   std::vector<Real> TakeShading(std::vector<Real>* radiance) {
     const Relief<Real> relief = ReliefOf<Real>(*prior_.disparity, prior_.relief_slope);
-    const std::vector<Real> estimated = Estimated(relief.normals, *radiance);
+    std::vector<Real> estimated = relief.normals;
+    if (!Estimate(*radiance, &estimated)) return {};
     ReliefShading<Real> shading =
         FitShading(relief, estimated, *radiance, data_.width_px, data_.height_px, data_.threads);
-    for (std::size_t i = 0; i < radiance->size(); ++i) (*radiance)[i] -= shading.already[i];
+    AddTo(shading.already, -1, radiance);
     return std::move(shading.sharp);
   }
 
@@ -152,52 +155,20 @@ class PatchRun {
   }
 
  private:
-  // What the quadratic that touches the total variation at `radiance` makes of planes that H shows,
-  // as many at a time as the photograph has channels.
-  std::vector<Real> Estimated(const std::vector<Real>& planes, const std::vector<Real>& radiance) {
-    std::vector<Real> estimated;
-    const std::size_t count = planes.size() / data_.pixels();
-    const QuadraticPrior<Real> touching = Touching(radiance);
+  // Of sharp planes, which become what the quadratic that touches the total variation at `radiance`
+  // makes of a photograph of them. Not of what iterations are left to r: it must not end early
+  // because of these. False: not converged.
+  bool Estimate(const std::vector<Real>& radiance, std::vector<Real>* planes) {
     DataTerm<Real> of_planes = data_;
-    for (std::size_t first = 0; first < count; first += static_cast<std::size_t>(data_.channels)) {
-      of_planes.channels =
-          static_cast<int>(std::min(count - first, static_cast<std::size_t>(data_.channels)));
-      const auto from = planes.begin() + static_cast<std::ptrdiff_t>(first * data_.pixels());
-      std::vector<Real> some(
-          from, from + static_cast<std::ptrdiff_t>(of_planes.pixels()) * of_planes.channels);
-      of_planes.photograph.resize(some.size());
-      data_.projection.apply(some.data(), of_planes.channels, of_planes.photograph.data());
-      SceneSystem<Real> system(of_planes, backend_);
-      system.SetPrior(touching);
-      Count(system.Solve(CgOfWhatIsLeft(), &some).iterations);
-      estimated.insert(estimated.end(), some.begin(), some.end());
-    }
-    return estimated;
-  }
-
-  QuadraticPrior<Real> Touching(const std::vector<Real>& radiance) const {
-    const auto width = static_cast<std::size_t>(data_.width_px);
-    QuadraticPrior<Real> touching;
-    touching.pull.assign(data_.pixels(), static_cast<Real>(kLeastPull));
-    touching.smoothness.resize(data_.pixels());
-    ForBands(data_.height_px, data_.threads, [&](int y0, int y1) {
-      for (std::size_t p = static_cast<std::size_t>(y0) * width;
-           p < static_cast<std::size_t>(y1) * width; ++p) {
-        double squares = 0;
-        for (std::size_t i = p; i < radiance.size(); i += data_.pixels()) {
-          const auto square = [&](std::size_t of) {
-            return std::pow(static_cast<double>(radiance[of] - radiance[i]), 2);
-          };
-          if (p % width + 1 < width) squares += square(i + 1);
-          if (p + width < data_.pixels()) squares += square(i + width);
-        }
-        const auto slope_squared = static_cast<double>(slope_squared_[p]);
-        touching.smoothness[p] =
-            static_cast<Real>(prior_.strength / 2 * slope_squared /
-                              std::sqrt(slope_squared * squares + kVariationEps * kVariationEps));
-      }
-    });
-    return touching;
+    of_planes.channels = static_cast<int>(planes->size() / data_.pixels());
+    of_planes.photograph.resize(planes->size());
+    data_.projection.apply(planes->data(), of_planes.channels, of_planes.photograph.data());
+    SceneSystem<Real> system(of_planes, backend_);
+    system.SetPrior(TouchingPrior(data_, slope_squared_, prior_.strength, radiance));
+    const CgOutcome outcome =
+        system.Solve({limits_.tolerance, limits_.max_iterations, limits_.on_iteration}, planes);
+    whole_.iterations += outcome.iterations;
+    return outcome.converged;
   }
 
   CgLimits CgOfWhatIsLeft() const {
@@ -211,6 +182,7 @@ class PatchRun {
   const PatchPrior& prior_;
   const DataTerm<Real>& data_;
   const std::vector<Real>& slope_squared_;
+  const RadianceLimits& limits_;
   RadianceLimits left_;
   kernels::Backend* backend_;
   RadianceOutcome whole_;
@@ -231,11 +203,14 @@ RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& 
   if (prior.relief_slope >= kLeastReliefSlope) {
     system.reset();  // a device holds one at a time
     shading = run.TakeShading(radiance);
-    without_shading = data;
-    std::vector<Real> shown(shading.size());
-    data.projection.apply(shading.data(), data.channels, shown.data());
-    PatchRun<Real>::AddTo(shown, -1, &without_shading->photograph);
-    system = std::make_unique<SceneSystem<Real>>(*without_shading, backend);
+    if (!shading.empty()) {
+      without_shading = data;
+      std::vector<Real> shown(shading.size());
+      data.projection.apply(shading.data(), data.channels, shown.data());
+      PatchRun<Real>::AddTo(shown, -1, &without_shading->photograph);
+    }
+    system =
+        std::make_unique<SceneSystem<Real>>(without_shading ? *without_shading : data, backend);
   }
   const DataTerm<Real>& rest = without_shading ? *without_shading : data;
   // Of the slopes the square: f s |dr| for s |dr|.

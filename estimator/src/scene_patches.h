@@ -23,15 +23,16 @@ struct PatchPrior {
 //   1. r of total variation of strength lambda;
 //   2. G, the shading of the relief (see FitShading), from r and from what the quadratic that
 //      touches that prior at r makes of a photograph of the relief's normals. From here on u = r -
-//      G is solved for, of which I - H G is the photograph;
+//      G is solved for, of which I - H G is the photograph. Where that estimate is not done within
+//      the limit of iterations, which it has for itself, there is no G;
 //   3. u of total variation of strength f lambda, f = (sigma_p/(.7 sigma))^1.5/2, but between 1/2
 //      and 1: sigma_p is the rms of s (H r - I) within 4 px of p. Where H explains the photograph
 //      less of it is needed, as the patches do the rest; where it does not, at hidden things, all;
-//   4. v = G + FilterPatches of the stored values of r less s G, its threshold 8.1/255
-//      (255 sigma)^.6, and r that minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
+//   4. v, of which stored values are s G + FilterPatches of those of r less s G, its threshold
+//      8.1/255 (255 sigma)^.6, and r that minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
 //      rho = .15 (255 sigma)^.8: half-quadratic splitting (Zoran and Weiss 2011) cut short.
-// `system`: of the data, whose backend is `backend`; is used up. The outcome is that of all systems
-// together, the residual that of the last, in u.
+// `system`: of the data, whose backend is `backend`; is used up. The iterations are those of all
+// systems together, the residual is that of the last, in u.
 template <typename Real>
 RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& data,
                                  const std::vector<Real>& slope_squared,

@@ -141,6 +141,29 @@ kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squa
   return {&slope_squared, lambda, kVariationEps, kLeastPull};
 }
 
+template <typename Real>
+QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
+                                   const std::vector<Real>& slope_squared, double lambda,
+                                   const std::vector<Real>& radiance) {
+  QuadraticPrior<Real> prior;
+  prior.pull.assign(data.pixels(), static_cast<Real>(kLeastPull));
+  prior.smoothness.resize(data.pixels());
+  ForBands(data.height_px, data.threads, [&](int y0, int y1) {
+    std::vector<Real> squares(Index(data.width_px));
+    for (int y = y0; y < y1; ++y) {
+      SquaredDifferences(data, radiance, y, &squares);
+      for (std::size_t x = 0; x < squares.size(); ++x) {
+        const std::size_t i = Index(y) * Index(data.width_px) + x;
+        const auto slope = static_cast<double>(slope_squared[i]);
+        prior.smoothness[i] = static_cast<Real>(
+            lambda / 2 * slope /
+            std::sqrt(slope * static_cast<double>(squares[x]) + kVariationEps * kVariationEps));
+      }
+    }
+  });
+  return prior;
+}
+
 namespace {
 
 // Of total variation: with weights that are the same everywhere, which bring the blurred parts of
@@ -190,6 +213,8 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
                                    const std::vector<Real>&);                                    \
   template QuadraticPrior<Real> RidgePrior(const std::vector<Real>&, double);                    \
   template QuadraticPrior<Real> GradientPrior(const std::vector<Real>&, double);                 \
+  template QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>&, const std::vector<Real>&,   \
+                                              double, const std::vector<Real>&);                 \
   template kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>&, double);       \
   template RadianceOutcome SolveRadiance(Prior, double, const DataTerm<Real>&,                   \
                                          const std::vector<Real>&, const RadianceLimits&,        \

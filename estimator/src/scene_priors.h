@@ -45,10 +45,15 @@ QuadraticPrior<Real> GradientPrior(const std::vector<Real>& slope_squared, doubl
 // lambda sum (g + eps^2)^(1/2) + kLeastPull |r|^2, g = sum s^2 |dr|^2. Refers to the slopes.
 template <typename Real>
 kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squared, double lambda);
+// The quadratic that touches it at a radiance, all channels of the data.
+template <typename Real>
+QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
+                                   const std::vector<Real>& slope_squared, double lambda,
+                                   const std::vector<Real>& radiance);
 
 struct RadianceLimits {
   double tolerance = 1e-4;
-  int max_iterations = 200;  // all systems together
+  int max_iterations = 200;  // all systems of a radiance together
   std::function<void()> on_iteration;
 };
 struct RadianceOutcome {

@@ -141,8 +141,6 @@ std::vector<PerNormal> Coefficients(const WindowMeans& means, const PerNormal& e
   const auto at = [](const cv::Mat& plane, int y, int x) {
     return static_cast<double>(plane.at<Real>(y, x));
   };
-  Eigen::Matrix<double, kNormals, Eigen::Dynamic> right(kNormals,
-                                                        static_cast<Eigen::Index>(colours.size()));
   for (int y = 0; y < first.rows; ++y) {
     for (int x = 0; x < first.cols; ++x) {
       Eigen::Matrix3d normal;  // of which the Cholesky factor reads the lower half
@@ -153,22 +151,22 @@ std::vector<PerNormal> Coefficients(const WindowMeans& means, const PerNormal& e
         }
         normal(row, row) += kRegularisation;
       }
-      double all = 1e-12;
+      const auto factor = normal.selfadjointView<Eigen::Lower>().llt();
+      double all = 1e-12, explained = 0;
       for (std::size_t c = 0; c < colours.size(); ++c) {
         all += std::max(0.0, at(variance[c], y, x));
+        PerNormal& planes = with_colour[c];
+        const Eigen::Vector3d right(at(planes[0], y, x), at(planes[1], y, x), at(planes[2], y, x));
+        const Eigen::Vector3d fit = factor.solve(right);
+        explained += fit.dot(right);
         for (std::size_t k = 0; k < kNormals; ++k) {
-          right(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(c)) =
-              at(with_colour[c][k], y, x);
+          planes[k].at<Real>(y, x) = static_cast<Real>(fit[static_cast<Eigen::Index>(k)]);
         }
       }
-      const auto fit = normal.selfadjointView<Eigen::Lower>().llt().solve(right).eval();
-      const double explained = std::clamp(fit.cwiseProduct(right).sum() / all, 0.0, 1.0);
-      const double share = explained / (explained + kDoubt * (1 - explained));
-      for (std::size_t c = 0; c < colours.size(); ++c) {
-        for (std::size_t k = 0; k < kNormals; ++k) {
-          with_colour[c][k].at<Real>(y, x) = static_cast<Real>(
-              share * fit(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(c)));
-        }
+      explained = std::clamp(explained / all, 0.0, 1.0);
+      const auto share = static_cast<Real>(explained / (explained + kDoubt * (1 - explained)));
+      for (PerNormal& planes : with_colour) {
+        for (cv::Mat& plane : planes) plane.at<Real>(y, x) *= share;
       }
     }
   }
@@ -179,17 +177,21 @@ std::vector<PerNormal> Coefficients(const WindowMeans& means, const PerNormal& e
 
 double ReliefSlope(const DisparityMap& disparity) {
   const Slopes slopes(disparity);
-  double squares = 0, count = 0;
+  double sum_x = 0, sum_y = 0, squares = 0, count = 0;
   for (int y = 0; y < disparity.height_px; ++y) {
     for (int x = 0; x < disparity.width_px; ++x) {
       const Slope slope = slopes.At(x, y);
       if (slope.is_jump) continue;
-      squares += static_cast<double>(slope.x) * static_cast<double>(slope.x) +
-                 static_cast<double>(slope.y) * static_cast<double>(slope.y);
+      const auto across = static_cast<double>(slope.x), down = static_cast<double>(slope.y);
+      sum_x += across;
+      sum_y += down;
+      squares += across * across + down * down;
       ++count;
     }
   }
-  return count > 0 ? std::sqrt(squares / count) : 0;
+  if (count == 0) return 0;
+  const double mean_x = sum_x / count, mean_y = sum_y / count;
+  return std::sqrt(std::max(0.0, squares / count - mean_x * mean_x - mean_y * mean_y));
 }
 
 template <typename Real>
@@ -269,6 +271,7 @@ ReliefShading<Real> FitShading(const Relief<Real>& relief, const std::vector<Rea
         now += coefficient.mul(already[k]);
       }
       sharp = sharp.mul(is_smooth);
+      now = now.mul(is_smooth);
       for (int y = first; y < last; ++y) {
         const std::size_t row = c * pixels + Index(y) * Index(width_px);
         std::copy_n(sharp.ptr<Real>(y - from), width_px, shading.sharp.data() + row);
@@ -287,5 +290,16 @@ ReliefShading<Real> FitShading(const Relief<Real>& relief, const std::vector<Rea
 THICKLENS_RELIEF(float)
 THICKLENS_RELIEF(double)
 #undef THICKLENS_RELIEF
+
+double ShadingBytes(int width_px, int rows, int channels, int threads, double real_bytes) {
+  // The normals, as they are and as estimated, and the finest of these; their covariances, and with
+  // colours, which become the coefficients; the colours, and the finest of them; what is smooth,
+  // near and around; and means in the making.
+  const double planes = 3.0 * kNormals + 6 + channels * (kNormals + 2.0) + 3 + 6;
+  const int strips = (rows + kStripRows - 1) / kStripRows;
+  const int rows_of_strip = std::min(rows, kStripRows + 2 * WindowMeans::ReachPx());
+  return std::min(threads, strips) * static_cast<double>(rows_of_strip) * width_px * planes *
+         real_bytes;
+}
 
 }  // namespace thicklens::estimator

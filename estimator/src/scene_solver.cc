@@ -22,7 +22,7 @@ namespace thicklens::estimator {
 namespace {
 
 // Of conjugate gradients, for the progress only.
-constexpr int kUsualIterations = 60;
+int UsualIterations(Prior prior) { return prior == Prior::kPatches ? 120 : 60; }
 
 std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, bool noise_known) {
   std::string message = fmt::format("{} prior of strength {:.3g}, {} iterations",
@@ -73,7 +73,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
   if (sink != nullptr) keeps.sink_bytes = sink->bytes;
   ReturnFreedMemory(options.memory_limit_mib);
   const SceneMemory memory(input, options, keeps, reach_px);
-  const int iterations = std::min(options.max_iterations, kUsualIterations);
+  const int iterations = std::min(options.max_iterations, UsualIterations(options.prior));
   IterationProgress progress(options.progress, iterations + static_cast<int>(input.weights.size()));
 
   const std::optional<double> noise = StoredNoiseSigma(input.picture, input.transfer);

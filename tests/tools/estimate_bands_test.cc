@@ -111,6 +111,29 @@ TEST_F(EstimateBandsTest, GiveTheSameViewsInLessMemory) {
     ASSERT_NEAR(found.values[i], expected.values[i], 1e-3) << i;
 }
 
+// The relief of a picture takes three planes of the largest system, however few channels it has.
+TEST_F(EstimateBandsTest, TheForecastHoldsForTheShadingOfARelief) {
+  if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
+  constexpr int kSize = 500;
+  model::StoredPicture grey{kSize, kSize, 1, 8, {}};
+  model::RawDepthMap waves{kSize, kSize, {}, false};
+  for (int i = 0; i < kSize * kSize; ++i) {
+    const double wave = std::sin(0.5 * (i % kSize)) * std::sin(0.4 * (i / kSize));
+    grey.values.push_back(static_cast<std::uint16_t>(std::lround(120 + 60 * wave)));
+    waves.values.push_back(static_cast<float>(0.04 * wave));
+  }
+  usual_[0] = folder_.Put("grey.png", EncodePng(grey));
+  usual_[1] = folder_.Put("waves.pfm", EncodePfm(waves));
+  *std::find(usual_.begin(), usual_.end(), "ridge") = "patches";
+  usual_.insert(usual_.end(), {"--keep-depth-noise", "--threads", "2"});
+  for (const Arguments& precision : {Arguments{}, Arguments{"--double"}}) {
+    fs::remove_all(folder_ / "grey");
+    ASSERT_EQ(Run("grey", precision).exit_code, 0);
+    const json summary = Summary();
+    EXPECT_LE(summary["peak_rss_mib"].get<double>(), summary["predicted_memory_mib"].get<double>());
+  }
+}
+
 // A page shows all views, which are held for it; without one they never are.
 TEST_F(EstimateBandsTest, ViewsAreHeldForAPageOnly) {
   // So many views that they are most of what is held.

@@ -184,11 +184,13 @@ void AddIterationOptions(CLI::App* command, EstimateOptions* options) {
       ->check(Between(0, 1, "a relative residual"))
       ->type_name("X");
   command
-      ->add_option("--max-iterations", options->max_iterations,
-                   fmt::format("Of iterative solvers: in all (scene; default {}), for each channel "
-                               "(default {}), or for each block's (default {})",
-                               scene.max_iterations, functional.max_iterations,
-                               estimator::BlockOptions().max_iterations))
+      ->add_option(
+          "--max-iterations", options->max_iterations,
+          fmt::format("Of iterative solvers: in all (scene; default {}; as many for the relief of "
+                      "patches), for each channel (default {}), or for each block's "
+                      "(default {})",
+                      scene.max_iterations, functional.max_iterations,
+                      estimator::BlockOptions().max_iterations))
       ->check(CLI::Range(1, kMaxIterations))
       ->type_name("N");
   command->add_flag("--double", options->double_precision,
