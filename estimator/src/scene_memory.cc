@@ -23,6 +23,10 @@ constexpr double kSmallBytes = 8 << 20;
 // While systems are solved: which share of the rays is hidden, and which share sees what.
 constexpr double kSharesBytes = 2 * kFloat;
 
+// Of a system: the data, H^T W I, the radiance, what CG holds and what H holds inside; and planes:
+// weights, slopes, diagonals, the prior. Of those with patches more planes.
+constexpr double kSolvePictures = 12, kSolvePlanes = 7, kMorePlanes = 6;
+
 // Of all views in the making: the surfaces of the disparity.
 constexpr double kRendererBytes = 3;
 
@@ -89,30 +93,27 @@ double SceneMemory::SetupBytes(double pixels) const {
   return pixels * (kFloat * seen_views_ + kHiddenBytes + kFloat + kRendererBytes + axes);
 }
 
-// Beside H: pictures are the data, H^T W I, the radiance, what CG holds and what H holds inside;
-// planes are weights, slopes, diagonals, the prior. A device has the same again, and its programs.
+// Beside H, while systems are solved. A device has the same again, and its programs.
 double SceneMemory::SolveBytes(double pixels) const {
-  constexpr double kPictures = 12, kPlanes = 7;
-  const double solve = PlaneBytes(pixels, kPictures * channels_ + kPlanes);
-  return patches_ ? std::max({solve, PatchesBytes(pixels), ReliefBytes(pixels)}) : solve;
+  if (patches_) return std::max(PatchesBytes(pixels), ReliefBytes(pixels));
+  return PlaneBytes(pixels, kSolvePictures * channels_ + kSolvePlanes);
 }
 
 // The last of the systems: in addition the target, here and in the system, the shading of the
 // relief, and the photograph without it; and the strengths, weights in double, and what of the data
 // goes with that photograph.
 double SceneMemory::PatchesBytes(double pixels) const {
-  constexpr double kPictures = 12 + 4, kPlanes = 7 + 6;
-  return PlaneBytes(pixels, kPictures * channels_ + kPlanes);
+  return PlaneBytes(pixels, (kSolvePictures + 4) * channels_ + kSolvePlanes + kMorePlanes);
 }
 
-// The system of the relief's normals: beside the photograph and the radiance three normals in place
-// of colours; and these as they are, what is smooth, and the prior and weights, which are here
-// twice. Then, without it, the fit of the shading.
+// The system of the relief's normals: these in place of colours, and as they are; photograph and
+// radiance; what is smooth, and the prior and weights, which are here twice. Then, without it, the
+// fit of the shading.
 double SceneMemory::ReliefBytes(double pixels) const {
-  constexpr double kNormals = 3;
-  const double system = PlaneBytes(pixels, 12 * kNormals + 2 * channels_ + kNormals + 7 + 6);
+  const double system = PlaneBytes(
+      pixels, (kSolvePictures + 1) * kNormals + 2 * channels_ + kSolvePlanes + kMorePlanes);
   const double fit =
-      pixels * (real_ * (4 * channels_ + 2 * kNormals + 7) + kSharesBytes) +
+      pixels * (real_ * (4 * channels_ + 2 * kNormals + kSolvePlanes) + kSharesBytes) +
       ShadingBytes(width_px_, static_cast<int>(pixels / width_px_), channels_, threads_, real_);
   return std::max(system, fit);
 }

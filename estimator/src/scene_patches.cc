@@ -209,10 +209,9 @@ RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& 
       data.projection.apply(shading.data(), data.channels, shown.data());
       PatchRun<Real>::AddTo(shown, -1, &without_shading->photograph);
     }
-    system =
-        std::make_unique<SceneSystem<Real>>(without_shading ? *without_shading : data, backend);
   }
   const DataTerm<Real>& rest = without_shading ? *without_shading : data;
+  if (!system) system = std::make_unique<SceneSystem<Real>>(rest, backend);
   // Of the slopes the square: f s |dr| for s |dr|.
   std::vector<Real> slopes = LocalVariation(rest, slope_squared, *radiance, prior.noise_sigma);
   for (std::size_t i = 0; i < slopes.size(); ++i) slopes[i] *= slopes[i] * slope_squared[i];

@@ -114,7 +114,6 @@ class WindowMeans {
   cv::Mat around_, near_;
 };
 
-constexpr int kNormals = 3;
 using PerNormal = std::array<cv::Mat, kNormals>;
 
 // a of one colour after the other, of a strip.

@@ -14,9 +14,10 @@ namespace thicklens::estimator {
 // guide are the normals of the depth, and which learns on what both pictures show alike.
 
 // Which way surfaces face, of each pixel.
+constexpr int kNormals = 3;
 template <typename Real>
 struct Relief {
-  // Three planes (x, y, toward the lens), each less its mean: the unit vector along (gx, gy, c),
+  // kNormals planes (x, y, toward the lens), each less its mean: the unit vector along (gx, gy, c),
   // where gx and gy are the slopes of the disparity, px per view step and px. Of the two
   // differences to neighbours the one nearer to 0, so that edges have none, cut at +-.15. It is the
   // surface's normal up to a stretch toward the lens: how many of these px are a mm is not known
