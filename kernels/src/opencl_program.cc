@@ -2,6 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <regex>
+#include <sstream>
+#include <string>
+#include <vector>
+
 #include "device_survey.h"
 #include "guarded_child.h"
 #include "thicklens/error.h"
@@ -54,6 +59,8 @@ cl::Device DeviceAt(int platform_index, int device_index, std::string* platform_
   return devices[static_cast<std::size_t>(device_index)];
 }
 
+constexpr char kLineDirective[] = "#line 1 ";
+
 // The compiler takes files and lines in its messages from here.
 std::string LineDirective(const std::string& path) {
   std::string quoted;
@@ -61,7 +68,24 @@ std::string LineDirective(const std::string& path) {
     if (c == '"' || c == '\\') quoted += '\\';
     quoted += c;
   }
-  return fmt::format("#line 1 \"{}\"\n", quoted);
+  return fmt::format("{}\"{}\"\n", kLineDirective, quoted);
+}
+
+// "second.cl:2" of each line of a source in which files stand behind their directives; "" before.
+std::vector<std::string> PlacesOfLines(const std::string& source) {
+  std::vector<std::string> places;
+  std::string file;
+  int line_in_file = 0;
+  std::istringstream lines(source);
+  for (std::string line; std::getline(lines, line); ++line_in_file) {
+    if (line.rfind(kLineDirective, 0) == 0) {
+      const std::size_t start = sizeof kLineDirective;  // behind the quotation mark
+      file = line.substr(start, line.size() - start - 1);
+      line_in_file = 0;
+    }
+    places.push_back(file.empty() ? "" : fmt::format("{}:{}", file, line_in_file));
+  }
+  return places;
 }
 
 }  // namespace
@@ -70,6 +94,21 @@ std::string OpenClErrorText(int error) {
   const char* name = ErrorName(error);
   return name == nullptr ? fmt::format("error {}", error)
                          : fmt::format("error {}, {}", error, name);
+}
+
+std::string WithFilesNamed(const std::string& log, const std::string& source) {
+  static const std::regex kPlace("<kernel>:([0-9]{1,7}):");
+  const std::vector<std::string> places = PlacesOfLines(source);
+  std::string named;
+  auto rest = log.cbegin();
+  for (std::sregex_iterator found(log.begin(), log.end(), kPlace), end; found != end; ++found) {
+    const std::size_t line = std::stoul((*found)[1]);
+    named.append(rest, (*found)[0].first);
+    rest = (*found)[0].second;
+    const bool is_known = line >= 1 && line <= places.size() && !places[line - 1].empty();
+    named += is_known ? places[line - 1] + ":" : found->str();
+  }
+  return named.append(rest, log.cend());
 }
 
 bool HasDouble(const cl::Device& device) {
@@ -131,7 +170,8 @@ cl::Program BuildProgram(const OpenClDevice& device, const std::vector<EmbeddedF
     std::string log;
     for (const auto& part : failure.getBuildLog()) log += part.second + "\n";
     throw Error(fmt::format("device {}: the kernels do not build for {} ({}): {}", device.name,
-                            real, OpenClErrorText(failure.err()), OneLine(log)));
+                            real, OpenClErrorText(failure.err()),
+                            OneLine(WithFilesNamed(log, source))));
   } catch (const cl::Error& failure) {
     throw Error(fmt::format("device {}: the kernels do not build for {}: {}: {}", device.name, real,
                             failure.what(), OpenClErrorText(failure.err())));

@@ -419,6 +419,26 @@ TEST(BuildProgram, HasTheCompilersMessageWithFileAndLine) {
   EXPECT_THAT(message, Not(HasSubstr("first.cl:")));
 }
 
+// What NVIDIA's compiler said of the program of the test above.
+TEST(BuildProgram, NamesFilesWhereTheCompilerCountsTheLinesOfAllOfThem) {
+  const std::string source =
+      "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n"
+      "#line 1 \"kernels/src/first.cl\"\nkernel void First(global REAL* x) { x[0] = 1; }\n"
+      "// end\n\n"
+      "#line 1 \"kernels/src/second.cl\"\nkernel void Second(global REAL* x) {\n"
+      "  x[0] = nonsense;\n}\n\n";
+  EXPECT_EQ(WithFilesNamed("<kernel>:8:10: error: use of undeclared identifier 'nonsense'\n"
+                           "  x[0] = nonsense;\n         ^\n<kernel>:3:1: note: see here\n",
+                           source),
+            "kernels/src/second.cl:2:10: error: use of undeclared identifier 'nonsense'\n"
+            "  x[0] = nonsense;\n         ^\nkernels/src/first.cl:1:1: note: see here\n");
+  // Of no file, of no line there is, and of other compilers: as they are.
+  for (const char* log : {"<kernel>:1:1: x", "<kernel>:0:1: x", "<kernel>:11:1: x", "a.cl:8:1: x",
+                          "<kernel>:99999999999:1: x", ""}) {
+    EXPECT_EQ(WithFilesNamed(log, source), log);
+  }
+}
+
 TEST(BuildProgram, TellsTheProgramItsReal) {
   const auto device = OpenAnyDevice();
   const std::vector<EmbeddedFile> wants_float = {
