@@ -60,11 +60,13 @@ BlurPicture BlurPictureOf(const EstimateInput& input, bool falloff, int threads)
 SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
                                         std::optional<double> memory_limit_mib,
                                         const ProjectionOptions& options, BlurPicture* picture) {
+  ProjectionOptions returning = options;
+  returning.freed = [&] { ReturnFreedMemory(memory_limit_mib); };
   const auto make = [&](const BlurPicture& of) {
-    return MakeSceneProjection<float>(of.disparity, weights, options);
+    return MakeSceneProjection<float>(of.disparity, weights, returning);
   };
   const auto bytes_of = [](const SceneProjection<float>& made) {
-    return made.bytes(0, made.height_px);
+    return ProjectionBytes{made.bytes(0, made.height_px), made.fan_bytes};
   };
   if (!memory_limit_mib) return make(*picture);
   const int width_px = picture->picture.width_px, height_px = picture->picture.height_px;
@@ -76,18 +78,21 @@ SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
   ReturnFreedMemory(memory_limit_mib);
   const SceneMemory memory(forecast, scene, {},
                            ReachPx(picture->disparity, 0, static_cast<int>(weights.rows())));
-  const auto fits = [&](int rows, double operator_bytes) {
-    return memory.MostBytes(rows, operator_bytes) <= *memory_limit_mib * kBytesPerMib;
+  const auto fits = [&](int rows, const ProjectionBytes& projection) {
+    return memory.MostBytes(rows, projection) <= *memory_limit_mib * kBytesPerMib;
   };
   BlurPicture sample = *picture;
   KeepMiddleRows(kSampleRows, &sample);
-  double bytes_per_row = bytes_of(make(sample)) / sample.picture.height_px;
+  const auto of_row = [](const ProjectionBytes& all, int rows) {
+    return ProjectionBytes{all.held / rows, all.fan / rows};
+  };
+  ProjectionBytes per_row = of_row(bytes_of(make(sample)), sample.picture.height_px);
   for (int rows = height_px; rows >= std::min(kLeastRows, height_px); rows = rows * 7 / 8) {
-    if (!fits(rows, rows * bytes_per_row)) continue;
+    if (!fits(rows, {rows * per_row.held, rows * per_row.fan})) continue;
     KeepMiddleRows(rows, picture);
     SceneProjection<float> made = make(*picture);
     if (fits(rows, bytes_of(made))) return made;
-    bytes_per_row = bytes_of(made) / rows;
+    per_row = of_row(bytes_of(made), rows);
   }
   throw Error(
       fmt::format("memory_limit_mib is {:g}: it is too low to check the blur on {} rows of {} px",

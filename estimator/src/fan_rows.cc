@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -228,16 +229,19 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
 
 template <typename Real>
 kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,
-                                const std::vector<unsigned char>& is_product, int threads) {
+                                const std::vector<unsigned char>& is_product, int threads,
+                                const std::function<void()>& freed) {
   kernels::PixelRuns<Real> runs;
   runs.width_px = fan.width_px;
   runs.height_px = fan.height_px;
-  constexpr int kBandRows = 32;
-  const int bands = (fan.height_px + kBandRows - 1) / kBandRows;
+  constexpr int kLeastBandRows = 4, kMostBandRows = 32;
+  const int band_rows =
+      std::clamp(fan.height_px / (kPartsOfAThread * threads), kLeastBandRows, kMostBandRows);
+  const int bands = (fan.height_px + band_rows - 1) / band_rows;
   std::vector<Band<Real>> parts(Index(bands));
   model::ParallelFor(bands, threads, [&](int n) {
-    FillBand(fan, disparity, is_product, runs.stride_px(), n * kBandRows,
-             std::min((n + 1) * kBandRows, fan.height_px), &parts[Index(n)]);
+    FillBand(fan, disparity, is_product, runs.stride_px(), n * band_rows,
+             std::min((n + 1) * band_rows, fan.height_px), &parts[Index(n)]);
   });
   std::vector<std::size_t> first(1, 0);  // run of each band; and the end
   for (const Band<Real>& part : parts) {
@@ -258,14 +262,17 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
     std::copy(part.weight.begin(), part.weight.end(),
               runs.weight.data() + at * Index(kernels::kPixelsOfRun));
     part = {};
+    if (freed) freed();
   });
   kernels::SetBands(&runs);
   return runs;
 }
 
 template kernels::PixelRuns<float> RunsOf(const ViewFan&, const DisparityMap&,
-                                          const std::vector<unsigned char>&, int);
+                                          const std::vector<unsigned char>&, int,
+                                          const std::function<void()>&);
 template kernels::PixelRuns<double> RunsOf(const ViewFan&, const DisparityMap&,
-                                           const std::vector<unsigned char>&, int);
+                                           const std::vector<unsigned char>&, int,
+                                           const std::function<void()>&);
 
 }  // namespace thicklens::estimator

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <limits>
 
 namespace thicklens::estimator {
 
@@ -21,9 +22,14 @@ double ResidentBytes() {
 
 void ReturnFreedMemory(const std::optional<double>& limit_mib) {
 #ifdef __GLIBC__
-  constexpr double kHardlyMissed = 1.0 / 16;
-  if (limit_mib && ResidentBytes() > kHardlyMissed * *limit_mib * kBytesPerMib) malloc_trim(0);
+  if (ResidentBytes() > StayingBytes(limit_mib)) malloc_trim(0);
 #endif
+}
+
+double StayingBytes(const std::optional<double>& limit_mib) {
+  constexpr double kHardlyMissed = 1.0 / 16;
+  if (!limit_mib) return std::numeric_limits<double>::infinity();
+  return kHardlyMissed * *limit_mib * kBytesPerMib;
 }
 
 }  // namespace thicklens::estimator

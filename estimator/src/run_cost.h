@@ -14,6 +14,8 @@ double ResidentBytes();  // of the whole process, now
 // What was freed, but kept for later use, goes back to the system where that is possible and the
 // process holds so much of what it may that it could be missed: to get it back takes time.
 void ReturnFreedMemory(const std::optional<double>& limit_mib);
+// So much stays with the process in any case; infinite without a limit.
+double StayingBytes(const std::optional<double>& limit_mib);
 
 }  // namespace thicklens::estimator
 

@@ -39,8 +39,12 @@ class JoinedSummary {
   }
 
   // Throws Error if iterations led nowhere.
-  void Fill(SceneSummary* summary) const {
-    RequireProgress("scene", relative_residual_, iterations_, "allow more");
+  void Fill(const SceneOptions& options, SceneSummary* summary) const {
+    RequireProgress(
+        "scene", relative_residual_, iterations_,
+        options.strength_rule == StrengthRule::kGiven
+            ? fmt::format("allow more, or give another strength than {:g}", options.strength)
+            : "allow more");
     summary->strength = strength_;
     summary->iterations = iterations_;
     summary->reweightings = reweightings_;
@@ -96,38 +100,38 @@ SolvedScene SceneBandRun<Real>::Solve(const model::LinearPicture& photograph, bo
   if (options_.prior == Prior::kPatches) relief_slope_ = ReliefSlope(input_.disparity);
   int count = std::min(options_.least_bands, height_px);
   if (options_.memory_limit_mib) {
-    bytes_per_pixel_ = memory_.LargestBytesPerPixel();
-    if (MostBytes(count, bytes_per_pixel_) > *options_.memory_limit_mib * kBytesPerMib) {
-      bytes_per_pixel_ = TakenSample(photograph).bytes_per_pixel;
-      count = BandsFor(bytes_per_pixel_);
+    per_pixel_ = memory_.LargestPerPixel();
+    if (MostBytes(count, per_pixel_) > *options_.memory_limit_mib * kBytesPerMib) {
+      per_pixel_ = TakenSample(photograph).per_pixel;
+      count = BandsFor(per_pixel_);
     }
   }
   summary_->setup_seconds += SecondsSince(start);
   for (;;) {
     std::optional<SolvedScene> solved = SolveIn(count, photograph, wants_confidence, maps);
     if (solved) return std::move(*solved);
-    count = std::max(count + 1, BandsFor(bytes_per_pixel_));
+    count = std::max(count + 1, BandsFor(per_pixel_));
   }
 }
 
 template <typename Real>
-double SceneBandRun<Real>::MostBytes(int count, double bytes_per_pixel) const {
+double SceneBandRun<Real>::MostBytes(int count, const ProjectionBytes& per_pixel) const {
   const int height_px = input_.picture.height_px;
   const int rows =
       count == 1
           ? height_px
           : std::min(height_px, (height_px + count - 1) / count + 2 * BandMarginPx(reach_px_));
-  return memory_.MostBytes(rows, memory_.OperatorBytes(rows, bytes_per_pixel));
+  return memory_.MostBytes(rows, memory_.OfRows(rows, per_pixel));
 }
 
 template <typename Real>
-int SceneBandRun<Real>::BandsFor(double bytes_per_pixel) const {
+int SceneBandRun<Real>::BandsFor(const ProjectionBytes& per_pixel) const {
   const double limit = *options_.memory_limit_mib * kBytesPerMib;
   const int least = std::min(options_.least_bands, input_.picture.height_px);
   const int most = std::max(least, input_.picture.height_px / kLeastRows);
-  double needed = MostBytes(least, bytes_per_pixel);
+  double needed = MostBytes(least, per_pixel);
   for (int count = least; count <= most; ++count) {
-    const double bytes = MostBytes(count, bytes_per_pixel);
+    const double bytes = MostBytes(count, per_pixel);
     if (bytes <= limit) return count;
     needed = std::min(needed, bytes);
   }
@@ -178,7 +182,8 @@ const typename SceneBandRun<Real>::Sample& SceneBandRun<Real>::TakenSample(
   sample_.emplace();
   const double pixels = static_cast<double>(photograph.width_px) * photograph.height_px;
   const int stride = static_cast<int>(std::ceil(pixels / kSamplePixels));
-  double sampled = 0, bytes = 0;
+  double sampled = 0;
+  ProjectionBytes bytes;
   const int margin_px = SampleMarginPx(reach_px_);
   const int rows = std::max(kSampleRows, 2 * margin_px);
   for (const SceneBand& band : SampleBands(photograph.height_px, rows, stride, margin_px)) {
@@ -187,10 +192,12 @@ const typename SceneBandRun<Real>::Sample& SceneBandRun<Real>::TakenSample(
     const SignalSum signal = radiance.Signal();
     sample_->signal.squares += signal.squares;
     sample_->signal.count += signal.count;
-    bytes += radiance.result_operator_bytes();
+    const ProjectionBytes of_band = radiance.result_projection_bytes();
+    bytes.held += of_band.held;
+    bytes.fan += of_band.fan;
     sampled += static_cast<double>(photograph.width_px) * (band.last - band.first);
   }
-  sample_->bytes_per_pixel = bytes / sampled;
+  sample_->per_pixel = {bytes.held / sampled, bytes.fan / sampled};
   return *sample_;
 }
 
@@ -222,13 +229,24 @@ bool SceneBandRun<Real>::IsWithinLimit(double bytes) const {
 }
 
 template <typename Real>
+double SceneBandRun<Real>::PredictedMib(double bytes, int rows, const ProjectionBytes& projection,
+                                        double kept_fan_bytes) const {
+  const double with_freed =
+      memory_.MostBytes(rows, projection, kept_fan_bytes, SceneMemory::Freed::kStays);
+  const double staying = std::min(with_freed, StayingBytes(options_.memory_limit_mib));
+  return std::max(bytes, staying) / kBytesPerMib;
+}
+
+template <typename Real>
 bool SceneBandRun<Real>::Fits(const SceneBand& band, const Radiance& radiance) {
-  const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes());
-  summary_->predicted_memory_mib = std::max(summary_->predicted_memory_mib, bytes / kBytesPerMib);
+  const ProjectionBytes projection = radiance.projection_bytes();
+  const double bytes = memory_.MostBytes(band.rows(), projection);
+  summary_->predicted_memory_mib =
+      std::max(summary_->predicted_memory_mib, PredictedMib(bytes, band.rows(), projection, 0));
   if (IsWithinLimit(bytes)) return true;
-  bytes_per_pixel_ =
-      std::max(bytes_per_pixel_, radiance.operator_bytes() /
-                                     static_cast<double>(input_.picture.width_px) / band.rows());
+  const double pixels = static_cast<double>(input_.picture.width_px) * band.rows();
+  per_pixel_ = {std::max(per_pixel_.held, projection.held / pixels),
+                std::max(per_pixel_.fan, projection.fan / pixels)};
   return false;
 }
 
@@ -274,9 +292,11 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
     if (!Fits(band, radiance)) return std::nullopt;
     if (run.fan) {
       ViewFan fan = radiance.TakeFan();
-      const double bytes = memory_.MostBytes(band.rows(), radiance.operator_bytes(), BytesOf(fan));
+      const double bytes =
+          memory_.MostBytes(band.rows(), radiance.projection_bytes(), BytesOf(fan));
       if (IsWithinLimit(bytes)) {
-        summary_->predicted_memory_mib = bytes / kBytesPerMib;
+        summary_->predicted_memory_mib =
+            PredictedMib(bytes, band.rows(), radiance.projection_bytes(), BytesOf(fan));
         whole.fan = std::move(fan);
       }
     }
@@ -294,7 +314,7 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
     }
     summary_->solve_seconds += take_lap();
   }
-  joined.Fill(summary_);
+  joined.Fill(options_, summary_);
   summary_->iterations += search_iterations_;
   summary_->bands = count;
   return whole;

@@ -36,11 +36,11 @@ class SceneBandRun {
   using Radiance = SceneRadiance<Real>;
   struct Sample {
     SignalSum signal;
-    double bytes_per_pixel = 0;  // of H
+    ProjectionBytes per_pixel;
   };
 
-  int BandsFor(double bytes_per_pixel) const;
-  double MostBytes(int count, double bytes_per_pixel) const;
+  int BandsFor(const ProjectionBytes& per_pixel) const;
+  double MostBytes(int count, const ProjectionBytes& per_pixel) const;
   const Sample& TakenSample(const model::LinearPicture& photograph);
   double StrengthFor(const model::LinearPicture& photograph, const std::vector<SceneBand>& bands);
   typename Radiance::Run RunFor(const SceneOptions& options) const;
@@ -54,6 +54,9 @@ class SceneBandRun {
                                      bool wants_confidence, SceneMaps* maps);
   bool Fits(const SceneBand& band, const Radiance& radiance);
   bool IsWithinLimit(double bytes) const;
+  // Of what is needed, `bytes`, and more that it leaves with the process if it may.
+  double PredictedMib(double bytes, int rows, const ProjectionBytes& projection,
+                      double kept_fan_bytes) const;
   // Whether the views of the photograph's rays are those of the light field.
   bool MayKeepFan(int bands) const;
 
@@ -67,7 +70,7 @@ class SceneBandRun {
   DisparityMap band_disparity_;  // unless it is the input's
   double relief_slope_ = 0;      // of patches
   double mean_slope_ = 0;
-  double bytes_per_pixel_ = 0;  // of H, the most that is known
+  ProjectionBytes per_pixel_;  // the most that is known
   std::optional<Sample> sample_;
   int search_iterations_ = 0;
 };

@@ -6,8 +6,10 @@
 
 #include "run_cost.h"
 #include "scene_relief.h"
+#include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/picture_filter.h"
 #include "thicklens/model/parallel.h"
+#include "view_fan.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -19,6 +21,10 @@ constexpr double kFloat = sizeof(float);
 constexpr double kRenderedBytes = kFloat + 1 + 8;
 // Code that is read in when it runs first, stacks, and all that is not as large as the picture.
 constexpr double kSmallBytes = 8 << 20;
+
+// Of a sample of a view of the fan: what it sees, and where that is hidden or mixed.
+constexpr double kSeenBytes = kFloat, kHiddenBytes = sizeof(CompactView::Hidden),
+                 kMixedBytes = sizeof(CompactView::Mixed);
 
 // While systems are solved: which share of the rays is hidden, and which share sees what.
 constexpr double kSharesBytes = 2 * kFloat;
@@ -47,7 +53,8 @@ SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options
       patches_(options.prior == Prior::kPatches),
       keeps_(keeps) {}
 
-double SceneMemory::MostBytes(int rows, double operator_bytes, double fan_bytes) const {
+double SceneMemory::MostBytes(int rows, const ProjectionBytes& projection, double kept_fan_bytes,
+                              Freed freed) const {
   const double all = static_cast<double>(width_px_) * height_px_;
   double kept = all;  // the confidence of its points
   if (keeps_.photograph) kept += kFloat * all * channels_;
@@ -60,9 +67,10 @@ double SceneMemory::MostBytes(int rows, double operator_bytes, double fan_bytes)
     band += kFloat * pixels * channels_;
   }
   return before_ + kept +
-         std::max(
-             band + operator_bytes + std::max(SetupBytes(pixels), fan_bytes + SolveBytes(pixels)),
-             fan_bytes + ViewsBytes());
+         std::max(band + projection.held +
+                      std::max(SetupBytes(pixels, projection, freed),
+                               kept_fan_bytes + SolveBytes(pixels)),
+                  kept_fan_bytes + ViewsBytes());
 }
 
 double SceneMemory::RowBytes() const {
@@ -74,23 +82,30 @@ double SceneMemory::RowBytes() const {
   return runs * (kRun * real_ + sizeof(std::int32_t));
 }
 
-double SceneMemory::LargestBytesPerPixel() const {
+ProjectionBytes SceneMemory::LargestPerPixel() const {
   constexpr double kIndexBytes = sizeof(std::int64_t) + sizeof(std::int32_t);
   const double products = std::min(u_count_, v_count_);
-  return RowBytes() + kIndexBytes + products * 2 * real_ * (2.0 * reach_px_ + 3);
+  return {RowBytes() + kIndexBytes + products * 2 * real_ * (2.0 * reach_px_ + 3),
+          seen_views_ * (kSeenBytes + kHiddenBytes + kMixedBytes)};
 }
 
-double SceneMemory::OperatorBytes(int rows, double bytes_per_pixel) const {
+ProjectionBytes SceneMemory::OfRows(int rows, const ProjectionBytes& per_pixel) const {
   const int at_borders = rows < height_px_ ? std::min(2 * reach_px_, rows) : 0;
-  return static_cast<double>(width_px_) * (rows * bytes_per_pixel + at_borders * RowBytes());
+  constexpr double kHiddenShare = 1.0 / 3;  // of views: half of them look away, and not all as far
+  const double width = width_px_;
+  return {width * (rows * per_pixel.held + at_borders * RowBytes()),
+          width * (rows * per_pixel.fan + kHiddenShare * at_borders * seen_views_ * kHiddenBytes)};
 }
 
-// Beside H: the fan of all views, and of it the axes, or the places where rows are gathered; and
-// which share of the aperture sees what.
-double SceneMemory::SetupBytes(double pixels) const {
-  constexpr double kHiddenBytes = sizeof(double) + kFloat;
+// Beside H: the fan of all views, and of it the axes, or the places where rows are gathered and
+// the parts of H that are on their way to the others; and which share of the aperture sees what.
+double SceneMemory::SetupBytes(double pixels, const ProjectionBytes& projection,
+                               Freed freed) const {
+  constexpr double kShareBytes = sizeof(double) + kFloat;
   const double axes = kFloat * (u_count_ + v_count_) + 2 + 2 * kFloat + 1;
-  return pixels * (kFloat * seen_views_ + kHiddenBytes + kFloat + kRendererBytes + axes);
+  const double parts = freed == Freed::kStays ? 1 : 1.0 / kPartsOfAThread;
+  return projection.fan + parts * projection.held +
+         pixels * (kShareBytes + kFloat + kRendererBytes + axes);
 }
 
 // Beside H, while systems are solved. A device has the same again, and its programs.

@@ -5,6 +5,12 @@
 
 namespace thicklens::estimator {
 
+// Bytes of H; and of the rays of the aperture from which it is made, which are then no longer.
+struct ProjectionBytes {
+  double held = 0;
+  double fan = 0;
+};
+
 // The most that the whole process is expected to hold while a scene is estimated, bytes: what it
 // holds already, and what the estimate keeps from its beginning to its end, and the largest of what
 // it needs to set a band of the picture up, to solve it, and to make the views.
@@ -23,16 +29,19 @@ class SceneMemory {
               int reach_px);
 
   // In bands of at most so many rows, of which H takes so much; and views of the fan are kept, from
-  // when H is made to when they are shown, that take so much.
-  double MostBytes(int rows, double operator_bytes, double fan_bytes = 0) const;
+  // when H is made to when they are shown, that take so much. What is freed while H is made goes
+  // back to the system, or stays for what is asked for next (ReturnFreedMemory).
+  enum class Freed { kReturned, kStays };
+  double MostBytes(int rows, const ProjectionBytes& projection, double kept_fan_bytes = 0,
+                   Freed freed = Freed::kReturned) const;
   // What H of a band takes if each pixel takes so much where the picture does not end.
-  double OperatorBytes(int rows, double bytes_per_pixel) const;
+  ProjectionBytes OfRows(int rows, const ProjectionBytes& per_pixel) const;
   // More than any pixel takes.
-  double LargestBytesPerPixel() const;
+  ProjectionBytes LargestPerPixel() const;
 
  private:
   double RowBytes() const;  // of a pixel that has a row of its own
-  double SetupBytes(double pixels) const;
+  double SetupBytes(double pixels, const ProjectionBytes& projection, Freed freed) const;
   double SolveBytes(double pixels) const;
   double PatchesBytes(double pixels) const;
   double ReliefBytes(double pixels) const;

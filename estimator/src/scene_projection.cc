@@ -165,6 +165,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
   projection.width_px = disparity.width_px;
   projection.height_px = disparity.height_px;
   projection.threads = options.threads;
+  projection.fan_bytes = BytesOf(fan);
   projection.hidden_share = HiddenShare(fan, projection.pixels());
   if (options.seen_share)
     projection.seen_share = SeenShare(fan, disparity, plain.is_seen, options.threads);
@@ -190,7 +191,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                  options.between, options.threads);
     }
   }
-  projection.rows = RunsOf<Real>(fan, disparity, is_product, options.threads);
+  projection.rows = RunsOf<Real>(fan, disparity, is_product, options.threads, options.freed);
   if (options.fan) {
     DropCentre(&fan);
     projection.fan = std::move(fan);

@@ -42,7 +42,8 @@ class SceneProjection {
   std::vector<float> hidden_share;
   // Share of the aperture that sees each point of the centre view; only where it was asked for.
   std::vector<float> seen_share;
-  ViewFan fan;  // likewise; without the centre
+  ViewFan fan;           // likewise; without the centre
+  double fan_bytes = 0;  // what all of it took while this was made
 
   // Both set their results.
   void Apply(const Real* x, int channels, Real* y) const;
@@ -70,6 +71,7 @@ struct ProjectionOptions {
   bool fan = false;                   // is kept
   int threads = 1;
   std::function<void()> progress;  // called now and then, from any thread; may throw to stop
+  std::function<void()> freed;     // called, from any thread, when much memory was freed
 };
 // `disparity` of the rays that meet on the photograph's pixels: px per view step, 0 in the plane of
 // focus, without holes. Weights V x U, sum 1. Throws Error for sizes that do not fit.

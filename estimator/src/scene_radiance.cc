@@ -105,6 +105,7 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph,
   projection.seen_share = run_.confidence;
   projection.fan = run_.fan;
   projection.progress = [this] { run_.progress->Tell(); };
+  projection.freed = [this] { ReturnFreedMemory(run_.options.memory_limit_mib); };
   projection_ = MakeSceneProjection<Real>(disparity, run_.input.weights, projection);
   ReturnFreedMemory(run_.options.memory_limit_mib);
 
@@ -115,10 +116,11 @@ void SceneRadiance<Real>::Prepare(const model::LinearPicture& photograph,
 }
 
 template <typename Real>
-double SceneRadiance<Real>::OperatorBytes(int first, int last) const {
+ProjectionBytes SceneRadiance<Real>::BytesOfRows(int first, int last) const {
   constexpr double kOnDevice = 2;  // at most: filters as they are and transposed
   const bool on_device = run_.backend != nullptr && run_.backend->is_opencl();
-  return projection_.bytes(first, last) * (on_device ? 1 + kOnDevice : 1);
+  return {projection_.bytes(first, last) * (on_device ? 1 + kOnDevice : 1),
+          projection_.fan_bytes * (last - first) / projection_.height_px};
 }
 
 template <typename Real>

@@ -8,6 +8,7 @@
 #include "iteration_progress.h"
 #include "scene_bands.h"
 #include "scene_data.h"
+#include "scene_memory.h"
 #include "scene_priors.h"
 #include "scene_projection.h"
 #include "scene_system.h"
@@ -52,9 +53,9 @@ class SceneRadiance {
   // disparity of its pixels, which must live as long.
   void Prepare(const model::LinearPicture& photograph, const DisparityMap& disparity,
                const SceneBand& band);
-  double operator_bytes() const { return OperatorBytes(0, projection_.height_px); }
-  // Of the band's result.
-  double result_operator_bytes() const { return OperatorBytes(first_row(), last_row()); }
+  // Of all rows that are solved for; and about those of the band's result alone.
+  ProjectionBytes projection_bytes() const { return BytesOfRows(0, projection_.height_px); }
+  ProjectionBytes result_projection_bytes() const { return BytesOfRows(first_row(), last_row()); }
   SignalSum Signal() const;
 
   // The views of the photograph's rays, if they were to be kept; they are no longer after it.
@@ -70,7 +71,7 @@ class SceneRadiance {
   // The band's result in the rows that are solved for.
   int first_row() const { return band_.first - band_.from; }
   int last_row() const { return band_.last - band_.from; }
-  double OperatorBytes(int first, int last) const;
+  ProjectionBytes BytesOfRows(int first, int last) const;
   std::size_t PixelOfRow(int row) const;
   void AddRows(const std::vector<float>& plane, std::vector<float>* to) const;
   std::vector<Real> SlopeSquared(const model::LinearPicture& photograph) const;

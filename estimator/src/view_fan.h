@@ -61,10 +61,14 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
                                     const DisparityMap& disparity, const Eigen::VectorXd& weights,
                                     Between between, int threads);
 
-// The rows of the pixels that are no product, linear between the pixels of a ray's surface.
+// The rows of the pixels that are no product, linear between the pixels of a ray's surface. They
+// are made in parts, kPartsOfAThread for each thread and more, which are then put together; freed
+// (may be empty) is called, from any thread, whenever one of them is no longer.
+constexpr int kPartsOfAThread = 8;
 template <typename Real>
 kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,
-                                const std::vector<unsigned char>& is_product, int threads);
+                                const std::vector<unsigned char>& is_product, int threads,
+                                const std::function<void()>& freed);
 
 }  // namespace thicklens::estimator
 

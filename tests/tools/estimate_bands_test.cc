@@ -134,6 +134,36 @@ TEST_F(EstimateBandsTest, TheForecastHoldsForTheShadingOfARelief) {
   }
 }
 
+// Rough depth hides, mixes and needs rows of its own everywhere; of many views the rays are what is
+// large.
+TEST_F(EstimateBandsTest, TheForecastHoldsForRoughDepthAndManyViews) {
+  if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
+  constexpr int kWidth = 160, kHeight = 400;
+  model::StoredPicture grey{kWidth, kHeight, 1, 8, {}};
+  model::RawDepthMap rough{kWidth, kHeight, {}, false};
+  std::mt19937 engine(3);
+  std::normal_distribution<double> noise(0, 0.4);
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    grey.values.push_back(static_cast<std::uint16_t>(100 + i % 97));
+    rough.values.push_back(static_cast<float>(noise(engine)));
+  }
+  usual_[0] = folder_.Put("grey.png", EncodePng(grey));
+  usual_[1] = folder_.Put("rough.pfm", EncodePfm(rough));
+  *std::find(usual_.begin(), usual_.end(), "3x3") = "15x15";
+  *std::find(usual_.begin(), usual_.end(), "5e-5") = "0.05";
+  usual_.insert(usual_.end(), {"--keep-depth-noise", "--threads", "2"});
+  ASSERT_EQ(Run("whole", {}).exit_code, 0);
+  const json whole = Summary();
+  const double forecast = whole["predicted_memory_mib"];
+  EXPECT_LE(whole["peak_rss_mib"].get<double>(), forecast);
+  // Half of what H takes must be done without.
+  const double limit = 0.7 * forecast;
+  ASSERT_GT(whole["peak_rss_mib"].get<double>(), limit);
+  ASSERT_EQ(Run("bands", {"--memory-limit", std::to_string(limit)}).exit_code, 0);
+  EXPECT_GT(Summary()["bands"].get<int>(), 1);
+  EXPECT_LE(Summary()["peak_rss_mib"].get<double>(), limit);
+}
+
 // A page shows all views, which are held for it; without one they never are.
 TEST_F(EstimateBandsTest, ViewsAreHeldForAPageOnly) {
   // So many views that they are most of what is held.
