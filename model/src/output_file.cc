@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <new>
 #include <system_error>
 
 #include "thicklens/error.h"
@@ -282,13 +283,15 @@ OutputFolder::OutputFolder(const std::string& path, const std::string& marker_fi
   impl_->fd = OpenLocked(impl_->part, path, PartKind::kFolder);
   // Under the lock: another run's Commit would be seen half-way else.
   RequireReplaceable(target, marker_file, own_entries);
-  std::error_code ignored;
+  std::error_code ignored, failure;
   for (const auto& left_over : fs::directory_iterator(impl_->part, ignored))
     fs::remove_all(left_over, ignored);
-  if (!fs::is_empty(impl_->part, ignored)) {
+  const bool is_empty = fs::is_empty(impl_->part, failure);
+  if (failure == std::errc::not_enough_memory) throw std::bad_alloc();
+  if (failure || !is_empty) {
     throw Error(
-        fmt::format("{}: cannot be written: {}, which an earlier run left, cannot be emptied", path,
-                    impl_->part));
+        fmt::format("{}: cannot be written: {}, which an earlier run left, cannot be emptied{}",
+                    path, impl_->part, failure ? ": " + failure.message() : ""));
   }
 }
 
