@@ -14,6 +14,7 @@ namespace {
 constexpr int kPatchPx = 32;
 constexpr double kFarAbove = 4;
 constexpr double kAbove = 1.5;
+constexpr double kLeastCounted = 0.1;  // of all blocks
 constexpr float kMostHidden = 0.01F;
 
 std::size_t Index(int width_px, int x, int y) {
@@ -57,6 +58,10 @@ Patch MeasurePatch(const std::vector<float>& residual, const std::vector<float>&
 }
 
 // The blocks of which enough is seen by the whole aperture.
+std::size_t Blocks(int size_px) {
+  return static_cast<std::size_t>((size_px + kPatchPx - 1) / kPatchPx);
+}
+
 std::vector<ResidualPatch> MeasurePatches(const std::vector<float>& residual,
                                           const std::vector<float>& hidden_share, int width_px,
                                           int height_px) {
@@ -140,7 +145,10 @@ std::optional<double> UnexplainedShare(const std::vector<float>& residual,
                                        int height_px, double noise_sigma) {
   const std::vector<ResidualPatch> patches =
       MeasurePatches(residual, hidden_share, width_px, height_px);
-  if (patches.empty()) return std::nullopt;
+  const auto blocks = static_cast<double>(Blocks(width_px) * Blocks(height_px));
+  if (patches.empty() || static_cast<double>(patches.size()) < kLeastCounted * blocks) {
+    return std::nullopt;
+  }
   const double usual = kAbove * noise_sigma;
   const auto above =
       std::count_if(patches.begin(), patches.end(),

@@ -18,7 +18,7 @@ bool HasDouble(const cl::Device& device);
 // Opens the device with these indices. From here on OpenCL is in use in this process. Throws Error.
 std::shared_ptr<const OpenClDevice> OpenOpenClDevice(int platform, int device);
 
-// What NVIDIA's compiler says of a program. It passes #line over and counts the lines of the whole
+// What NVIDIA's compiler says of a program. It ignores #line and counts the lines of the whole
 // source: in place of "<kernel>:LINE:" stand the file and the line in it, as others have them.
 std::string WithFilesNamed(const std::string& log, const std::string& source);
 

@@ -230,7 +230,7 @@ class OpenClSteps : public RadianceSteps<Real> {
     std::vector<Number> of_group(sums_.bytes() / sizeof(Number));
     sums_.Read(of_group.data());
     std::array<double, kSums> sums{};
-    const std::size_t count = SumGroups() * kSums;  // a call to the driver
+    const std::size_t count = SumGroups() * kSums;  // not anew for each number: it is looked up
     for (std::size_t i = 0; i < count; ++i) {
       sums[i % kSums] += static_cast<double>(of_group[i]);
     }

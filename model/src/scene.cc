@@ -163,14 +163,14 @@ DepthStatistics StatisticsOf(const std::vector<float>& depth_mm) {
 //     zf/100 (it was within 10 zf).
 // Many of the second sort are nearer than f1 already.
 void CheckPlausible(const Camera& camera, const DepthStatistics& depth,
-                    const std::string& depth_name) {
+                    const std::string& depth_name, const std::string& doubt) {
   const std::string found = fmt::format("{}: depths from {:.6g} to {:.6g} mm, median {:.6g} mm",
                                         depth_name, depth.min_mm, depth.max_mm, depth.median_mm);
   const double front_focal_length_mm = camera.lens.front_focal_length_mm;
   if (!(depth.min_mm > front_focal_length_mm)) {
-    throw Error(fmt::format(
-        "{}: they must be beyond the camera's front focal point at {:.6g} mm; is the unit right?",
-        found, front_focal_length_mm));
+    throw Error(
+        fmt::format("{}: they must be beyond the camera's front focal point at {:.6g} mm; {}",
+                    found, front_focal_length_mm, doubt));
   }
   if (!camera.calibration || !camera.calibration->image_distance_mm) return;
   const double focus_depth_mm = camera.focus_depth_mm();
@@ -182,8 +182,8 @@ void CheckPlausible(const Camera& camera, const DepthStatistics& depth,
   if (too_large || too_small) {
     throw Error(fmt::format(
         "{}: too {} for a camera focused at {:.6g} mm, as if the unit were off by a factor of "
-        "1000; is the unit right?",
-        found, too_large ? "far" : "near", focus_depth_mm));
+        "1000; {}",
+        found, too_large ? "far" : "near", focus_depth_mm, doubt));
   }
 }
 
@@ -328,7 +328,10 @@ Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& 
     throw Error(fmt::format("{}: none of its {} values is a depth: all are holes", depth_name,
                             map.values.size()));
   }
-  CheckPlausible(camera, scene.depth, depth_name);
+  CheckPlausible(camera, scene.depth, depth_name,
+                 convention.kind == DepthKind::kDisparity
+                     ? "are scale and offset of the disparity right, and is it one?"
+                     : "is the unit right?");
   scene.picture = std::move(picture);
   return scene;
 }

@@ -226,6 +226,11 @@ TEST_F(ResidualPatchesTest, UnexplainedShareLeavesOutWhatIsHidden) {
   EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 3.0 / 25);
   hidden_share_.assign(kPixels, 1.0F);
   EXPECT_FALSE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
+  // Few say nothing of all: less than a tenth of 28 are two.
+  Fill(&hidden_share_, 0, 0, 64, 32, 0);
+  EXPECT_FALSE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
+  Fill(&hidden_share_, 64, 0, 32, 32, 0);
+  EXPECT_TRUE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
 }
 
 TEST_F(ResidualPatchesTest, SizesThatDoNotFitAreNamed) {

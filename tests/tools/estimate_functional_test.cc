@@ -222,7 +222,8 @@ TEST_P(EstimateFunctionalTest, OptionsOfOthersAreAUsageError) {
 TEST_P(EstimateFunctionalTest, SettingsThatCannotBe) {
   EXPECT_THAT(Refusal(With(Usual(), {"--gamma", "0"}), 1), HasSubstr("gamma is 0"));
   EXPECT_THAT(Refusal(With(Usual(), {"--ridge", "0"}), 1), HasSubstr("ridge is 0"));
-  EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "1"}), 1), HasSubstr("tolerance is 1"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "1"}), 2),
+              HasSubstr("--tolerance: must be above 0 and below 1"));
   EXPECT_THAT(Refusal(With(Usual(), {"--memory-limit", "5"}), 1),
               AllOf(HasSubstr("memory limit 5 MiB"), HasSubstr("at least")));
 }

@@ -312,7 +312,8 @@ TEST_F(EstimateSceneTest, SettingsThatCannotBe) {
   }
   EXPECT_THAT(Refusal(With(Usual(), {"--prior", "sparse"}), 2), HasSubstr("sparse"));
   EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "0"}), 2), HasSubstr("--tolerance"));
-  EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "1"}), 1), HasSubstr("tolerance is 1"));
+  EXPECT_THAT(Refusal(With(Usual(), {"--tolerance", "1"}), 2),
+              HasSubstr("--tolerance: must be above 0 and below 1"));
   EXPECT_THAT(Refusal(With(Usual(), {"--max-iterations", "0"}), 2), HasSubstr("--max-iterations"));
   EXPECT_THAT(Refusal(With(Usual(), {"--memory-limit", "5"}), 1),
               AllOf(HasSubstr("memory limit 5 MiB"), HasSubstr("at least")));
@@ -472,6 +473,14 @@ TEST_F(EstimateSceneTest, HolesAreToldWithTheirShare) {
   EXPECT_EQ(summary["holes_filled"], 320);
   EXPECT_NEAR(summary["holes_share"].get<double>(), 0.052, 5e-4);
   EXPECT_THAT(result.out, HasSubstr("320 px, filled along the surfaces around them (5.2 %)"));
+  EXPECT_THAT(result.err, Not(HasSubstr("are no depth")));
+
+  const std::string nearly_none = Depth([](int x, int y) {
+    return x == 20 && y == 20 ? 0.4 : std::numeric_limits<double>::quiet_NaN();
+  });
+  Summary({Picture(), nearly_none, "--depth-kind", "disparity", "--views", "3x3"}, &result);
+  EXPECT_THAT(result.out, HasSubstr("(99.9 %)"));
+  EXPECT_THAT(result.err, AllOf(HasSubstr("depth.pfm"), HasSubstr("are no depth")));
 }
 
 TEST_F(EstimateSceneTest, TheReportShowsEachFigureOnce) {
@@ -500,8 +509,10 @@ TEST_F(EstimateSceneTest, TheReportShowsEachFigureOnce) {
                   "Refocused to −0.94 px"));
   for (const char* outside : {"http", "href=", "<script", "@import"})
     EXPECT_THAT(html, Not(HasSubstr(outside)));
-  EXPECT_THAT(html, AllOf(HasSubstr("<td>total variation</td>"),
-                          HasSubstr("Hatched in grey: 325 px"), HasSubstr("grey levels</td>")));
+  EXPECT_THAT(html,
+              AllOf(HasSubstr("<td>total variation</td>"), HasSubstr("Hatched in grey: 325 px"),
+                    HasSubstr("grey levels</td>"), HasSubstr("picture.png</td>"),
+                    HasSubstr("depth.pfm (disparity)</td>"), HasSubstr("<td>srgb (assumed)</td>")));
   EXPECT_EQ(summary["holes_filled"], 325);
 }
 

@@ -201,8 +201,14 @@ TEST_F(EstimateTest, APictureOfAPartOfTheSensor) {
   EXPECT_EQ(found.camera->sensor.width_px, kWidth);
   EXPECT_DOUBLE_EQ(found.camera->sensor.principal_point_px.x(), (kWidth + 19) / 2.0 - 20);
   fs::remove_all(Output());
-  EXPECT_THAT(Refusal(With(With({Picture(), depth}, rest), {"--sensor-origin", "21,8"})),
-              HasSubstr("21"));
+  EXPECT_THAT(
+      Refusal(With(With({Picture(), depth}, rest), {"--sensor-origin", "21,8"})),
+      AllOf(HasSubstr("--sensor-origin: a picture of 36x28 px at x 21, y 8"),
+            HasSubstr("large.yaml, which has 56x36 px"), HasSubstr("x may be at most 20, y 8")));
+  EXPECT_THAT(
+      Refusal(With(AsDisparity(Picture(), Disparity()), {"--crop", "30,0,10,10"})),
+      AllOf(HasSubstr("--crop: a rectangle of 10x10 px at x 30, y 0"),
+            HasSubstr("picture.png, which has 36x28 px"), HasSubstr("x may be at most 26")));
 }
 
 TEST_F(EstimateTest, GreyAndSixteenBits) {
@@ -328,7 +334,13 @@ TEST_F(EstimateTest, DepthFarFromFocusIsTold) {
 
 TEST_F(EstimateTest, DisparityBeyondThePicture) {
   EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()), {"--disparity-scale", "1e6"})),
-              AllOf(HasSubstr("px per view step"), HasSubstr("36 px")));
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("px per view step"), HasSubstr("36 px"),
+                    HasSubstr("--disparity-scale")));
+  // By a camera it is a depth that none can be; the person gave none.
+  EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()),
+                           {"--camera", Camera(), "--disparity-scale", "1e6"})),
+              AllOf(HasSubstr("depth.pfm"), HasSubstr("scale and offset of the disparity"),
+                    Not(HasSubstr("unit"))));
 }
 
 TEST_F(EstimateTest, AFolderWithOtherThingsIsLeftAlone) {

@@ -98,7 +98,9 @@ void CheckBlur(const EstimateOptions& options, const estimator::EstimateInput& i
         line.Show(done, total);
       });
   if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
+  const auto start = Clock::now();
   outcome->blur.emplace(estimator::CheckBlur(input, settings), input, options.depth);
+  outcome->seconds.blur_check = SecondsSince(start);
 }
 
 // Views go to the writer as they are made, unless a page is to show them or they are to be
@@ -272,6 +274,29 @@ PageDepth DepthForPage(const PreparedEstimate& prepared) {
   return depth;
 }
 
+// For the page: what was read, and what was taken for granted of it.
+std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions& options,
+                                                           const nlohmann::json& summary) {
+  const DepthOptions& depth = options.depth;
+  std::string how = depth.kind;
+  if (!depth.unit.empty()) how += ", " + depth.unit;
+  if (depth.disparity_scale != 1 || depth.disparity_offset_px != 0) {
+    how +=
+        fmt::format(", {:g} times the map {} {:g} px", depth.disparity_scale,
+                    depth.disparity_offset_px < 0 ? "-" : "+", std::abs(depth.disparity_offset_px));
+  }
+  const std::string from = summary["transfer_from"];
+  const std::string said = from == "option" ? "--transfer" : from == "camera" ? "the camera" : "";
+  return {{"photograph", options.picture_path},
+          {"depth map", fmt::format("{} ({})", options.depth_path, how)},
+          {"camera", options.camera_path},
+          {"part of both", options.crop.text},
+          {"stored values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
+                                        said.empty() ? "assumed" : "as " + said + " says")},
+          {"aperture",
+           options.aperture_of.empty() ? options.aperture_shape : "of " + options.aperture_of}};
+}
+
 std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
                  const EstimateOutcome& outcome, const nlohmann::json& summary) {
   LightFieldPageInput page;
@@ -283,7 +308,8 @@ std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
       ParseEstimateRecord(summary.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
                           options.common.json_path);
   if (outcome.scene) page.maps = &outcome.maps;
-  page.warnings = EstimateWarnings(options, outcome);
+  page.warnings = EstimateWarnings(options, prepared, outcome);
+  page.sources = SourcesOf(options, summary);
   page.mosaic = true;
   page.version = Version();
   page.date = outcome.light_field.origin.date;
@@ -348,6 +374,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
     result.summary["plan"] = ChoiceJson(*choice, options.wish, outcome.seconds.total);
     text += ChoiceText(*choice, outcome.seconds.total);
   }
+  const std::vector<std::string> warnings = EstimateWarnings(options, prepared, outcome);
   std::string page;
   if (outputs.report) page = Page(options, std::move(prepared), outcome, result.summary);
   ThrowIfInterrupted();
@@ -356,7 +383,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   if (outputs.checkpoint && !outputs.checkpoint->Remove()) {
     spdlog::warn("{}: is no longer needed, and could not be removed", outputs.checkpoint->path());
   }
-  for (const std::string& warning : EstimateWarnings(options, outcome)) spdlog::warn("{}", warning);
+  for (const std::string& warning : warnings) spdlog::warn("{}", warning);
   PrintResult(options.common, text);
   return result;
 }

@@ -58,6 +58,23 @@ Eigen::ArrayXXd ViewWeights(const EstimateOptions& options,
   return model::ApertureWeights(ApertureShapeOr(options.aperture_shape, usual), u_count, v_count);
 }
 
+// What must lie inside of what: as a person would say it, with the file.
+void RequireInside(const std::string& option, const std::string& what, const model::PixelRect& rect,
+                   const std::string& whole, int width_px, int height_px) {
+  if (rect.width <= width_px && rect.height <= height_px && rect.x <= width_px - rect.width &&
+      rect.y <= height_px - rect.height) {
+    return;
+  }
+  const std::string right =
+      rect.width <= width_px && rect.height <= height_px
+          ? fmt::format("x may be at most {}, y {}", width_px - rect.width, height_px - rect.height)
+          : "it must not be larger";
+  throw Error(fmt::format(
+      "{}: {} of {}x{} px at x {}, y {} is not inside of {}, which has {}x{} "
+      "px: {}",
+      option, what, rect.width, rect.height, rect.x, rect.y, whole, width_px, height_px, right));
+}
+
 // The camera behind a picture, which may be a part of its sensor, and of that the crop.
 std::optional<model::Camera> CameraFor(const EstimateOptions& options, int width_px, int height_px,
                                        const std::optional<model::PixelRect>& crop) {
@@ -72,7 +89,10 @@ std::optional<model::Camera> CameraFor(const EstimateOptions& options, int width
       throw UsageError(
           fmt::format("--sensor-origin: X,Y is expected, found '{}'", options.sensor_origin));
     }
-    camera = model::CropCamera(camera, {origin[0], origin[1], width_px, height_px});
+    const model::PixelRect part{origin[0], origin[1], width_px, height_px};
+    RequireInside("--sensor-origin", "a picture", part, "the sensor of " + options.camera_path,
+                  camera.sensor.width_px, camera.sensor.height_px);
+    camera = model::CropCamera(camera, part);
   } else if (camera.sensor.width_px != width_px || camera.sensor.height_px != height_px) {
     throw Error(fmt::format(
         "{}: the picture is {}x{} px, the sensor of {} has {}x{} px: they must be equal, or "
@@ -111,8 +131,16 @@ void CutToCrop(const EstimateOptions& options, const std::optional<model::PixelR
   };
   const bool cut_picture = !was_cut(picture->width_px, picture->height_px, options.picture_path);
   const bool cut_map = !was_cut(map->width_px, map->height_px, options.depth_path);
-  if (cut_picture) *picture = model::CropPicture(*picture, *crop);
-  if (cut_map) *map = model::CropDepth(*map, *crop);
+  if (cut_picture) {
+    RequireInside("--crop", "a rectangle", *crop, options.picture_path, picture->width_px,
+                  picture->height_px);
+    *picture = model::CropPicture(*picture, *crop);
+  }
+  if (cut_map) {
+    RequireInside("--crop", "a rectangle", *crop, options.depth_path, map->width_px,
+                  map->height_px);
+    *map = model::CropDepth(*map, *crop);
+  }
 }
 
 // A depth far from what the camera is focused at is possible, but more often its unit is wrong.
@@ -149,6 +177,23 @@ void CheckViewCounts(const Eigen::ArrayXXd& weights) {
        {std::pair{weights.cols(), "u (across)"}, std::pair{weights.rows(), "v (down)"}}) {
     if (count == 1) spdlog::warn("--views: one view along {}: no blur is modelled that way", axis);
   }
+}
+
+// A disparity as large as the picture is none of a scene.
+void CheckDisparities(const EstimateOptions& options, const estimator::DisparityMap& map) {
+  const auto [least, most] = std::minmax_element(map.disparity.begin(), map.disparity.end());
+  const double step = map.step.cwiseAbs().maxCoeff();
+  const double low_px = step * static_cast<double>(*least),
+               high_px = step * static_cast<double>(*most);
+  const int size_px = std::max(map.width_px, map.height_px);
+  if (std::max(std::abs(low_px), std::abs(high_px)) <= size_px) return;
+  throw Error(fmt::format(
+      "{}: disparities from {:.4g} to {:.4g} px per view step, which must be within the {} px of "
+      "the picture; {}",
+      options.depth_path, low_px, high_px, size_px,
+      options.depth.kind == "disparity"
+          ? "are --disparity-scale and --disparity-offset right?"
+          : "are --depth-unit, and the camera's aperture and focus, right?"));
 }
 
 void SmoothNoisyDepth(const EstimateOptions& options, PreparedEstimate* prepared) {
@@ -193,6 +238,7 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   if (prepared.depth.depth && options.depth.kind != "disparity") {
     TellUnlikelyDepth(options, *input.camera, *prepared.depth.depth);
   }
+  CheckDisparities(options, input.disparity);
   SmoothNoisyDepth(options, &prepared);
   prepared.effects = DecideEstimateEffects(options, input.camera, prepared.depth.depth);
   if (input.camera && !prepared.effects.on.Has(model::Effect::kThickness)) {

@@ -181,7 +181,7 @@ void AddIterationOptions(CLI::App* command, EstimateOptions* options) {
                                "default {:g} (scene with tv), {:g} (blocks) or {:g}",
                                scene.tolerance_or_usual(), estimator::BlockOptions().tolerance,
                                functional.tolerance))
-      ->check(Between(0, 1, "a relative residual"))
+      ->check(Inside(0, 1, "a relative residual"))
       ->type_name("X");
   command
       ->add_option(

@@ -223,7 +223,7 @@ std::string DepthText(const PreparedEstimate& prepared) {
   }
   if (prepared.depth.holes > 0) {
     text += fmt::format("holes        {} px, filled along the surfaces around them ({:.1f} %)\n",
-                        prepared.depth.holes, 100 * HoleShare(prepared));
+                        prepared.depth.holes, std::min(99.9, 100 * HoleShare(prepared)));
   }
   return text;
 }
@@ -245,8 +245,16 @@ void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome) {
 }
 
 std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
+                                          const PreparedEstimate& prepared,
                                           const EstimateOutcome& outcome) {
   std::vector<std::string> warnings;
+  constexpr double kMostHoles = 0.5;
+  if (HoleShare(prepared) > kMostHoles) {
+    warnings.push_back(fmt::format(
+        "{}: {} of its {} values are no depth: what stands there is guessed from the "
+        "others",
+        options.depth_path, prepared.depth.holes, prepared.input.disparity.disparity.size()));
+  }
   if (outcome.steps.share > 0) {
     warnings.push_back(
         fmt::format("{:.1f} % of the pixels move by more than {:g} px from view to view (up to "
@@ -285,6 +293,17 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
             ? "are --disparity-scale and --disparity-offset right?"
             : "are the depth's unit, and the camera's aperture and focus, right?"));
   }
+  constexpr double kUnexplained = 1.5;  // times the noise
+  if (outcome.scene && !outcome.unexplained_share &&
+      outcome.scene->residual_rms > kUnexplained * outcome.scene->noise_sigma) {
+    warnings.push_back(fmt::format(
+        "the photograph is explained to {:.1f} grey levels (noise: {:.1f}), and hardly any of it "
+        "is "
+        "seen by the whole aperture, which is wide for a picture of {} x {} px: whether the depth "
+        "is right cannot be told",
+        kGreyLevels * outcome.scene->residual_rms, kGreyLevels * outcome.scene->noise_sigma,
+        prepared.input.picture.width_px, prepared.input.picture.height_px));
+  }
   const std::string blur = outcome.blur ? outcome.blur->Warning() : "";
   if (!blur.empty()) warnings.push_back(blur);
   return warnings;
@@ -309,6 +328,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
               {"seconds",
                {{"read", seconds.read},
                 {"setup", seconds.setup},
+                {"blur_check", seconds.blur_check},
                 {"solve", seconds.solve},
                 {"views", seconds.views},
                 {"files", seconds.files},
@@ -331,7 +351,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
                 {"coarse_share", outcome.steps.share},
                 {"noise_px", nullptr},
                 {"noise_left_px", nullptr}}},
-              {"warnings", EstimateWarnings(options, outcome)}};
+              {"warnings", EstimateWarnings(options, prepared, outcome)}};
   if (outcome.depth_noise_px) out["disparity"]["noise_px"] = *outcome.depth_noise_px;
   if (outcome.depth_noise_left_px) {
     out["disparity"]["noise_left_px"] = *outcome.depth_noise_left_px;
@@ -365,8 +385,10 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
   text += ConfidenceText(outcome.confidence);
   if (outcome.inpainting) text += fmt::format("inpainting   {}\n", outcome.inpainting->message);
   text += fmt::format(
-      "time         {:.2f} s: set-up {:.2f}, solve {:.2f}, views {:.2f}, files {:.2f}\n",
-      seconds.total, seconds.setup, seconds.solve, seconds.views, seconds.files);
+      "time         {:.2f} s: set-up {:.2f}, {}solve {:.2f}, views {:.2f}, files {:.2f}\n",
+      seconds.total, seconds.setup,
+      outcome.blur ? fmt::format("blur check {:.2f}, ", seconds.blur_check) : "", seconds.solve,
+      seconds.views, seconds.files);
   text += fmt::format("memory       {:.0f} MiB at most ({:.0f} forecast)\n",
                       summary["peak_rss_mib"].get<double>(),
                       summary["predicted_memory_mib"].get<double>());

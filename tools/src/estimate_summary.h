@@ -22,6 +22,7 @@ namespace thicklens::tools {
 struct EstimateSeconds {
   double read = 0;   // of the set-up: until a plan is chosen, and that
   double setup = 0;  // reading included
+  double blur_check = 0;
   double solve = 0;
   double views = 0;  // making them; by blocks they are what is solved for
   double files = 0;  // writing them
@@ -53,6 +54,7 @@ void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome);
 
 // What speaks against the result, one line each, with its number.
 std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
+                                          const PreparedEstimate& prepared,
                                           const EstimateOutcome& outcome);
 
 // What --json writes.

@@ -80,11 +80,9 @@ constexpr int kMaxViews = 99;
 std::pair<int, int> ViewCounts(const ViewsOption& option) {
   if (option.text.empty()) return {0, 0};
   const std::string form = "UxV (views across and down, e.g. 7x7)";
-  const std::vector<int> counts = SplitPixels("--views", option.text, 'x', form);
-  if (counts.size() != 2 || counts[0] < 1 || counts[1] < 1 || counts[0] > kMaxViews ||
-      counts[1] > kMaxViews) {
-    throw UsageError(fmt::format("--views: {}, each from 1 to {}, is expected, found '{}'", form,
-                                 kMaxViews, option.text));
+  const std::vector<int> counts = SplitWhole("--views", option.text, 'x', form, 1, kMaxViews);
+  if (counts.size() != 2) {
+    throw UsageError(fmt::format("--views: {} is expected, found '{}'", form, option.text));
   }
   return {counts[0], counts[1]};
 }

@@ -137,6 +137,7 @@ std::string HowItWasMade(const LightFieldPageInput& input) {
   };
   std::string rows;
   rows += OriginRow(IsEstimated(input) ? "solver" : "made by", record.solver);
+  for (const auto& [what, source] : input.sources) rows += OriginRow(what, source);
   rows += OriginRow("prior", PriorInWords(record));
   rows += OriginRow("strength of the prior", StrengthInWords(record));
   rows += OriginRow("noise of the photograph", GreyLevels(record.noise_sigma));

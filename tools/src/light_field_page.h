@@ -45,6 +45,8 @@ struct LightFieldPageInput {
   std::string calibration;                     // from InlinedCalibrationReport
   const estimator::SceneMaps* maps = nullptr;  // of the photograph, as the estimate knows it
   std::vector<std::string> warnings;           // of the estimate, one line each
+  // What the estimate read and took for granted: names and what they are.
+  std::vector<std::pair<std::string, std::string>> sources;
   bool mosaic = false;  // all views in one picture, not some beside each other
   std::optional<EstimateRecord> estimate;
   std::optional<ComparisonRecord> comparison;

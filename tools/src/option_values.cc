@@ -56,6 +56,11 @@ CLI::Validator Between(double lo, double hi, const std::string& hint) {
       must, [lo, hi](double value) { return (lo == 0 ? value > 0 : value >= lo) && value <= hi; });
 }
 
+CLI::Validator Inside(double lo, double hi, const std::string& hint) {
+  return NumberThat(fmt::format("above {} and below {} ({})", lo, hi, hint),
+                    [lo, hi](double value) { return value > lo && value < hi; });
+}
+
 std::vector<double> SplitNumbers(const std::string& option, const std::string& text, char separator,
                                  const std::string& form) {
   std::vector<double> numbers;
@@ -69,17 +74,24 @@ std::vector<double> SplitNumbers(const std::string& option, const std::string& t
   return numbers;
 }
 
+std::vector<int> SplitWhole(const std::string& option, const std::string& text, char separator,
+                            const std::string& form, int least, int most) {
+  std::vector<int> whole;
+  for (const double number : SplitNumbers(option, text, separator, form)) {
+    if (!(number >= least) || !(number <= most) || number != std::floor(number)) {
+      throw UsageError(
+          fmt::format("{}: {}, each a whole number from {} to {}, is expected, found "
+                      "'{}'",
+                      option, form, least, most, text));
+    }
+    whole.push_back(static_cast<int>(number));
+  }
+  return whole;
+}
+
 std::vector<int> SplitPixels(const std::string& option, const std::string& text, char separator,
                              const std::string& form) {
-  std::vector<int> pixels;
-  for (const double number : SplitNumbers(option, text, separator, form)) {
-    if (!(number >= 0) || !(number <= kMaxPixels) || number != std::floor(number)) {
-      throw UsageError(fmt::format("{}: {} in whole pixels from 0 to {} is expected, found '{}'",
-                                   option, form, kMaxPixels, text));
-    }
-    pixels.push_back(static_cast<int>(number));
-  }
-  return pixels;
+  return SplitWhole(option, text, separator, form + " in px", 0, kMaxPixels);
 }
 
 }  // namespace thicklens::tools

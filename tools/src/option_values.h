@@ -20,12 +20,17 @@ CLI::Validator Finite();
 CLI::Validator NonNegative();
 // lo <= value <= hi, or lo < value <= hi for lo = 0; `hint` says what is meant.
 CLI::Validator Between(double lo, double hi, const std::string& hint);
+// lo < value < hi.
+CLI::Validator Inside(double lo, double hi, const std::string& hint);
 
 // The finite numbers of a text such as "3,4,640,480". Throws UsageError that names the option, what
 // was found and `form`, e.g. "x,y,width,height".
 std::vector<double> SplitNumbers(const std::string& option, const std::string& text, char separator,
                                  const std::string& form);
-// The same for whole numbers from 0 to 100000.
+// The same for whole numbers.
+std::vector<int> SplitWhole(const std::string& option, const std::string& text, char separator,
+                            const std::string& form, int least, int most);
+// The same from 0 to 100000 px.
 std::vector<int> SplitPixels(const std::string& option, const std::string& text, char separator,
                              const std::string& form);
 

@@ -121,10 +121,12 @@ struct ViewPlace {
   int k = 0, l = 0;
 };
 
+constexpr int kMostViewIndex = 9999;
+
 ViewPlace ParseView(const std::string& text) {
   if (text == "centre") return {true, 0, 0};
   const std::string form = "u,v (view indices from 0) or centre";
-  const std::vector<int> place = SplitPixels("--view", text, ',', form);
+  const std::vector<int> place = SplitWhole("--view", text, ',', form, 0, kMostViewIndex);
   if (place.size() != 2)
     throw UsageError(fmt::format("--view: {} is expected, found '{}'", form, text));
   return {false, place[0], place[1]};

@@ -55,7 +55,7 @@ constexpr double kMostUnexplained = 0.2;
 // residual has an rms of more than 1.5 times that of the noise, whatever the others have. The
 // residual of one channel has about the rms of the noise, the mean of three less. Where many
 // blocks have more, the photograph has details that the blur assumed would have left out. Absent
-// if no block counts. Throws Error for sizes that do not fit.
+// if fewer than a tenth of all blocks count. Throws Error for sizes that do not fit.
 std::optional<double> UnexplainedShare(const std::vector<float>& residual,
                                        const std::vector<float>& hidden_share, int width_px,
                                        int height_px, double noise_sigma);
