@@ -14,6 +14,10 @@
 #include <utility>
 #include <vector>
 
+#include "scene_data.h"
+#include "scene_priors.h"
+#include "scene_projection.h"
+#include "scene_system.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
@@ -88,7 +92,8 @@ using RaysOfWave = std::function<Eigen::VectorXcd(const Eigen::VectorXcd& h)>;
 // The views of a solver that makes of a wave of amplitude 1 in the photograph the rays
 // `rays_of_wave` of the scene's points, h the photograph's share of each: view (k, l) shows at x
 // what the points x + a disparity send to it.
-std::vector<float> ViewsByWaves(const EstimateInput& input, const RaysOfWave& rays_of_wave) {
+std::vector<Eigen::MatrixXd> ExactViewsByWaves(const EstimateInput& input,
+                                               const RaysOfWave& rays_of_wave) {
   const Eigen::MatrixXcd across = Waves(kAcross), down = Waves(kDown);
   const Eigen::MatrixXcd photograph = down * PictureOf(input) * across.transpose();
   std::vector<Eigen::MatrixXcd> views(kViews * kViews, Eigen::MatrixXcd(kDown, kAcross));
@@ -108,10 +113,15 @@ std::vector<float> ViewsByWaves(const EstimateInput& input, const RaysOfWave& ra
       }
     }
   }
-  std::vector<float> values;
+  std::vector<Eigen::MatrixXd> shown;
   for (const Eigen::MatrixXcd& view : views) {
-    const Eigen::MatrixXd shown =
-        (down.conjugate() * view * across.adjoint()).real() / (kAcross * kDown);
+    shown.push_back((down.conjugate() * view * across.adjoint()).real() / (kAcross * kDown));
+  }
+  return shown;
+}
+std::vector<float> ViewsByWaves(const EstimateInput& input, const RaysOfWave& rays_of_wave) {
+  std::vector<float> values;
+  for (const Eigen::MatrixXd& shown : ExactViewsByWaves(input, rays_of_wave)) {
     for (int y = 0; y < kDown; ++y) {
       for (int x = 0; x < kAcross; ++x) values.push_back(static_cast<float>(shown(y, x)));
     }
@@ -249,6 +259,32 @@ TEST(SolverAgreement, OfTheFunctionalInDouble) {
 
 TEST(SolverAgreement, OfTheFunctionalInFloat) {
   ExpectAll(FunctionalWays(false), ViewsByWaves(EvenAtTheBorders(), RaysOfTheFunctional), kFloat);
+}
+
+// Light fields are stored in float; the radiance of the scene's points, which the middle view
+// shows, is solved for in double.
+TEST(SolverAgreement, OfTheRadianceInDouble) {
+  const EstimateInput input = EvenAtTheBorders();
+  const Eigen::MatrixXd expected = ExactViewsByWaves(input, RaysOfTheScene)[kViews * kViews / 2];
+  const auto projection = MakeSceneProjection<double>(input.disparity, input.weights, {});
+  DataTerm<double> data = DataTermOf(projection, input.picture, 1);
+  data.weight.assign(data.pixels(), 1);
+  data.squared_row = SquaredRows<double>(input.disparity, input.weights);
+  RadianceLimits limits;
+  limits.tolerance = 1e-14;
+  limits.max_iterations = 1000;
+  SceneSystem<double> system(data);
+  std::vector<double> radiance(data.pixels(), 0);
+  SolveRadiance(Prior::kRidge, kRidge * kViews * kViews, data,
+                std::vector<double>(data.pixels(), 1), limits, &system, &radiance);
+  double largest = 0;
+  for (int y = 0; y < kDown; ++y) {
+    for (int x = 0; x < kAcross; ++x) {
+      const double found = radiance[static_cast<std::size_t>(y * kAcross + x)];
+      largest = std::max(largest, std::abs(found - expected(y, x)));
+    }
+  }
+  EXPECT_LT(largest, 1e-10);
 }
 
 TEST(SolverAgreement, OfTheScene) {
