@@ -189,13 +189,14 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
   ProjectionOptions projection;
   projection.threads = threads;
   projection.progress = [&progress] { progress.Tell(); };
+  projection.freed = [&options] { ReturnFreedMemory(options.memory_limit_mib); };
   auto given = std::make_optional(
       ProjectionWithin(input.weights, options.memory_limit_mib, projection, &looked));
   check.width_px = looked.picture.width_px;
   check.height_px = looked.picture.height_px;
   BlurTrials trials({std::move(looked.picture), std::move(looked.disparity), input.weights,
                      input.transfer, check.noise_sigma},
-                    *given, threads, projection.progress);
+                    *given, projection);
   given.reset();
   progress.Count();
   check.blocks = trials.blocks();

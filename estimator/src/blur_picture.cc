@@ -60,10 +60,8 @@ BlurPicture BlurPictureOf(const EstimateInput& input, bool falloff, int threads)
 SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
                                         std::optional<double> memory_limit_mib,
                                         const ProjectionOptions& options, BlurPicture* picture) {
-  ProjectionOptions returning = options;
-  returning.freed = [&] { ReturnFreedMemory(memory_limit_mib); };
   const auto make = [&](const BlurPicture& of) {
-    return MakeSceneProjection<float>(of.disparity, weights, returning);
+    return MakeSceneProjection<float>(of.disparity, weights, options);
   };
   const auto bytes_of = [](const SceneProjection<float>& made) {
     return ProjectionBytes{made.bytes(0, made.height_px), made.fan_bytes};
@@ -87,6 +85,8 @@ SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
     return ProjectionBytes{all.held / rows, all.fan / rows};
   };
   ProjectionBytes per_row = of_row(bytes_of(make(sample)), sample.picture.height_px);
+  // Of few rows most rays pass the upper or the lower border, where they are hidden.
+  per_row.fan = static_cast<double>((weights > 0).count()) * width_px * sizeof(float);
   for (int rows = height_px; rows >= std::min(kLeastRows, height_px); rows = rows * 7 / 8) {
     if (!fits(rows, {rows * per_row.held, rows * per_row.fan})) continue;
     KeepMiddleRows(rows, picture);

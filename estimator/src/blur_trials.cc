@@ -41,9 +41,9 @@ bool IsUnexplained(const Block& block) {
 
 }  // namespace
 
-BlurTrials::BlurTrials(Photograph photograph, const SceneProjection<float>& given, int threads,
-                       std::function<void()> tell)
-    : photograph_(std::move(photograph)), threads_(threads), tell_(std::move(tell)) {
+BlurTrials::BlurTrials(Photograph photograph, const SceneProjection<float>& given,
+                       ProjectionOptions options)
+    : photograph_(std::move(photograph)), options_(std::move(options)) {
   for (const double slope :
        StoredSlopes(photograph_.picture, photograph_.transfer, kSlopeSmoothingPx)) {
     slope_squared_.push_back(static_cast<float>(slope * slope));
@@ -68,7 +68,7 @@ std::size_t BlurTrials::BlockOf(std::size_t pixel) const {
 
 std::vector<BlurTrials::Block> BlurTrials::Solve(const SceneProjection<float>& projection,
                                                  const DisparityMap& disparity) {
-  DataTerm<float> data = DataTermOf(projection, photograph_.picture, threads_);
+  DataTerm<float> data = DataTermOf(projection, photograph_.picture, options_.threads);
   data.weight = weight_;
   data.squared_row = SquaredRows<float>(disparity, photograph_.weights);
   if (strength_ == 0) {
@@ -76,7 +76,7 @@ std::vector<BlurTrials::Block> BlurTrials::Solve(const SceneProjection<float>& p
         StrengthForNoise(Prior::kTotalVariation, photograph_.noise_sigma, data, slope_squared_);
   }
   SceneSystem<float> system(data);
-  RadianceLimits limits{kTolerance, kMaxIterations, tell_};
+  RadianceLimits limits{kTolerance, kMaxIterations, options_.progress};
   iterations_ += SolveRadiance(Prior::kTotalVariation, strength_, data, slope_squared_, limits,
                                &system, &radiance_)
                      .iterations;
@@ -122,11 +122,9 @@ BlurTrial BlurTrials::Try(double blur_scale, double focus_offset_px) {
   for (float& value : disparity.disparity) {
     value = static_cast<float>(blur_scale * static_cast<double>(value) + offset);
   }
-  ProjectionOptions options;
-  options.threads = threads_;
-  options.progress = tell_;
   const std::vector<Block> tried =
-      Solve(MakeSceneProjection<float>(disparity, photograph_.weights, options), disparity);
+      Solve(MakeSceneProjection<float>(disparity, photograph_.weights, options_), disparity);
+  if (options_.freed) options_.freed();
 
   BlurTrial trial{blur_scale, focus_offset_px};
   double given_score = 0, score = 0, given_above = 0, above = 0, compared = 0;

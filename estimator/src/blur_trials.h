@@ -22,10 +22,9 @@ class BlurTrials {
     model::TransferCurve transfer;
     double noise_sigma = 0;  // of stored values
   };
-  // Solves with the given blur, whose H is handed over. `tell` is called now and then, from any
-  // thread, and may throw to stop.
-  BlurTrials(Photograph photograph, const SceneProjection<float>& given, int threads,
-             std::function<void()> tell);
+  // Solves with the given blur, whose H is handed over. Of the options for others `progress` is
+  // called now and then, from any thread, and may throw to stop.
+  BlurTrials(Photograph photograph, const SceneProjection<float>& given, ProjectionOptions options);
 
   // Of the given blur, as BlurCheck has them.
   int blocks() const { return blocks_; }
@@ -47,8 +46,7 @@ class BlurTrials {
   std::size_t BlockOf(std::size_t pixel) const;
 
   const Photograph photograph_;
-  const int threads_;
-  const std::function<void()> tell_;
+  const ProjectionOptions options_;
   std::vector<float> slope_squared_, weight_, radiance_;
   std::vector<unsigned char> is_seen_;
   double strength_ = 0;

@@ -57,11 +57,11 @@ Patch MeasurePatch(const std::vector<float>& residual, const std::vector<float>&
   return patch;
 }
 
-// The blocks of which enough is seen by the whole aperture.
 std::size_t Blocks(int size_px) {
   return static_cast<std::size_t>((size_px + kPatchPx - 1) / kPatchPx);
 }
 
+// The blocks of which enough is seen by the whole aperture.
 std::vector<ResidualPatch> MeasurePatches(const std::vector<float>& residual,
                                           const std::vector<float>& hidden_share, int width_px,
                                           int height_px) {

@@ -1,5 +1,6 @@
 // The rows of H of the pixels whose fan of rays is no product of its axes.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -175,12 +176,11 @@ void Reserve(int rows_done, int rows, Band<Real>* band) {
 
 template <typename Real>
 void FillBand(const ViewFan& fan, const DisparityMap& map,
-              const std::vector<unsigned char>& is_product, int stride_px, int first_row,
-              int last_row, Band<Real>* band) {
+              const std::vector<unsigned char>& is_product, int first_row, int last_row,
+              Gatherer<Real>* gatherer, Band<Real>* band) {
   const double tolerance = SurfaceTolerance(map);
   const auto near = static_cast<float>(tolerance);
   const auto limit_px = static_cast<float>(map.width_px + map.height_px);
-  Gatherer<Real> gatherer(stride_px, map.height_px);
   std::vector<Cursor<CompactView::Hidden>> next_hidden;
   std::vector<Cursor<CompactView::Mixed>> next_mixed;
   for (const FanView& view : fan.views) {
@@ -212,17 +212,44 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
           ray.weight -= share;
           AddTaps(map, tolerance, x, y,
                   {mixed->other.source_x, mixed->other.source_y, mixed->other.disparity, share},
-                  &gatherer);
+                  gatherer);
         }
-        if (!AddFourTaps(map, near, limit_px, x, y, ray, &gatherer)) {
-          AddTaps(map, tolerance, x, y, ray, &gatherer);
+        if (!AddFourTaps(map, near, limit_px, x, y, ray, gatherer)) {
+          AddTaps(map, tolerance, x, y, ray, gatherer);
         }
       }
       band->pixel.push_back(static_cast<std::int32_t>(i));
-      gatherer.MoveTo(band);
+      gatherer->MoveTo(band);
     }
     Reserve(y + 1 - first_row, last_row - first_row, band);
   }
+}
+
+// The first rows of the parts, and the end: at most so many pixels with a row of their own each, or
+// one row of the picture, and no more rows than make work for all threads to the end.
+std::vector<int> PartsOf(const ViewFan& fan, const std::vector<unsigned char>& is_product,
+                         int threads) {
+  constexpr int kMostRows = 32;
+  std::vector<std::ptrdiff_t> of_row;
+  std::ptrdiff_t all = 0;
+  for (int y = 0; y < fan.height_px; ++y) {
+    const auto row = is_product.begin() + std::ptrdiff_t{y} * fan.width_px;
+    of_row.push_back(std::count(row, row + fan.width_px, 0));
+    all += of_row.back();
+  }
+  const std::ptrdiff_t most = all / (kPartsOfAThread * threads);
+  std::vector<int> borders(1, 0);
+  std::ptrdiff_t sum = 0;
+  for (int y = 0; y < fan.height_px; ++y) {
+    const bool is_full = sum + of_row[Index(y)] > most || y - borders.back() == kMostRows;
+    if (is_full && y > borders.back()) {
+      borders.push_back(y);
+      sum = 0;
+    }
+    sum += of_row[Index(y)];
+  }
+  borders.push_back(fan.height_px);
+  return borders;
 }
 
 }  // namespace
@@ -231,19 +258,23 @@ template <typename Real>
 kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,
                                 const std::vector<unsigned char>& is_product, int threads,
                                 const std::function<void()>& freed) {
+  threads = model::ResolveThreads(threads);
   kernels::PixelRuns<Real> runs;
   runs.width_px = fan.width_px;
   runs.height_px = fan.height_px;
-  constexpr int kLeastBandRows = 4, kMostBandRows = 32;
-  const int band_rows =
-      std::clamp(fan.height_px / (kPartsOfAThread * threads), kLeastBandRows, kMostBandRows);
-  const int bands = (fan.height_px + band_rows - 1) / band_rows;
-  std::vector<Band<Real>> parts(Index(bands));
-  model::ParallelFor(bands, threads, [&](int n) {
-    FillBand(fan, disparity, is_product, runs.stride_px(), n * band_rows,
-             std::min((n + 1) * band_rows, fan.height_px), &parts[Index(n)]);
+  const std::vector<int> borders = PartsOf(fan, is_product, threads);
+  const int count = static_cast<int>(borders.size()) - 1;
+  std::vector<Band<Real>> parts(Index(count));
+  // A sum of a pixel has a place for each pixel of the picture: of these each thread has one set.
+  std::atomic<int> next{0};
+  model::ParallelFor(std::min(threads, count), threads, [&](int) {
+    Gatherer<Real> gatherer(runs.stride_px(), fan.height_px);
+    for (int n = next++; n < count; n = next++) {
+      FillBand(fan, disparity, is_product, borders[Index(n)], borders[Index(n) + 1], &gatherer,
+               &parts[Index(n)]);
+    }
   });
-  std::vector<std::size_t> first(1, 0);  // run of each band; and the end
+  std::vector<std::size_t> first(1, 0);  // run of each part; and the end
   for (const Band<Real>& part : parts) {
     first.push_back(first.back() + part.index.size());
     runs.pixel.insert(runs.pixel.end(), part.pixel.begin(), part.pixel.end());
@@ -254,7 +285,7 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
   }
   runs.index.resize(first.back());
   runs.weight.resize(first.back() * Index(kernels::kPixelsOfRun));
-  model::ParallelFor(bands, threads, [&](int n) {
+  model::ParallelFor(count, threads, [&](int n) {
     Band<Real>& part = parts[Index(n)];
     const std::size_t at = first[Index(n)];
     std::copy(part.index.begin(), part.index.end(),

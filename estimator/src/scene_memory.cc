@@ -98,14 +98,17 @@ ProjectionBytes SceneMemory::OfRows(int rows, const ProjectionBytes& per_pixel) 
 }
 
 // Beside H: the fan of all views, and of it the axes, or the places where rows are gathered and
-// the parts of H that are on their way to the others; and which share of the aperture sees what.
+// the parts of H that are on their way to the others, one for each thread; the sums of each
+// thread; and which share of the aperture sees what.
 double SceneMemory::SetupBytes(double pixels, const ProjectionBytes& projection,
                                Freed freed) const {
   constexpr double kShareBytes = sizeof(double) + kFloat;
   const double axes = kFloat * (u_count_ + v_count_) + 2 + 2 * kFloat + 1;
-  const double parts = freed == Freed::kStays ? 1 : 1.0 / kPartsOfAThread;
+  const double rows = std::max(1.0, pixels / width_px_);
+  const double parts =
+      freed == Freed::kStays ? 1 : std::min(1.0, 1.0 / kPartsOfAThread + threads_ / rows);
   return projection.fan + parts * projection.held +
-         pixels * (kShareBytes + kFloat + kRendererBytes + axes);
+         pixels * (kShareBytes + kFloat + kRendererBytes + std::max(axes, threads_ * real_));
 }
 
 // Beside H, while systems are solved. A device has the same again, and its programs.

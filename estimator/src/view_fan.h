@@ -62,8 +62,9 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
                                     Between between, int threads);
 
 // The rows of the pixels that are no product, linear between the pixels of a ray's surface. They
-// are made in parts, kPartsOfAThread for each thread and more, which are then put together; freed
-// (may be empty) is called, from any thread, whenever one of them is no longer.
+// are made in parts of whole rows of the picture, which are then put together, each by one thread:
+// a part has an eighth of a thread's share of these pixels, and what more the last of its rows has.
+// `freed` (may be empty) is called, from any thread, whenever one of them is no longer.
 constexpr int kPartsOfAThread = 8;
 template <typename Real>
 kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,

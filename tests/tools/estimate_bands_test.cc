@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "child_process.h"
@@ -134,34 +135,50 @@ TEST_F(EstimateBandsTest, TheForecastHoldsForTheShadingOfARelief) {
   }
 }
 
-// Rough depth hides, mixes and needs rows of its own everywhere; of many views the rays are what is
-// large.
+// Rough depth hides, mixes and needs rows of its own; of many views the rays are what is large. It
+// is rough in one strip alone or everywhere, and there are few threads or many.
 TEST_F(EstimateBandsTest, TheForecastHoldsForRoughDepthAndManyViews) {
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";
   constexpr int kWidth = 160, kHeight = 400;
   model::StoredPicture grey{kWidth, kHeight, 1, 8, {}};
-  model::RawDepthMap rough{kWidth, kHeight, {}, false};
-  std::mt19937 engine(3);
-  std::normal_distribution<double> noise(0, 0.4);
   for (int i = 0; i < kWidth * kHeight; ++i) {
     grey.values.push_back(static_cast<std::uint16_t>(100 + i % 97));
-    rough.values.push_back(static_cast<float>(noise(engine)));
   }
   usual_[0] = folder_.Put("grey.png", EncodePng(grey));
-  usual_[1] = folder_.Put("rough.pfm", EncodePfm(rough));
-  *std::find(usual_.begin(), usual_.end(), "3x3") = "15x15";
+  *std::find(usual_.begin(), usual_.end(), "3x3") = "9x9";
   *std::find(usual_.begin(), usual_.end(), "5e-5") = "0.05";
-  usual_.insert(usual_.end(), {"--keep-depth-noise", "--threads", "2"});
-  ASSERT_EQ(Run("whole", {}).exit_code, 0);
-  const json whole = Summary();
-  const double forecast = whole["predicted_memory_mib"];
-  EXPECT_LE(whole["peak_rss_mib"].get<double>(), forecast);
-  // Half of what H takes must be done without.
-  const double limit = 0.7 * forecast;
-  ASSERT_GT(whole["peak_rss_mib"].get<double>(), limit);
-  ASSERT_EQ(Run("bands", {"--memory-limit", std::to_string(limit)}).exit_code, 0);
-  EXPECT_GT(Summary()["bands"].get<int>(), 1);
-  EXPECT_LE(Summary()["peak_rss_mib"].get<double>(), limit);
+  usual_.push_back("--keep-depth-noise");
+  for (const auto& [rough_rows, threads] : {std::pair{kHeight, "2"}, {40, "12"}}) {
+    SCOPED_TRACE(rough_rows);
+    model::RawDepthMap rough{kWidth, kHeight, {}, false};
+    std::mt19937 engine(3);
+    std::normal_distribution<double> noise(0, 0.4);
+    for (int i = 0; i < kWidth * kHeight; ++i) {
+      const int y = i / kWidth - kHeight / 2;
+      rough.values.push_back(
+          2 * y < rough_rows && 2 * y >= -rough_rows ? static_cast<float>(noise(engine)) : 0.3F);
+    }
+    usual_[1] = folder_.Put("rough.pfm", EncodePfm(rough));
+    const auto run = [&](double limit_mib) {
+      fs::remove_all(folder_ / "lf");
+      const ProgramResult result =
+          Run("lf", {"--threads", threads, "--memory-limit", std::to_string(limit_mib)});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      const json summary = Summary();
+      EXPECT_LE(summary["peak_rss_mib"].get<double>(),
+                summary["predicted_memory_mib"].get<double>() + 1);
+      EXPECT_LE(summary["peak_rss_mib"].get<double>(), limit_mib);
+      return summary;
+    };
+    const json whole = run(3000);
+    EXPECT_EQ(whole["bands"], 1);
+    const ProgramResult refused = Run("none", {"--threads", threads, "--memory-limit", "5"});
+    ASSERT_THAT(refused.err, HasSubstr("in any number of bands "));
+    const double least = std::stod(refused.err.substr(refused.err.find("of bands ") + 9));
+    const double forecast = whole["predicted_memory_mib"];
+    ASSERT_LT(least, forecast);
+    EXPECT_GT(run((least + forecast) / 2)["bands"].get<int>(), 1);
+  }
 }
 
 // A page shows all views, which are held for it; without one they never are.
