@@ -330,7 +330,7 @@ Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& 
   }
   CheckPlausible(camera, scene.depth, depth_name,
                  convention.kind == DepthKind::kDisparity
-                     ? "are scale and offset of the disparity right, and is it one?"
+                     ? "are scale and offset of the disparity right, or is the map a depth?"
                      : "is the unit right?");
   scene.picture = std::move(picture);
   return scene;

@@ -326,7 +326,8 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
       }
     }
   }
-  return {BenchSummary({{"output", file.path()}, {"profile", profile}, {"loads", loads}}), ""};
+  return {BenchSummary({{"output", file.path()}, {"profile", profile}, {"loads", loads}}), "",
+          true};
 }
 
 CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
@@ -373,7 +374,7 @@ CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
   summary["machine"]["threads"] = backends.threads;
   summary["machine"]["opencl"] =
       backends.device ? nlohmann::json(backends.device->description()) : nlohmann::json();
-  return {std::move(summary), ""};
+  return {std::move(summary), "", !options.report_folder.empty()};
 }
 
 }  // namespace

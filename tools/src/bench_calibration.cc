@@ -349,7 +349,7 @@ CommandResult BenchCalibration(const BenchCalibrationOptions& options) {
   for (const CalibrationRow& row : rows) json_rows.push_back(CalibrationRowJson(row));
   summary["rows"] = json_rows;
   PrintResult(options.common, TextOf(about, sweeps, rows));
-  return {std::move(summary), ""};
+  return {std::move(summary), "", !options.report_folder.empty()};
 }
 
 }  // namespace

@@ -159,6 +159,7 @@ CommandResult RunCalibration(const CalibrateOptions& options, const SweepInput& 
   if (refusal.empty() || calibration.source.done)
     PrintResult(options.common, CalibrationText(input.sweep, calibration, TruthOf(input)));
   CommandResult result;
+  result.is_written = outputs.camera || outputs.report;
   result.summary =
       CalibrationJson(input.sweep, calibration, TruthOf(input), options.use_source_recipe());
   if (!refusal.empty())

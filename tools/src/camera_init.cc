@@ -136,6 +136,7 @@ CommandResult InitCamera(const CameraInitOptions& options) {
   if (!output) PrintResult(options.common, yaml);
   TellAssumedFields(camera);
   CommandResult result;
+  result.is_written = output.has_value();
   result.summary = {{"status", "ok"},
                     {"reason", ""},
                     {"name", camera.name},

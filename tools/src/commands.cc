@@ -105,8 +105,8 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
   if (!options.json_path.empty()) json.emplace(options.json_path);
   CommandResult result;
   try {
-    // An interrupt after its last look for one comes too late: what it writes is in place.
     result = command();
+    if (!result.is_written) ThrowIfInterrupted();
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {

@@ -24,7 +24,8 @@ void AddCommonOptions(CLI::App* command, CommonOptions* options);
 // been written.
 struct CommandResult {
   nlohmann::json summary;
-  std::string refusal;  // one line; empty: none
+  std::string refusal;      // one line; empty: none
+  bool is_written = false;  // outputs are in place: an interrupt comes too late
 };
 
 // Runs a command with its --json file claimed before and written after it; an Error is written

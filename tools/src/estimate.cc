@@ -274,6 +274,12 @@ PageDepth DepthForPage(const PreparedEstimate& prepared) {
   return depth;
 }
 
+std::string ApertureInWords(const EstimateOptions& options) {
+  if (!options.aperture_of.empty()) return "of " + options.aperture_of;
+  if (!options.aperture_shape.empty()) return options.aperture_shape;
+  return options.camera_path.empty() ? "uniform (assumed)" : "as the camera says";
+}
+
 // For the page: what was read, and what was taken for granted of it.
 std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions& options,
                                                            const nlohmann::json& summary) {
@@ -293,12 +299,12 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
           {"part of both", options.crop.text},
           {"stored values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
                                         said.empty() ? "assumed" : "as " + said + " says")},
-          {"aperture",
-           options.aperture_of.empty() ? options.aperture_shape : "of " + options.aperture_of}};
+          {"aperture", ApertureInWords(options)}};
 }
 
 std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
-                 const EstimateOutcome& outcome, const nlohmann::json& summary) {
+                 const EstimateOutcome& outcome, const nlohmann::json& summary,
+                 std::vector<std::string> warnings) {
   LightFieldPageInput page;
   page.name = options.output_folder;
   page.light_field = &outcome.light_field;
@@ -308,7 +314,7 @@ std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
       ParseEstimateRecord(summary.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
                           options.common.json_path);
   if (outcome.scene) page.maps = &outcome.maps;
-  page.warnings = EstimateWarnings(options, prepared, outcome);
+  page.warnings = std::move(warnings);
   page.sources = SourcesOf(options, summary);
   page.mosaic = true;
   page.version = Version();
@@ -376,9 +382,10 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   }
   const std::vector<std::string> warnings = EstimateWarnings(options, prepared, outcome);
   std::string page;
-  if (outputs.report) page = Page(options, std::move(prepared), outcome, result.summary);
+  if (outputs.report) page = Page(options, std::move(prepared), outcome, result.summary, warnings);
   ThrowIfInterrupted();
   outputs.light_field.Commit();
+  result.is_written = true;
   if (outputs.report) outputs.report->Commit(page);
   if (outputs.checkpoint && !outputs.checkpoint->Remove()) {
     spdlog::warn("{}: is no longer needed, and could not be removed", outputs.checkpoint->path());

@@ -182,9 +182,9 @@ void CheckViewCounts(const Eigen::ArrayXXd& weights) {
 // A disparity as large as the picture is none of a scene.
 void CheckDisparities(const EstimateOptions& options, const estimator::DisparityMap& map) {
   const auto [least, most] = std::minmax_element(map.disparity.begin(), map.disparity.end());
-  const double step = map.step.cwiseAbs().maxCoeff();
-  const double low_px = step * static_cast<double>(*least),
-               high_px = step * static_cast<double>(*most);
+  const Eigen::Index axis = std::abs(map.step.x()) >= std::abs(map.step.y()) ? 0 : 1;
+  const auto [low_px, high_px] = std::minmax(
+      {map.step[axis] * static_cast<double>(*least), map.step[axis] * static_cast<double>(*most)});
   const int size_px = std::max(map.width_px, map.height_px);
   if (std::max(std::abs(low_px), std::abs(high_px)) <= size_px) return;
   throw Error(fmt::format(

@@ -298,11 +298,10 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
       outcome.scene->residual_rms > kUnexplained * outcome.scene->noise_sigma) {
     warnings.push_back(fmt::format(
         "the photograph is explained to {:.1f} grey levels (noise: {:.1f}), and hardly any of it "
-        "is "
-        "seen by the whole aperture, which is wide for a picture of {} x {} px: whether the depth "
-        "is right cannot be told",
+        "is seen by the whole aperture: it is wide for a picture of {} x {} px, or the depth is "
+        "rough; whether that is right cannot be told",
         kGreyLevels * outcome.scene->residual_rms, kGreyLevels * outcome.scene->noise_sigma,
-        prepared.input.picture.width_px, prepared.input.picture.height_px));
+        prepared.input.disparity.width_px, prepared.input.disparity.height_px));
   }
   const std::string blur = outcome.blur ? outcome.blur->Warning() : "";
   if (!blur.empty()) warnings.push_back(blur);

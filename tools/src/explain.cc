@@ -160,7 +160,9 @@ CommandResult Explain(const ExplainOptions& options) {
     costs = CostsOf(options, camera, scene.range, decision);
     AddCosts(*costs, &result.summary);
   }
+  ThrowIfInterrupted();
   if (figure) figure->Commit(BlurCurveSvg(camera, scene.range));
+  result.is_written = figure.has_value();
   PrintResult(
       options.common,
       ExplanationText(explanation) +

@@ -425,6 +425,7 @@ CommandResult RenderPicture(const RenderOptions& options) {
 
   const double fraction = static_cast<double>(clipped) / static_cast<double>(picture.values.size());
   CommandResult result;
+  result.is_written = true;
   result.summary = std::move(rendering.details);
   result.summary.update({{"width_px", picture.width_px},
                          {"height_px", picture.height_px},
@@ -461,6 +462,7 @@ CommandResult Convert(const RenderOptions& options) {
   const double fraction =
       static_cast<double>(clipped) / static_cast<double>(light_field.values.size());
   CommandResult result;
+  result.is_written = true;
   result.summary = {{"rendered", "convert"}, {"layout", options.convert}};
   AddToSummary(options, light_field, fraction, SecondsSince(start), &result.summary);
   PrintResult(

@@ -306,7 +306,8 @@ CommandResult Report(const ReportOptions& options) {
            {"reason", ""},
            {"output", options.output_path},
            {"sections", page.sections}},
-          ""};
+          "",
+          true};
 }
 
 void CheckUsage(const ReportOptions& options) {

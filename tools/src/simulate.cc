@@ -115,6 +115,7 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
 
   const std::chrono::duration<double> seconds = Clock::now() - start;
   CommandResult result;
+  result.is_written = true;
   result.summary = Summary(options, simulation, simulator.truth(), seconds.count());
   result.summary["bits"] = bits;
   result.summary["effects"] = EffectsJson(simulator.effects());

@@ -157,6 +157,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
   folder.Commit();
 
   CommandResult result;
+  result.is_written = true;
   result.summary = Summary(options, scene, truth, start);
   result.summary["bits"] = bits;
   result.summary["effects"] = EffectsJson(simulator.effects());
@@ -196,6 +197,7 @@ CommandResult SimulateLightField(const SceneOptions& options) {
   folder.Commit();
 
   CommandResult result;
+  result.is_written = true;
   result.summary = Summary(options, scene, simulator.Truth(simulator.RenderDepth()), start);
   result.summary["views"] = {scene.u_count, scene.v_count};
   result.summary["clipped_values"] = clipped;

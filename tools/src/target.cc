@@ -126,6 +126,7 @@ CommandResult MakeTarget(const TargetOptions& options, Format format, TargetRequ
   output.Commit(bytes);
 
   CommandResult result;
+  result.is_written = true;
   result.summary = Summary(options, request, page, leaves.size());
   std::string size = fmt::format("sheet {:g} x {:g} mm", page.width_mm, page.height_mm);
   if (png_size) {
