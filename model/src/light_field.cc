@@ -125,9 +125,14 @@ void RequireInside(const std::string& what, const PixelRect& rect, int width_px,
                       rect.x < width_px && rect.y < height_px && rect.width <= width_px - rect.x &&
                       rect.height <= height_px - rect.y;
   if (inside) return;
+  const bool may_fit =
+      rect.width >= 1 && rect.height >= 1 && rect.width <= width_px && rect.height <= height_px;
+  const std::string right = may_fit ? fmt::format("of that size x may be from 0 to {}, y to {}",
+                                                  width_px - rect.width, height_px - rect.height)
+                                    : "its sides must be at least 1 px, and not longer than that";
   throw Error(
-      fmt::format("the rectangle {},{},{},{} (x, y, width, height) leaves the {} of {}x{} px",
-                  rect.x, rect.y, rect.width, rect.height, what, width_px, height_px));
+      fmt::format("the rectangle {},{},{},{} (x, y, width, height) leaves the {} of {}x{} px: {}",
+                  rect.x, rect.y, rect.width, rect.height, what, width_px, height_px, right));
 }
 
 // Cuts the rectangle out of rows of `width_px` pixels of `channels` values each.

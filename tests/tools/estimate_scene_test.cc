@@ -512,7 +512,8 @@ TEST_F(EstimateSceneTest, TheReportShowsEachFigureOnce) {
   EXPECT_THAT(html,
               AllOf(HasSubstr("<td>total variation</td>"), HasSubstr("Hatched in grey: 325 px"),
                     HasSubstr("grey levels</td>"), HasSubstr("picture.png</td>"),
-                    HasSubstr("depth.pfm (disparity)</td>"), HasSubstr("<td>srgb (assumed)</td>")));
+                    HasSubstr("depth.pfm (disparity)</td>"), HasSubstr("<td>srgb (assumed)</td>"),
+                    HasSubstr("<td>uniform (assumed)</td>")));
   EXPECT_EQ(summary["holes_filled"], 325);
 }
 

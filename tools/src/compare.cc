@@ -20,6 +20,7 @@
 #include "image_io.h"
 #include "light_field_io.h"
 #include "light_field_options.h"
+#include "naming_the_file.h"
 #include "option_values.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
@@ -50,17 +51,6 @@ bool IsFolder(const std::string& path) {
   if (!fs::exists(status))
     throw Error(fmt::format("{}: there is no such file or folder", PrintableUtf8(path)));
   return fs::is_directory(status);
-}
-
-template <typename Work>
-auto NamingTheFile(const std::string& path, const Work& work) {
-  try {
-    return work();
-  } catch (const UsageError&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", PrintableUtf8(path), error.what()));
-  }
 }
 
 // False for what has the rectangle's size already: it is taken as cropped before.

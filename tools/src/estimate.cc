@@ -274,14 +274,9 @@ PageDepth DepthForPage(const PreparedEstimate& prepared) {
   return depth;
 }
 
-std::string ApertureInWords(const EstimateOptions& options) {
-  if (!options.aperture_of.empty()) return "of " + options.aperture_of;
-  if (!options.aperture_shape.empty()) return options.aperture_shape;
-  return options.camera_path.empty() ? "uniform (assumed)" : "as the camera says";
-}
-
 // For the page: what was read, and what was taken for granted of it.
 std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions& options,
+                                                           const std::string& aperture,
                                                            const nlohmann::json& summary) {
   const DepthOptions& depth = options.depth;
   std::string how = depth.kind;
@@ -299,7 +294,7 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
           {"part of both", options.crop.text},
           {"stored values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
                                         said.empty() ? "assumed" : "as " + said + " says")},
-          {"aperture", ApertureInWords(options)}};
+          {"aperture", aperture}};
 }
 
 std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
@@ -315,7 +310,7 @@ std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
                           options.common.json_path);
   if (outcome.scene) page.maps = &outcome.maps;
   page.warnings = std::move(warnings);
-  page.sources = SourcesOf(options, summary);
+  page.sources = SourcesOf(options, prepared.aperture, summary);
   page.mosaic = true;
   page.version = Version();
   page.date = outcome.light_field.origin.date;

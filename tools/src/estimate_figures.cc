@@ -156,9 +156,8 @@ std::string ConfidenceFigure(const LightFieldPageInput& input) {
       "How far to trust it",
       fmt::format(
           "Shares are of the photograph's pixels; the summary's are of all rays of the views. What "
-          "the "
-          "centre view does not show is made up from the background beside it. Where "
-          "the blur has a sigma of more than {:g} px, no more than a twentieth of details finer "
+          "the centre view does not show is made up from the background beside it. Where the blur "
+          "has a sigma of more than {:g} px, no more than a twentieth of details finer "
           "than 8 px is left in the photograph.",
           estimator::kUnresolvedBlurSigmaPx));
 }

@@ -14,6 +14,7 @@
 #include "image_io.h"
 #include "light_field_effects.h"
 #include "light_field_io.h"
+#include "naming_the_file.h"
 #include "option_values.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/depth_noise.h"
@@ -30,6 +31,15 @@ model::StoredPicture ReadPhoto(const std::string& path) {
   const model::StoredPicture picture = ToStoredPicture(ReadPictureFile(path));
   if (picture.channels == 4) spdlog::warn("{}: its alpha channel is left out", path);
   return WithoutAlpha(picture);
+}
+
+model::ApertureShape ShapeFor(const EstimateOptions& options,
+                              const std::optional<model::Camera>& camera) {
+  const model::ApertureShape usual = IsLeftOut(options.effects, model::Effect::kApertureShape)
+                                         ? model::ApertureShape::kGaussian
+                                     : camera ? model::ApertureShapeOf(camera->psf)
+                                              : model::ApertureShape::kUniform;
+  return ApertureShapeOr(options.aperture_shape, usual);
 }
 
 // The share of each view in the photograph, and how many views there are.
@@ -51,28 +61,16 @@ Eigen::ArrayXXd ViewWeights(const EstimateOptions& options,
   }
   auto [u_count, v_count] = ViewCounts(options.views);
   if (u_count == 0) u_count = v_count = kDefaultViews;
-  const model::ApertureShape usual = IsLeftOut(options.effects, model::Effect::kApertureShape)
-                                         ? model::ApertureShape::kGaussian
-                                     : camera ? model::ApertureShapeOf(camera->psf)
-                                              : model::ApertureShape::kUniform;
-  return model::ApertureWeights(ApertureShapeOr(options.aperture_shape, usual), u_count, v_count);
+  return model::ApertureWeights(ShapeFor(options, camera), u_count, v_count);
 }
 
-// What must lie inside of what: as a person would say it, with the file.
-void RequireInside(const std::string& option, const std::string& what, const model::PixelRect& rect,
-                   const std::string& whole, int width_px, int height_px) {
-  if (rect.width <= width_px && rect.height <= height_px && rect.x <= width_px - rect.width &&
-      rect.y <= height_px - rect.height) {
-    return;
-  }
-  const std::string right =
-      rect.width <= width_px && rect.height <= height_px
-          ? fmt::format("x may be at most {}, y {}", width_px - rect.width, height_px - rect.height)
-          : "it must not be larger";
-  throw Error(fmt::format(
-      "{}: {} of {}x{} px at x {}, y {} is not inside of {}, which has {}x{} "
-      "px: {}",
-      option, what, rect.width, rect.height, rect.x, rect.y, whole, width_px, height_px, right));
+std::string ApertureInWords(const EstimateOptions& options,
+                            const std::optional<model::Camera>& camera) {
+  if (!options.aperture_of.empty()) return "of " + options.aperture_of;
+  const std::string shape = model::ApertureShapeName(ShapeFor(options, camera));
+  if (!options.aperture_shape.empty()) return shape;
+  const bool is_the_cameras = camera && !IsLeftOut(options.effects, model::Effect::kApertureShape);
+  return shape + (is_the_cameras ? " (as the camera says)" : " (assumed)");
 }
 
 // The camera behind a picture, which may be a part of its sensor, and of that the crop.
@@ -90,9 +88,8 @@ std::optional<model::Camera> CameraFor(const EstimateOptions& options, int width
           fmt::format("--sensor-origin: X,Y is expected, found '{}'", options.sensor_origin));
     }
     const model::PixelRect part{origin[0], origin[1], width_px, height_px};
-    RequireInside("--sensor-origin", "a picture", part, "the sensor of " + options.camera_path,
-                  camera.sensor.width_px, camera.sensor.height_px);
-    camera = model::CropCamera(camera, part);
+    camera = NamingTheFile("--sensor-origin: " + options.camera_path,
+                           [&] { return model::CropCamera(camera, part); });
   } else if (camera.sensor.width_px != width_px || camera.sensor.height_px != height_px) {
     throw Error(fmt::format(
         "{}: the picture is {}x{} px, the sensor of {} has {}x{} px: they must be equal, or "
@@ -132,14 +129,12 @@ void CutToCrop(const EstimateOptions& options, const std::optional<model::PixelR
   const bool cut_picture = !was_cut(picture->width_px, picture->height_px, options.picture_path);
   const bool cut_map = !was_cut(map->width_px, map->height_px, options.depth_path);
   if (cut_picture) {
-    RequireInside("--crop", "a rectangle", *crop, options.picture_path, picture->width_px,
-                  picture->height_px);
-    *picture = model::CropPicture(*picture, *crop);
+    *picture = NamingTheFile("--crop: " + options.picture_path,
+                             [&] { return model::CropPicture(*picture, *crop); });
   }
   if (cut_map) {
-    RequireInside("--crop", "a rectangle", *crop, options.depth_path, map->width_px,
-                  map->height_px);
-    *map = model::CropDepth(*map, *crop);
+    *map = NamingTheFile("--crop: " + options.depth_path,
+                         [&] { return model::CropDepth(*map, *crop); });
   }
 }
 
@@ -181,10 +176,7 @@ void CheckViewCounts(const Eigen::ArrayXXd& weights) {
 
 // A disparity as large as the picture is none of a scene.
 void CheckDisparities(const EstimateOptions& options, const estimator::DisparityMap& map) {
-  const auto [least, most] = std::minmax_element(map.disparity.begin(), map.disparity.end());
-  const Eigen::Index axis = std::abs(map.step.x()) >= std::abs(map.step.y()) ? 0 : 1;
-  const auto [low_px, high_px] = std::minmax(
-      {map.step[axis] * static_cast<double>(*least), map.step[axis] * static_cast<double>(*most)});
+  const auto [low_px, high_px] = DisparityRangePx(map);
   const int size_px = std::max(map.width_px, map.height_px);
   if (std::max(std::abs(low_px), std::abs(high_px)) <= size_px) return;
   throw Error(fmt::format(
@@ -211,6 +203,12 @@ void SmoothNoisyDepth(const EstimateOptions& options, PreparedEstimate* prepared
 
 }  // namespace
 
+std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map) {
+  const auto [least, most] = std::minmax_element(map.disparity.begin(), map.disparity.end());
+  const double step = map.step.x() != 0 ? map.step.x() : map.step.y();
+  return std::minmax({static_cast<double>(*least) * step, static_cast<double>(*most) * step});
+}
+
 PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   const auto crop = CropRect(options.crop);
   model::StoredPicture stored = ReadPhoto(options.picture_path);
@@ -229,6 +227,7 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   input.transfer = TransferFor(options, input.camera);
   input.picture = model::ToLinear(stored, input.transfer);
   input.weights = ViewWeights(options, input.camera);
+  prepared.aperture = ApertureInWords(options, input.camera);
   CheckViewCounts(input.weights);
   if (input.camera) input.grid = GridFor(options, *input.camera, input.weights);
   prepared.depth =

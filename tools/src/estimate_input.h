@@ -2,6 +2,8 @@
 #define THICKLENS_TOOLS_ESTIMATE_INPUT_H_
 
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "estimate_options.h"
 #include "light_field_options.h"
@@ -15,7 +17,11 @@ struct PreparedEstimate {
   PreparedDepth depth;  // without its disparity, which is the input's
   // Of the disparity, px per view step: as it was, and what is left of it where it was smoothed.
   std::optional<double> depth_noise_px, depth_noise_left_px;
+  std::string aperture;  // its shape and who says so, for people
 };
+
+// Least and largest disparity, px per view step along u, or along v where there is one view in u.
+std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map);
 
 // Reads picture, depth and camera and tells what is taken for granted of them. Throws Error and
 // UsageError.

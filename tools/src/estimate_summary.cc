@@ -21,13 +21,6 @@ std::string TransferFrom(const EstimateOptions& options) {
   return options.camera_path.empty() ? "assumed" : "camera";
 }
 
-// Least and largest disparity, px per view step along u, or along v where there is one view in u.
-std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map) {
-  const auto [least, most] = std::minmax_element(map.disparity.begin(), map.disparity.end());
-  const double step = map.step.x() != 0 ? map.step.x() : map.step.y();
-  return std::minmax({static_cast<double>(*least) * step, static_cast<double>(*most) * step});
-}
-
 json PatchesJson(const std::vector<estimator::ResidualPatch>& patches) {
   json list = json::array();
   for (const estimator::ResidualPatch& patch : patches) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "naming_the_file.h"
 #include "option_values.h"
 #include "thicklens/error.h"
 #include "thicklens/kernels/device.h"
@@ -38,16 +39,6 @@ void RequireSize(const model::RawDepthMap& map, const std::string& map_name,
                           picture.height_px));
 }
 
-// Where the name of the map is not told by who found the fault.
-template <typename Work>
-auto NamingTheMap(const std::string& map_name, const Work& work) {
-  try {
-    return work();
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", map_name, error.what()));
-  }
-}
-
 PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& map_name,
                               model::DepthConvention convention,
                               const model::LinearPicture& picture, const model::Camera& camera,
@@ -60,7 +51,7 @@ PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& 
   const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, map_name);
   PreparedDepth prepared;
   prepared.depth = scene.depth;
-  prepared.disparity = NamingTheMap(map_name, [&] {
+  prepared.disparity = NamingTheFile(map_name, [&] {
     return WithoutHoles(
         estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), picture,
         estimator::DisparityAtInfinity(grid), &prepared);
@@ -228,7 +219,7 @@ PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map
         options.kind));
   }
   PreparedDepth prepared;
-  prepared.disparity = NamingTheMap(map_name, [&] {
+  prepared.disparity = NamingTheFile(map_name, [&] {
     return WithoutHoles(estimator::DisparityFromMap(map, convention.disparity_scale,
                                                     convention.disparity_offset_px),
                         picture, -std::numeric_limits<double>::infinity(), &prepared);

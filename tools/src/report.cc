@@ -24,6 +24,7 @@
 #include "light_field_io.h"
 #include "light_field_options.h"
 #include "light_field_page.h"
+#include "naming_the_file.h"
 #include "option_values.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/view_geometry.h"
@@ -59,16 +60,6 @@ bool NeedsCrop(const std::optional<model::PixelRect>& crop, int width_px, int he
   throw Error(fmt::format(
       "{}: it is {}x{} px, the views are {}x{} px: the sizes must be equal (--crop cuts all alike)",
       path, width_px, height_px, light_field.s_count, light_field.t_count));
-}
-
-// Where the name of the file is not told by who found the fault.
-template <typename Work>
-auto NamingTheFile(const std::string& path, const Work& work) {
-  try {
-    return work();
-  } catch (const Error& error) {
-    throw Error(fmt::format("{}: {}", path, error.what()));
-  }
 }
 
 model::LightField ReadCropped(const std::string& path, LightFieldReading reading) {

@@ -1,0 +1,28 @@
+#ifndef THICKLENS_TOOLS_NAMING_THE_FILE_H_
+#define THICKLENS_TOOLS_NAMING_THE_FILE_H_
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "option_values.h"
+#include "printable_text.h"
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+
+// What `work` returns. An Error of it, which does not know the file, is told with its name.
+template <typename Work>
+auto NamingTheFile(const std::string& path, const Work& work) {
+  try {
+    return work();
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", PrintableUtf8(path), error.what()));
+  }
+}
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_NAMING_THE_FILE_H_
