@@ -23,8 +23,8 @@ Eigen::Vector2d AperturePosition(const model::LightField& light_field, int k, in
   const double a = light_field.u_offset(k);
   const double b = light_field.v_offset(l);
   if (!light_field.camera) return {a, b};
-  const model::LightFieldGrid& grid = *light_field.grid;
-  return model::ApertureCrossingMm(grid.planes, {0, 0, a * grid.u_step_mm, b * grid.v_step_mm});
+  return model::ApertureStepsMm(*light_field.grid, *light_field.camera)
+      .cwiseProduct(Eigen::Vector2d(a, b));
 }
 
 // The share that an aperture of that radius leaves of a view's weight, which belongs to the
@@ -117,7 +117,7 @@ std::optional<model::ApertureShape> ShapeOfWeights(const model::LightField& ligh
 double LargestWander(const model::LightField& light_field) {
   const model::LightFieldGrid& grid = *light_field.grid;
   const Eigen::Vector2d reach_mm =
-      model::ApertureCrossingMm(grid.planes, {0, 0, grid.u_step_mm, grid.v_step_mm})
+      model::ApertureStepsMm(grid, *light_field.camera)
           .cwiseProduct(Eigen::Vector2d(grid.u_count, grid.v_count) / 2)
           .cwiseAbs();
   double largest = 0;
@@ -137,8 +137,7 @@ double LargestWander(const model::LightField& light_field) {
 std::vector<float> PassedRays(const model::LightField& light_field, const Vignetting& vignetting,
                               int k, int l) {
   const model::LightFieldGrid& grid = *light_field.grid;
-  const Eigen::Vector2d step_mm =
-      model::ApertureCrossingMm(grid.planes, {0, 0, grid.u_step_mm, grid.v_step_mm});
+  const Eigen::Vector2d step_mm = model::ApertureStepsMm(grid, *light_field.camera);
   std::vector<float> passed;
   passed.reserve(light_field.view_size());
   for (int j = 0; j < grid.t_count; ++j) {

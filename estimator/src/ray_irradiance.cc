@@ -13,41 +13,32 @@
 namespace thicklens::estimator {
 namespace {
 
-void CheckWeights(const model::LightFieldGrid& grid, const Eigen::ArrayXXd& weights) {
-  if (weights.cols() != grid.u_count || weights.rows() != grid.v_count) {
-    throw Error(fmt::format("weights are {}x{} for {}x{} views: the counts must be equal",
-                            weights.cols(), weights.rows(), grid.u_count, grid.v_count));
-  }
-  if (!(weights >= 0).all() || !(weights.sum() > 0)) {
-    throw Error(
-        fmt::format("weights of the views: their sum is {}: they must be >= 0, one of them "
-                    "> 0",
-                    weights.sum()));
-  }
-}
-
 double IrradianceOf(const model::Camera& camera, const model::LightFieldGrid& grid,
                     const model::Ray& ray) {
   return model::RelativeIrradiance(camera.lens, camera.image_distance_mm(), grid.planes, ray);
 }
 
-// The weighted mean over the rays that land at the principal point: P s = Q u by (16), so
-// s = Q u/P; s = 0 with ST in the plane of focus.
+// Of the ray of view (k, l) that lands at the principal point: P s = Q u by (16), so s = Q u/P; s =
+// 0 with ST in the plane of focus.
 double IrradianceAtPrincipalPoint(const model::LightFieldGrid& grid, const model::Camera& camera,
-                                  const Eigen::ArrayXXd& weights) {
+                                  int k, int l) {
   const model::ProjectionCoefficients projection =
       model::ProjectionOf(camera.lens, camera.image_distance_mm(), grid.planes);
   const double s_per_u = projection.q / projection.p;
-  double sum = 0;
+  model::Ray ray = grid.RayAt(0, 0, k, l);
+  ray.s_mm = s_per_u * ray.u_mm;
+  ray.t_mm = s_per_u * ray.v_mm;
+  return IrradianceOf(camera, grid, ray);
+}
+
+// One over that of every view, V x U.
+Eigen::ArrayXXd Exposures(const model::LightFieldGrid& grid, const model::Camera& camera) {
+  Eigen::ArrayXXd exposures(grid.v_count, grid.u_count);
   for (int l = 0; l < grid.v_count; ++l) {
-    for (int k = 0; k < grid.u_count; ++k) {
-      model::Ray ray = grid.RayAt(0, 0, k, l);
-      ray.s_mm = s_per_u * ray.u_mm;
-      ray.t_mm = s_per_u * ray.v_mm;
-      sum += weights(l, k) * IrradianceOf(camera, grid, ray);
-    }
+    for (int k = 0; k < grid.u_count; ++k)
+      exposures(l, k) = 1 / IrradianceAtPrincipalPoint(grid, camera, k, l);
   }
-  return sum / weights.sum();
+  return exposures;
 }
 
 // Samples from a pixel to the ray of view k that lands nearest to it.
@@ -106,15 +97,15 @@ class RowIrradiance {
 
 // The mean over the rays of all views that land nearest to the pixel (x, y), samples or not.
 double MeanIrradianceAt(const model::LightFieldGrid& grid, const model::Camera& camera,
-                        const Eigen::ArrayXXd& weights, const Eigen::Vector2d& landing_step_px,
-                        int x, int y) {
+                        const Eigen::ArrayXXd& weights, const Eigen::ArrayXXd& exposures,
+                        const Eigen::Vector2d& landing_step_px, int x, int y) {
   double sum = 0;
   for (int l = 0; l < grid.v_count; ++l) {
     const int j = y + NearestRayShift(landing_step_px.y(), l, grid.v_count);
     for (int k = 0; k < grid.u_count; ++k) {
       if (weights(l, k) == 0) continue;
       const int i = x + NearestRayShift(landing_step_px.x(), k, grid.u_count);
-      sum += weights(l, k) * IrradianceOf(camera, grid, grid.RayAt(i, j, k, l));
+      sum += weights(l, k) * exposures(l, k) * IrradianceOf(camera, grid, grid.RayAt(i, j, k, l));
     }
   }
   return sum / weights.sum();
@@ -122,10 +113,23 @@ double MeanIrradianceAt(const model::LightFieldGrid& grid, const model::Camera& 
 
 }  // namespace
 
+void CheckViewWeights(const model::LightFieldGrid& grid, const Eigen::ArrayXXd& weights) {
+  if (weights.cols() != grid.u_count || weights.rows() != grid.v_count) {
+    throw Error(fmt::format("weights are {}x{} for {}x{} views: the counts must be equal",
+                            weights.cols(), weights.rows(), grid.u_count, grid.v_count));
+  }
+  if (!(weights >= 0).all() || !(weights.sum() > 0)) {
+    throw Error(
+        fmt::format("weights of the views: their sum is {}: they must be >= 0, one of them "
+                    "> 0",
+                    weights.sum()));
+  }
+}
+
 std::vector<float> RelativeFalloff(const model::LightFieldGrid& grid, const model::Camera& camera,
                                    const Eigen::ArrayXXd& weights, int k, int l) {
-  CheckWeights(grid, weights);
-  const double unit = IrradianceAtPrincipalPoint(grid, camera, weights);
+  CheckViewWeights(grid, weights);
+  const double unit = IrradianceAtPrincipalPoint(grid, camera, k, l);
   const RowIrradiance irradiance(grid, camera);
   const auto width = static_cast<std::size_t>(grid.s_count);
   std::vector<float> falloff(width * static_cast<std::size_t>(grid.t_count));
@@ -139,8 +143,8 @@ std::vector<float> RelativeFalloff(const model::LightFieldGrid& grid, const mode
 std::vector<float> FalloffOfPicture(const model::LightFieldGrid& grid, const model::Camera& camera,
                                     const Eigen::ArrayXXd& weights, int width_px, int height_px,
                                     int threads) {
-  CheckWeights(grid, weights);
-  const double unit = IrradianceAtPrincipalPoint(grid, camera, weights);
+  CheckViewWeights(grid, weights);
+  const Eigen::ArrayXXd exposures = Exposures(grid, camera);
   const Eigen::Vector2d landing_step_px = LandingStepPx(camera, grid);
   const RowIrradiance irradiance(grid, camera);
   const auto width = static_cast<std::size_t>(width_px);
@@ -156,16 +160,16 @@ std::vector<float> FalloffOfPicture(const model::LightFieldGrid& grid, const mod
         const int first = std::max(0, -shift), last = std::min(width_px, grid.s_count - shift);
         if (weights(l, k) == 0 || first >= last) continue;
         sum.segment(first, last - first) +=
-            weights(l, k) * irradiance.Of(first + shift, last - first, j, k, l);
+            weights(l, k) * exposures(l, k) * irradiance.Of(first + shift, last - first, j, k, l);
         weight.segment(first, last - first) += weights(l, k);
       }
     }
     float* const row = falloff.data() + static_cast<std::size_t>(y) * width;
     for (int x = 0; x < width_px; ++x) {
-      const double mean = weight[x] > 0
-                              ? sum[x] / weight[x]
-                              : MeanIrradianceAt(grid, camera, weights, landing_step_px, x, y);
-      row[x] = static_cast<float>(mean / unit);
+      const double mean =
+          weight[x] > 0 ? sum[x] / weight[x]
+                        : MeanIrradianceAt(grid, camera, weights, exposures, landing_step_px, x, y);
+      row[x] = static_cast<float>(mean);
     }
   });
   return falloff;

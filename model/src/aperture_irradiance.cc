@@ -63,9 +63,10 @@ Irradiance IrradianceAt(const EffectOptics& optics, const Eigen::Vector2d& posit
   };
   Irradiance irradiance;
   irradiance.over_mean = values_at(position_px - sensor.principal_point_px);
-  const double mean = mean_of(irradiance.over_mean);
-  for (double& value : irradiance.over_mean) value /= mean;
-  irradiance.mean = mean / mean_of(values_at({0, 0}));
+  const std::vector<double> on_axis = values_at({0, 0});
+  for (std::size_t i = 0; i < on_axis.size(); ++i) irradiance.over_mean[i] /= on_axis[i];
+  irradiance.mean = mean_of(irradiance.over_mean);
+  for (double& value : irradiance.over_mean) value /= irradiance.mean;
   return irradiance;
 }
 

@@ -20,8 +20,10 @@ struct AperturePoint {
 };
 const std::vector<AperturePoint>& AperturePoints(Aperture aperture);
 
-// What rays through the points of an aperture bring to a position of the picture of a uniform
-// radiance by (12): their mean, 1 at the principal point by exposure, and each over that mean.
+// What rays through the points of an aperture bring to a position of the image of a uniform
+// radiance, each by (12) relative to what the same point of the aperture brings to the principal
+// point: the calibrated blur of a point on the axis contains the fall-off there. Their mean, which
+// is 1 at the principal point, and each over that mean.
 struct Irradiance {
   double mean = 0;
   std::vector<double> over_mean;

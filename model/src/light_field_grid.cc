@@ -229,12 +229,18 @@ ApertureSamples SampleAperture(const Eigen::ArrayXXd& weights, double blur_ratio
   samples.u_count = static_cast<int>(weights.cols());
   samples.v_count = static_cast<int>(weights.rows());
   samples.weights = weights;
-  double u_moment = 0;
-  double v_moment = 0;
+  double u_mean = 0, v_mean = 0;
   for (int j = 0; j < samples.v_count; ++j) {
     for (int i = 0; i < samples.u_count; ++i) {
-      const double a = samples.u_offset(i);
-      const double b = samples.v_offset(j);
+      u_mean += weights(j, i) * samples.u_offset(i);
+      v_mean += weights(j, i) * samples.v_offset(j);
+    }
+  }
+  double u_moment = 0, v_moment = 0;
+  for (int j = 0; j < samples.v_count; ++j) {
+    for (int i = 0; i < samples.u_count; ++i) {
+      const double a = samples.u_offset(i) - u_mean;
+      const double b = samples.v_offset(j) - v_mean;
       u_moment += weights(j, i) * a * a;
       v_moment += weights(j, i) * b * b;
     }
@@ -300,6 +306,11 @@ Ray LightFieldGrid::RayAt(int i, int j, int k, int l) const {
           (k - (u_count - 1) / 2.0) * u_step_mm, (l - (v_count - 1) / 2.0) * v_step_mm};
 }
 
+Eigen::Vector2d ApertureStepsMm(const LightFieldGrid& grid, const Camera& camera) {
+  const double directions_per_aperture = 1 - grid.planes.uv_depth_mm / camera.focus_depth_mm();
+  return Eigen::Vector2d(grid.u_step_mm, grid.v_step_mm) / directions_per_aperture;
+}
+
 LightFieldGrid DefaultGrid(const Camera& camera, int u_count, int v_count) {
   const double focus_depth_mm = FocusDepthMm(camera.lens, camera.image_distance_mm());
   if (std::isinf(focus_depth_mm)) {
@@ -337,8 +348,9 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
   }
 
   const double p = ProjectionOf(camera.lens, image_distance_mm, planes).p;
-  // From (10) at fixed s: da = (zl + d0)/d0 du.
-  const double uv_per_aperture = planes.plane_spacing_mm / st_depth_mm;
+  // A ray through the point on the axis in focus has s = -u (zl + d0 - zf)/(zf - zl), and so, by
+  // (10), crosses the aperture at a = u zf/(zf - zl). Derived here; zf may be infinite.
+  const double uv_per_aperture = 1 - planes.uv_depth_mm / focus_depth_mm;
 
   LightFieldGrid grid;
   grid.s_count = camera.sensor.width_px;

@@ -131,8 +131,7 @@ ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& r
   const Eigen::Vector2d& axis_px = sensor.principal_point_px;
   const auto count = static_cast<Eigen::Index>(rays.size());
   std::vector<SceneRay> bundle;
-  Eigen::ArrayXf behind_x(count), behind_y(count);
-  double sum = 0;
+  Eigen::ArrayXf behind_x(count), behind_y(count), exposure(count);
   for (const PixelRay& ray : rays) {
     const auto i = static_cast<Eigen::Index>(bundle.size());
     const Eigen::Vector2d aperture_mm = geometry_.aperture_sigma_mm() * ray.aperture;
@@ -140,11 +139,14 @@ ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& r
     const Eigen::Vector2d behind_mm = sensor.pixel_pitch_mm * ray.offset_px + aperture_mm;
     behind_x(i) = static_cast<float>(behind_mm.x());
     behind_y(i) = static_cast<float>(behind_mm.y());
-    // (12) fixes its constant k by exposure: uniform radiance 1 gives 1 at the principal point.
-    sum += Irradiance(axis_px, geometry_.RayAt(axis_px, aperture_mm));
+    // The blur of a point on the axis is that of the calibration, fall-off included: (12) counts
+    // relative to what the same part of the aperture brings to the principal point. A uniform
+    // radiance 1 gives 1 there.
+    exposure(i) =
+        static_cast<float>(1 / Irradiance(axis_px, geometry_.RayAt(axis_px, aperture_mm)));
   }
-  return {RayBundle(geometry_, bundle, on_.Has(Effect::kOcclusion)),
-          static_cast<double>(rays.size()) / sum, std::move(behind_x), std::move(behind_y)};
+  return {RayBundle(geometry_, bundle, on_.Has(Effect::kOcclusion)), std::move(exposure),
+          std::move(behind_x), std::move(behind_y)};
 }
 
 double ScenePhotograph::Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const {
@@ -170,7 +172,7 @@ RayNumbers ScenePhotograph::Weights(const RaySet& set, const Eigen::Vector2d& ce
                            (of(set.rays.slope_y()) + slope.y()).square();
   const RayNumbers beta = 1 + per_distance2 * ((of(set.behind_x) + landing_mm.x()).square() +
                                                (of(set.behind_y) + landing_mm.y()).square());
-  return static_cast<float>(set.exposure) / ((alpha * beta).sqrt() * beta);
+  return of(set.exposure) / ((alpha * beta).sqrt() * beta);
 }
 
 RayBundle::Shown ScenePhotograph::ShownBy(const Pixel& pixel, const RayPart& part) const {

@@ -33,7 +33,8 @@ class ScenePhotograph {
  private:
   struct RaySet {
     RayBundle rays;
-    double exposure = 1;
+    // One over (12) of each ray's place on the aperture at the principal point.
+    Eigen::ArrayXf exposure;
     Eigen::ArrayXf behind_x, behind_y;  // of each ray, its slope behind the lens times d1
   };
 

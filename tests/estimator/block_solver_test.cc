@@ -129,7 +129,7 @@ Dense DenseOf(const EstimateInput& input, bool falloff) {
   const int v_count = static_cast<int>(input.weights.rows());
   const int rays = width * height * u_count * v_count;
   Dense dense{Eigen::MatrixXd::Zero(width * height, rays), Eigen::MatrixXd::Zero(2 * rays, rays)};
-  double at_axis = 0;
+  Eigen::ArrayXXd at_axis = Eigen::ArrayXXd::Ones(v_count, u_count);
   for (int l = 0; l < v_count; ++l) {
     for (int k = 0; k < u_count; ++k) {
       const double a = k - (u_count - 1) / 2.0;
@@ -141,9 +141,8 @@ Dense DenseOf(const EstimateInput& input, bool falloff) {
         const model::Ray ray{c.q / c.p * a * input.grid->u_step_mm,
                              c.q / c.p * b * input.grid->v_step_mm, a * input.grid->u_step_mm,
                              b * input.grid->v_step_mm};
-        at_axis += input.weights(l, k) *
-                   model::RelativeIrradiance(input.camera->lens, input.camera->image_distance_mm(),
-                                             input.grid->planes, ray);
+        at_axis(l, k) = model::RelativeIrradiance(
+            input.camera->lens, input.camera->image_distance_mm(), input.grid->planes, ray);
       }
       const ViewDisparity view = RenderDisparity(input.disparity, a, b);
       const ViewDisparity right = RenderDisparity(input.disparity, a + 1, b);
@@ -203,7 +202,7 @@ Dense DenseOf(const EstimateInput& input, bool falloff) {
           dense.h.col(RayOf(input, i, j, k, l)) *=
               model::RelativeIrradiance(input.camera->lens, input.camera->image_distance_mm(),
                                         input.grid->planes, input.grid->RayAt(i, j, k, l)) /
-              at_axis;
+              at_axis(l, k);
         }
       }
     }

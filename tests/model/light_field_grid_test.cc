@@ -396,9 +396,17 @@ TEST(GridOnPlanes, ViewsCrossTheApertureInTheSamples) {
       if (!(planes.uv_depth_mm < 640)) continue;
       const LightFieldGrid grid = GridOnPlanes(camera, planes, 6, 7);
       for (int k = 0; k + 1 < 6; ++k) {
-        const Eigen::Vector2d step_mm =
-            ApertureCrossingMm(planes, grid.RayAt(40, 50, k + 1, k + 1)) -
-            ApertureCrossingMm(planes, grid.RayAt(40, 50, k, k));
+        // Of the rays of the point on the axis in focus: where they meet ST follows from (0, 0) at
+        // zf.
+        const auto crossing_mm = [&](int view) {
+          Ray ray = grid.RayAt(0, 0, view, view);
+          const double share = (640 - planes.uv_depth_mm) / planes.plane_spacing_mm;
+          ray.s_mm = ray.u_mm * (share - 1) / share;
+          ray.t_mm = ray.v_mm * (share - 1) / share;
+          return ApertureCrossingMm(planes, ray);
+        };
+        const Eigen::Vector2d step_mm = crossing_mm(k + 1) - crossing_mm(k);
+        EXPECT_TRUE(step_mm.isApprox(ApertureStepsMm(grid, camera), 1e-12));
         EXPECT_NEAR(step_mm.x(), samples.u_step_mm, 1e-11);
         EXPECT_NEAR(step_mm.y(), samples.v_step_mm, 1e-11);
       }
@@ -506,13 +514,16 @@ TEST(SampleAperture, AnyWeightsCarryTheCalibratedBlur) {
   weights(0, 0) = 0;  // a view that the photograph did not see
   weights /= weights.sum();
   const ApertureSamples samples = SampleAperture(weights, 0.45, 4);
-  double moment = 0;
+  // About their own middle, which that view's absence moves.
+  double middle = 0, moment = 0;
   for (int j = 0; j < 3; ++j) {
     for (int i = 0; i < 5; ++i) {
+      middle += weights(j, i) * samples.u_offset(i) * samples.u_step_mm;
       moment += weights(j, i) * std::pow(samples.u_offset(i) * samples.u_step_mm, 2);
     }
   }
-  EXPECT_NEAR(std::sqrt(moment), 0.45 * 4, 1e-12);
+  EXPECT_GT(std::abs(middle), 0.1);
+  EXPECT_NEAR(std::sqrt(moment - middle * middle), 0.45 * 4, 1e-12);
   EXPECT_THROW(SampleAperture(weights * 2, 0.45, 4), Error);
   EXPECT_THROW(SampleAperture(-weights, 0.45, 4), Error);
   EXPECT_THROW(SampleAperture(Eigen::ArrayXXd(), 0.45, 4), Error);

@@ -243,6 +243,11 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   if (input.camera && !prepared.effects.on.Has(model::Effect::kThickness)) {
     input.falloff_camera = model::ThinTwin(*input.camera);
   }
+  if (input.grid) {
+    const bool falloff = prepared.effects.on.Has(model::Effect::kFalloff);
+    prepared.aperture_blur = estimator::MeasureApertureBlur(
+        *input.grid, *input.camera, input.weights, falloff ? &input.camera_of_falloff() : nullptr);
+  }
   return prepared;
 }
 

@@ -7,6 +7,7 @@
 
 #include "estimate_options.h"
 #include "light_field_options.h"
+#include "thicklens/estimator/aperture_blur.h"
 #include "thicklens/estimator/estimate.h"
 
 namespace thicklens::tools {
@@ -17,7 +18,8 @@ struct PreparedEstimate {
   PreparedDepth depth;  // without its disparity, which is the input's
   // Of the disparity, px per view step: as it was, and what is left of it where it was smoothed.
   std::optional<double> depth_noise_px, depth_noise_left_px;
-  std::string aperture;  // its shape and who says so, for people
+  std::string aperture;                                  // its shape and who says so, for people
+  std::optional<estimator::ApertureBlur> aperture_blur;  // with a camera
 };
 
 // Least and largest disparity, px per view step along u, or along v where there is one view in u.

@@ -192,6 +192,25 @@ std::string AccuracyText(const EstimateOutcome& outcome) {
                      iterations.converged ? "" : ", not converged");
 }
 
+// What the samples of the aperture carry of the calibrated blur.
+json ApertureBlurJson(const std::optional<estimator::ApertureBlur>& blur) {
+  if (!blur) return nullptr;
+  return {
+      {"calibrated_sigma_mm", blur->calibrated_sigma_mm},
+      {"sigma_mm", {blur->sigma_mm.x(), blur->sigma_mm.y()}},
+      {"corner_change_percent", {100 * blur->corner_change.x(), 100 * blur->corner_change.y()}}};
+}
+
+std::string ApertureBlurText(const estimator::ApertureBlur& blur) {
+  const auto along = [&](int axis, const char* name) {
+    if (!(blur.sigma_mm[axis] > 0)) return fmt::format("none along {} (one view)", name);
+    return fmt::format("{:.4g} mm along {} ({:+.2f} % in the corners)", blur.sigma_mm[axis], name,
+                       100 * blur.corner_change[axis]);
+  };
+  return fmt::format("aperture     blur sigma {}, {}; calibrated {:.4g} mm\n", along(0, "u"),
+                     along(1, "v"), blur.calibrated_sigma_mm);
+}
+
 std::string ConfidenceText(const estimator::ConfidenceShares& of_rays) {
   return fmt::format(
       "rays         {:.1f} % seen, {:.1f} % seen in part, {:.1f} % blurred too strongly for "
@@ -353,6 +372,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
                     {"median_mm", prepared.depth.depth->median_mm},
                     {"max_mm", prepared.depth.depth->max_mm}};
   }
+  out["aperture_blur"] = ApertureBlurJson(prepared.aperture_blur);
   out["inpainting"] = InpaintingJson(outcome);
   if (outcome.scene) AddScene(options, outcome, &out);
   if (outcome.blocks) AddBlocks(outcome, &out);
@@ -368,6 +388,7 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
   text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n",
                       light_field.u_count, light_field.v_count, light_field.s_count,
                       light_field.t_count, light_field.channels);
+  if (prepared.aperture_blur) text += ApertureBlurText(*prepared.aperture_blur);
   text += SolverText(summary, outcome);
   text += fmt::format("device       {}, {} thread(s)\n", summary["device"].get<std::string>(),
                       summary["threads"].get<int>());

@@ -341,8 +341,7 @@ std::string HciParameters(const model::LightField& light_field) {
     intrinsics += fmt::format("focal_length_mm = {}\n", camera.focal_scale_px() * pitch_mm);
     intrinsics += fmt::format("sensor_size_mm = {}\n", larger_side_px * pitch_mm);
     const model::LightFieldGrid& grid = *light_field.grid;
-    const Eigen::Vector2d step_mm =
-        model::ApertureCrossingMm(grid.planes, {0, 0, grid.u_step_mm, grid.v_step_mm});
+    const Eigen::Vector2d step_mm = model::ApertureStepsMm(grid, camera);
     const double baseline_mm = std::abs(step_mm.x() != 0 ? step_mm.x() : step_mm.y());
     if (baseline_mm > 0) extrinsics += fmt::format("baseline_mm = {}\n", baseline_mm);
     const double focus_depth_m = camera.focus_depth_mm() / 1000;

@@ -16,11 +16,9 @@ namespace {
 
 constexpr int kMaxGrid = 1000;
 
-// Step between views on the aperture, mm: what a view step of the grid is at s = 0, along u, or
-// along v where there is one view in u.
-double ApertureStepMm(const model::LightFieldGrid& grid) {
-  const Eigen::Vector2d step =
-      model::ApertureCrossingMm(grid.planes, {0, 0, grid.u_step_mm, grid.v_step_mm});
+// Step between views on the aperture, mm, along u, or along v where there is one view in u.
+double ApertureStepMm(const model::LightFieldGrid& grid, const model::Camera& camera) {
+  const Eigen::Vector2d step = model::ApertureStepsMm(grid, camera);
   return std::abs(step.x() != 0 ? step.x() : step.y());
 }
 
@@ -44,7 +42,7 @@ PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& 
                               const model::LinearPicture& picture, const model::Camera& camera,
                               const model::LightFieldGrid& grid) {
   if (convention.kind == model::DepthKind::kDisparity)
-    convention.aperture_step_mm = ApertureStepMm(grid);
+    convention.aperture_step_mm = ApertureStepMm(grid, camera);
   // Of the picture, only its size counts here.
   model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);

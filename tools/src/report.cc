@@ -148,9 +148,8 @@ PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light
     return depth;
   }
   const model::LightFieldGrid& grid = *light_field.grid;
-  // (10) at s = 0: what one step in u, or in v where there is one view in u, is on the aperture.
-  const Eigen::Vector2d step_mm =
-      model::ApertureCrossingMm(grid.planes, {0, 0, grid.u_step_mm, grid.v_step_mm});
+  // One step in u, or in v where there is one view in u.
+  const Eigen::Vector2d step_mm = model::ApertureStepsMm(grid, *light_field.camera);
   convention.aperture_step_mm = std::abs(step_mm.x() != 0 ? step_mm.x() : step_mm.y());
   // Of the picture, only its size counts here.
   model::LinearPicture picture{map.width_px, map.height_px, 1, {}};

@@ -26,7 +26,7 @@ bool IsOffAperture(const model::LightField& light_field);
 std::optional<model::ApertureShape> ShapeOfWeights(const model::LightField& light_field);
 
 // How far the rays of a pixel wander over the aperture at most, over half of what the views of one
-// pixel cover there: so much of their light is missing on one side. Needs a grid.
+// pixel cover there: so much of their light is missing on one side. Needs a grid and a camera.
 double LargestWander(const model::LightField& light_field);
 
 // How an aperture weighs a ray by where it crosses: as the weight of that shape there, in steps of
@@ -38,8 +38,8 @@ struct Vignetting {
 };
 
 // Of every ray of the view (k, l), T x S row by row, 1 in the middle of the aperture. From (10):
-// the ray (s, t, u, v) crosses at a = ((zl + d0) u - zl s)/d0, and a step du of the views is
-// (zl + d0)/d0 du on the aperture. Needs a grid and a camera.
+// the ray (s, t, u, v) crosses at a = ((zl + d0) u - zl s)/d0; a step of the views is that of
+// model::ApertureStepsMm. Needs a grid and a camera.
 std::vector<float> PassedRays(const model::LightField& light_field, const Vignetting& vignetting,
                               int k, int l);
 

@@ -91,9 +91,11 @@ Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count);
 // a_i = i - (U-1)/2 times `step`, each with a weight; the weights sum to 1.
 //
 // The steps are such that the samples carry exactly the calibrated blur: the weighted second moment
-// of the positions is (kappa r)^2 per axis. Derived: sum_k w_k (a_k da)^2 = (kappa r)^2 gives
-// da = kappa r/sqrt(sum_k w_k a_k^2). An axis with one sample carries no blur; its step is 0.
-// (The spacing 4 kappa r/U, a first guess, carries 12 % too little blur at U = 7.)
+// of the positions about their centroid is (kappa r)^2 per axis. Derived: with a_k from the
+// centroid, sum_k w_k (a_k da)^2 = (kappa r)^2 gives da = kappa r/sqrt(sum_k w_k a_k^2). The
+// weights are those of a point on the axis, its fall-off included: whatever (12) does there is in
+// the calibrated blur. An axis with one sample carries no blur; its step is 0. (The spacing 4 kappa
+// r/U, a first guess, carries 12 % too little blur at U = 7.)
 struct ApertureSamples {
   int u_count = 1;
   int v_count = 1;
@@ -131,7 +133,8 @@ struct LightFieldGrid {
 LightFieldGrid DefaultGrid(const Camera& camera, int u_count, int v_count);
 
 // A grid on planes of the user's choice: one s-step one pixel (ds = p/|P|), and directional steps
-// that cross the aperture in those of SampleAperture at fixed s. Throws Error for zl >= zf
+// with which the rays of the point on the axis in focus cross the aperture in those of
+// SampleAperture, whatever the planes: du = da (zf - zl)/zf. Throws Error for zl >= zf
 // (P = 0 at zl = zf: the rays no longer separate the pixels), zl + d0 <= 0 or d0 = 0.
 LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes, int u_count,
                             int v_count);
@@ -139,6 +142,10 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
 // The same for given samples, where the weights are not those of the camera's PSF.
 LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes,
                             const ApertureSamples& samples);
+
+// Step between views on the aperture, mm, along u and v, of the rays through the point on the axis
+// in focus: a = u zf/(zf - zl), whatever d0. Of the default grid the grid's own steps.
+Eigen::Vector2d ApertureStepsMm(const LightFieldGrid& grid, const Camera& camera);
 
 // m = (z - zl - d0) du/((z - zl) ds): the step of s, in samples, per view step at a fixed scene
 // point. For Q = 0 it is minus the disparity. Throws Error at z = zl, where it is infinite.
