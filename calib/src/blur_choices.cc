@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "blur_examples.h"
 
@@ -71,11 +72,18 @@ class Choices {
       evidence_.other_psf = FitSamples(evidence_, as_other, other.region);
       evidence_.gaussian_misfit = (is_gaussian ? as_stated : as_other).chi2_per_dof;
       evidence_.disc_misfit = (is_gaussian ? as_other : as_stated).chi2_per_dof;
+      evidence_.shape_dof = DegreesOfFreedom(as_stated);
       evidence_.better_psf = *evidence_.gaussian_misfit <= *evidence_.disc_misfit
                                  ? model::Psf::kGaussian
                                  : model::Psf::kDisc;
     }
     AddTransferExamples(stated_, other, &evidence_);
+  }
+
+  // Real and imaginary part of each mode of each frame, less the texture's.
+  static double DegreesOfFreedom(const RelativeBlur& blur) {
+    const double used = std::accumulate(blur.modes_used.begin(), blur.modes_used.end(), 0.0);
+    return std::max(0.0, 2 * (used - static_cast<double>(blur.texture.size())));
   }
 
   FittedRegion FitOtherShape() {

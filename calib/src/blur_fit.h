@@ -54,9 +54,6 @@ struct BlurFitSetup {
   std::vector<BlurSamples> meters;
   // S0, px^2: free, or given with its sigma (0: fixed).
   std::optional<model::Estimate> floor_variance_px2;
-  // The aperture's shape where fall-off (12) weighs its rays: the blur is then that of the weighed
-  // aperture, and kappa still that of the aperture. None: nothing is weighed.
-  std::optional<model::Psf> weighed_psf;
 };
 
 // Parameters of a result, in this order.
@@ -81,8 +78,8 @@ struct BlurFitResult {
 
 // sigma^2 at a depth by the law, without the floor, for kappa = 1, px^2.
 double DefocusVariance(const BlurFitSetup& setup, double focus_depth_mm, double depth_mm);
-// The same for a result's own kappa, as it is seen with fall-off.
-double SeenDefocusVariance(const BlurFitSetup& setup, const BlurFitResult& fit, double depth_mm);
+// The same for a result's own zf and kappa.
+double FittedDefocusVariance(const BlurFitSetup& setup, const BlurFitResult& fit, double depth_mm);
 
 // Fits (zf, kappa, S0, the targets' c, every reading's error, the scale's law) by Ceres to the
 // blur, the readings and the scales at once; the readings' errors are eliminated (variable

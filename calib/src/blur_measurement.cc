@@ -39,7 +39,6 @@ class Measurement {
     setup.lens = task.sweep.camera.lens;
     setup.pixel_pitch_mm = task.sweep.camera.sensor.pixel_pitch_mm;
     setup.law = task.law;
-    setup.weighed_psf = task.sweep.camera.psf;
     setup.offset_mm = task.offset_mm;
     setup.direction = task.sweep.direction;
     setup.reading_sigma_mm = task.reading_sigma_mm;

@@ -50,6 +50,7 @@ struct BlurEvidence {
   std::optional<BlurSamples> other_psf, narrow_band;
   model::Psf better_psf = model::Psf::kGaussian;
   std::optional<double> gaussian_misfit, disc_misfit;
+  double shape_dof = 0;  // degrees of freedom of each misfit; 0: they are means over few edges
   std::vector<BlurExample> examples;
   std::vector<double> frame_noise_ratios;  // spectral scatter over the pixel noise, of setup.frames
   std::string message;                     // why there is no meter

@@ -1,7 +1,5 @@
 #include "blur_prediction.h"
 
-#include "thicklens/model/weighed_aperture.h"
-
 namespace thicklens::calib {
 namespace {
 
@@ -28,11 +26,6 @@ Radius RadiusPx(const BlurFitSetup& setup, double zf, double z) {
   return {a * k * ((z - zf) / (zf * zf)), by_focus, a * k / (zf * zf), 0};
 }
 
-model::SeenBlurRatio SeenRatio(const BlurFitSetup& setup, double zf, double kappa) {
-  if (setup.weighed_psf) return model::SeeBlurRatio(setup.lens, *setup.weighed_psf, kappa, zf);
-  return {kappa * kappa, 2 * kappa, 0};
-}
-
 }  // namespace
 
 double DefocusVariance(const BlurFitSetup& setup, double focus_depth_mm, double depth_mm) {
@@ -40,25 +33,23 @@ double DefocusVariance(const BlurFitSetup& setup, double focus_depth_mm, double 
   return radius_px * radius_px;
 }
 
-double SeenDefocusVariance(const BlurFitSetup& setup, const BlurFitResult& fit, double depth_mm) {
-  const double zf = fit.values[kFocusDepth];
-  return SeenRatio(setup, zf, fit.values[kBlurRatio]).squared *
-         DefocusVariance(setup, zf, depth_mm);
+double FittedDefocusVariance(const BlurFitSetup& setup, const BlurFitResult& fit, double depth_mm) {
+  const double kappa = fit.values[kBlurRatio];
+  return kappa * kappa * DefocusVariance(setup, fit.values[kFocusDepth], depth_mm);
 }
 
 BlurPrediction PredictBlur(const BlurFitSetup& setup, const Eigen::Vector4d& global,
                            double depth_mm, double scale) {
   const Radius r = RadiusPx(setup, global[kFocusDepth], depth_mm);
   const double s2 = 1 / (scale * scale);
-  const model::SeenBlurRatio seen = SeenRatio(setup, global[kFocusDepth], global[kBlurRatio]);
-  const double kappa2 = seen.squared;
+  const double kappa = global[kBlurRatio];
+  const double kappa2 = kappa * kappa;
   BlurPrediction p;
   p.value = s2 * (global[kFloorVariance] + kappa2 * r.value * r.value);
   p.by_depth = s2 * kappa2 * 2 * r.value * r.by_depth;
   p.by_depth_twice = s2 * kappa2 * 2 * (r.by_depth * r.by_depth + r.value * r.by_depth_twice);
-  p.by_global[kFocusDepth] =
-      s2 * (kappa2 * 2 * r.value * r.by_focus + seen.by_focus_depth * r.value * r.value);
-  p.by_global[kBlurRatio] = s2 * seen.by_blur_ratio * r.value * r.value;
+  p.by_global[kFocusDepth] = s2 * kappa2 * 2 * r.value * r.by_focus;
+  p.by_global[kBlurRatio] = s2 * 2 * kappa * r.value * r.value;
   p.by_global[kFloorVariance] = s2;
   p.by_global[kBenchOffset] = p.by_depth;
   return p;

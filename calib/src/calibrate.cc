@@ -24,7 +24,7 @@
 #include "thicklens/calib/sharpness.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
-#include "thicklens/model/weighed_aperture.h"
+#include "thicklens/model/pupil_law.h"
 
 namespace thicklens::calib {
 namespace {
@@ -245,15 +245,25 @@ class Calibrator {
       frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
   }
 
-  // The image scale's zero is the centre of perspective, which fall-off puts in front of the
-  // aperture: how far depends on the blur.
+  // The image scale's zero is the centre of perspective. How far from the aperture it lies depends
+  // on the blur and on how the light spreads over the pupil, which nobody knows of a real lens: the
+  // paper's law gives the value, the others an interval about it.
   void ReckonWithFalloff(double blur_ratio, double focus_depth_mm, ScaleLaw* law) const {
     const model::Camera& camera = sweep_.camera;
     if (!law->done || !(focus_depth_mm > camera.lens.front_focal_length_mm)) return;
     const double line_zero_mm = law->line_zero_mm();
-    law->centre_mm =
-        model::CentreOfPerspectiveMm(camera.lens, camera.psf, blur_ratio, focus_depth_mm);
+    const auto centre_mm = [&](model::PupilLaw pupil) {
+      return model::CentreOfPerspectiveMm(camera.lens, camera.psf, pupil, blur_ratio,
+                                          focus_depth_mm);
+    };
+    law->centre_mm = centre_mm(model::PupilLaw::kPaper);
     law->offset_mm.value = line_zero_mm + law->centre_mm;
+    law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
+    for (const model::PupilLaw pupil : model::AllPupilLaws()) {
+      const double offset_mm = line_zero_mm + centre_mm(pupil);
+      law->offset_of_pupil_laws_mm = {std::min(law->offset_of_pupil_laws_mm.x(), offset_mm),
+                                      std::max(law->offset_of_pupil_laws_mm.y(), offset_mm)};
+    }
   }
 
   // The sharpest frame may be the one whose reading is wrong: the next sharpest takes its place,
@@ -323,6 +333,13 @@ class Calibrator {
 
   // What the checks found, as far as it moves the results.
   void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
+    if (!sweep_.offset_mm && result_.scale.done) {
+      const Eigen::Vector2d& offsets_mm = result_.scale.offset_of_pupil_laws_mm;
+      WidenByTrials("pupil law",
+                    "measure offset_mm: a zero from the image scale depends on how the light "
+                    "spreads over the pupil",
+                    WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);
+    }
     if (conflicting_offset_mm_) {
       // Believing it is believing its error too.
       const model::Estimate& zero = *conflicting_offset_mm_;

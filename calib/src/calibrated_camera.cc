@@ -47,6 +47,8 @@ model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& c
     found.covariance = calibration.covariance;
     found.evidence.focus_depth_mm = estimate(calibration.focus_depth_mm);
     found.evidence.chi2_per_dof = calibration.blur.chi2_per_dof;
+    found.evidence.blur_family = model::PsfName(calibration.blur.family);
+    found.evidence.blur_band = calibration.blur.band;
   }
   result.calibration = found;
   return result;

@@ -42,20 +42,24 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) 
     calibration->warnings.push_back("the given offset_mm could not be checked: " + law.message);
     return check;
   }
-  const double apart_mm = law.offset_mm.value - sweep.offset_mm->value;
+  // No pupil law is known to hold: the zero may lie anywhere between those that they give.
+  const double given_mm = sweep.offset_mm->value;
+  const double apart_mm =
+      std::clamp(given_mm, law.offset_of_pupil_laws_mm.x(), law.offset_of_pupil_laws_mm.y()) -
+      given_mm;
   const double sigma_mm = std::hypot(law.offset_mm.sigma, sweep.offset_mm->sigma);
   if (!(std::abs(apart_mm) > 3 * sigma_mm + 1e-3 * law.reference_depth_mm)) return check;
   const std::string found = fmt::format(
       "the image scale puts the bench zero at {:.2f} +- {:.2f} mm, {:+.2f} mm from "
       "the given one",
-      law.offset_mm.value, law.offset_mm.sigma, apart_mm);
+      given_mm + apart_mm, law.offset_mm.sigma, apart_mm);
   if (std::abs(apart_mm) > kGrossOffset * law.reference_depth_mm &&
       std::abs(apart_mm) > 5 * sigma_mm) {
     check.refusal = found + ": check offset_mm, and that it and the readings are in mm";
     return check;
   }
   calibration->warnings.push_back(found);
-  check.conflicting_mm = model::Estimate{law.offset_mm.value, law.offset_mm.sigma};
+  check.conflicting_mm = model::Estimate{given_mm + apart_mm, law.offset_mm.sigma};
   return check;
 }
 

@@ -61,7 +61,7 @@ class Field {
       MeterFrame entry = frame;
       const double depth_mm = DepthMm(frame.frame);
       entry.expected_variance_px2 =
-          (fit_.values[kFloorVariance] + SeenDefocusVariance(evidence_.setup, fit_, depth_mm)) /
+          (fit_.values[kFloorVariance] + FittedDefocusVariance(evidence_.setup, fit_, depth_mm)) /
           (frame.place.scale * frame.place.scale);
       if (frame.frame == reference) setup_.reference = kept.size();
       kept.push_back(entry);

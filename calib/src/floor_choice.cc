@@ -44,7 +44,7 @@ std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
   for (std::size_t i = 0; i < evidence.unstated_edges->frames.size(); ++i) {
     const FitFrame& frame = setup.frames[evidence.unstated_edges->frames[i]];
     const double depth_mm = setup.offset_mm.value + sign * frame.reading_mm;
-    const double defocus = SeenDefocusVariance(setup, fit, depth_mm);
+    const double defocus = FittedDefocusVariance(setup, fit, depth_mm);
     rests.push_back(evidence.unstated_edges->variances_px2[static_cast<Eigen::Index>(i)] *
                         frame.scale * frame.scale -
                     defocus);

@@ -100,6 +100,8 @@ class Solution {
     blur.meter = evidence_.edges < 0      ? "relative spectrum"
                  : evidence_.spectrum < 0 ? "edges"
                                           : "edges and relative spectrum";
+    blur.family = sweep_.camera.psf;
+    if (evidence_.spectrum >= 0) blur.band = UsualBand(sweep_.camera.psf);
     blur.better_psf = evidence_.disc_misfit ? evidence_.better_psf : sweep_.camera.psf;
     blur.gaussian_misfit = evidence_.gaussian_misfit;
     blur.disc_misfit = evidence_.disc_misfit;

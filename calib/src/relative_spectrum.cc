@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "spectral_transfer.h"
 
@@ -296,6 +297,58 @@ class Fit {
       noise_[i] = std::max(found[i], 0.5 * typical * expected_noise_[i]);
   }
 
+  // The tails by one Gauss-Newton step, gains, variances and T eliminated: d ln M/d tails = 4 u^2
+  // is real, as those of the amplitudes are. `solve` applies the inverse of their normal matrix.
+  template <typename Solve>
+  void FillTails(const Evaluation& e, const Eigen::VectorXd& gradient, const Solve& solve) {
+    const Eigen::ArrayXd power = e.texture.abs2();
+    const Eigen::ArrayXd root = (power / e.information).sqrt();
+    std::vector<Eigen::ArrayXd> slopes(samples_.size()), weights(samples_.size());
+    Eigen::VectorXd projected = Eigen::VectorXd::Zero(modes_);
+    double own = 0, pull = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      const double defocus_px2 =
+          state_.variance[i] - options_.floor_variance_px2 / std::pow(samples_[s].scale, 2);
+      slopes[s] = 4 * (kTwoPiSquared * defocus_px2 * norm2_.head(c)).square();
+      const Eigen::ArrayXd noise = box2_[s].head(c) / noise_[i];
+      weights[s] = e.models[s].abs2() * noise;
+      projected.head(c) += (weights[s] * root.head(c) * slopes[s]).matrix();
+      own += (weights[s] * power.head(c) * slopes[s].square()).sum();
+      const Eigen::ArrayXcd model = e.models[s] * e.texture.head(c);
+      pull += ((model.conjugate() * (data_[s] - model)).real() * noise * slopes[s]).sum();
+    }
+    Eigen::VectorXd mixed(2 * (n() - 1));
+    Eigen::Index row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      const Eigen::ArrayXd shared =
+          weights[s] * (power.head(c) * slopes[s] - root.head(c) * projected.head(c).array());
+      mixed[2 * row] = shared.sum();
+      mixed[2 * row + 1] = (shared * e.slopes[s]).sum();
+      ++row;
+    }
+    const Eigen::VectorXd answer = solve(mixed);
+    const double information = own - projected.squaredNorm() - mixed.dot(answer);
+    result_.variance_by_tails = Eigen::VectorXd::Zero(n());
+    row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      result_.variance_by_tails[i] = -answer[2 * row + 1];
+      ++row;
+    }
+    // Without defocus, or at one blur alone, nothing tells the shape.
+    if (!(information > 1e-12 * own)) {
+      result_.tails = {0, std::numeric_limits<double>::infinity()};
+      return;
+    }
+    result_.tails = {(pull - answer.dot(gradient)) / information,
+                     std::sqrt(kRealPart * kSharedNoise / information)};
+  }
+
   bool Finish() {
     const Eigen::Index size = 2 * (n() - 1);
     Eigen::VectorXd gradient;
@@ -315,6 +368,7 @@ class Fit {
         scaled(a, b) = scale[low] * scale[high] * normal(high, low);
       }
     }
+    const Eigen::VectorXd full_scale = scale;
     normal.resize(0, 0);  // matrices of this size are what a long sweep's memory goes to
     scaled.diagonal().array() += 1e-12;
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(scaled);  // in place
@@ -322,6 +376,19 @@ class Fit {
       result_.message = "the spectra do not tell the blur of every frame";
       return false;
     }
+    FillTails(Evaluate(state_), gradient, [&](const Eigen::VectorXd& of) -> Eigen::VectorXd {
+      Eigen::VectorXd permuted(size), solved(size);
+      for (Eigen::Index a = 0; a < size; ++a) {
+        const Eigen::Index at = order[static_cast<std::size_t>(a)];
+        permuted[a] = full_scale[at] * of[at];
+      }
+      permuted = factor.solve(permuted);
+      for (Eigen::Index a = 0; a < size; ++a) {
+        const Eigen::Index at = order[static_cast<std::size_t>(a)];
+        solved[at] = full_scale[at] * permuted[a];
+      }
+      return solved;
+    });
     Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(size / 2, size / 2);
     scaled.bottomRightCorner(size / 2, size / 2)
         .triangularView<Eigen::Lower>()

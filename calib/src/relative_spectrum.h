@@ -46,7 +46,13 @@ struct RelativeBlur {
   Eigen::VectorXd noise_ratio;    // scatter about the fit over what the pixel noise explains
   std::vector<int> modes_used;    // of each sample
   double chi2_per_dof = 0;        // against the pixel noise, all samples
-  Eigen::ArrayXcd texture;        // T
+  // How the shape departs from the family's: H exp(4 tails u^2), u = 2 pi^2 v nu^2 with v the
+  // defocus alone; the same in all frames, and no change of the second moment. 0: the family
+  // itself; a disc is a Gaussian with -1/24 to the first order. One step of the fit from 0, and how
+  // V answers.
+  model::Estimate tails;
+  Eigen::VectorXd variance_by_tails;  // dV/d tails, px^2
+  Eigen::ArrayXcd texture;            // T
 };
 
 RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pupil_shapes.h"
 #include "systematic_advice.h"
 
 namespace thicklens::calib {
@@ -12,8 +13,12 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 5;
 constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
-constexpr double kLawFails = 2;        // chi^2 per degree of freedom of the blur law
-constexpr double kSidesDisagree = 3;   // of their standard deviations
+// Difference of chi^2 of the frames, 4 standard deviations, beyond which a family is ruled out.
+constexpr double kRuledOut = 16;
+constexpr double kReach = 2;          // standard deviations
+constexpr double kDoubtless = 4;      // the same, of what is beyond doubt
+constexpr double kLawFails = 2;       // chi^2 per degree of freedom of the blur law
+constexpr double kSidesDisagree = 3;  // of their standard deviations
 // What the meters themselves are good for, relative to kappa: measured on simulated sweeps.
 constexpr double kMeterRatioError = 0.003;
 
@@ -40,6 +45,7 @@ class Parts {
     AddSides();
     AddBand();
     AddShape();
+    AddTails();
     AddMeter();
     AddTolerances();
     SystematicPart own;
@@ -117,11 +123,9 @@ class Parts {
   }
 
   // Another set of samples in a meter's place. Frames that were thrown out stay out.
-  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter,
-                            model::Psf psf) const {
+  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter) const {
     if (!samples || meter < 0) return std::nullopt;
     BlurFitSetup setup = evidence_.setup;
-    if (setup.weighed_psf) setup.weighed_psf = psf;
     BlurSamples& place = setup.meters[static_cast<std::size_t>(meter)];
     std::vector<Eigen::Index> kept;
     for (std::size_t i = 0; i < samples->frames.size(); ++i) {
@@ -141,8 +145,7 @@ class Parts {
   }
 
   void AddBand() {
-    const std::optional<Trial> trial =
-        With(evidence_.narrow_band, evidence_.spectrum, sweep_.camera.psf);
+    const std::optional<Trial> trial = With(evidence_.narrow_band, evidence_.spectrum);
     if (!trial) return;
     SystematicPart part;
     part.name = "frequency band";
@@ -165,12 +168,22 @@ class Parts {
            fit_.chi2_per_dof > 2 * other.fit.chi2_per_dof;
   }
 
-  // With a shape that fits, kappa is not expected to move; with another one it is another kappa,
-  // and only the depth can be compared.
+  // The stated family describes the frames better beyond doubt. Another family's kappa says nothing
+  // then: it is the second moment of a shape that the blur does not have.
+  bool OtherShapeIsRuledOut() const {
+    if (!evidence_.gaussian_misfit || !evidence_.disc_misfit) return false;
+    const bool is_gaussian = sweep_.camera.psf == model::Psf::kGaussian;
+    const double stated = is_gaussian ? *evidence_.gaussian_misfit : *evidence_.disc_misfit;
+    const double other = is_gaussian ? *evidence_.disc_misfit : *evidence_.gaussian_misfit;
+    if (evidence_.shape_dof > 0) return (other / stated - 1) * evidence_.shape_dof > kRuledOut;
+    return other > kShapesDiffer * stated;
+  }
+
+  // The spread over the families that the frames do not rule out. The depth is compared in any
+  // case.
   void AddShape() {
     const std::optional<Trial> trial =
-        With(evidence_.other_psf, evidence_.spectrum >= 0 ? evidence_.spectrum : evidence_.edges,
-             OtherPsf(sweep_.camera.psf));
+        With(evidence_.other_psf, evidence_.spectrum >= 0 ? evidence_.spectrum : evidence_.edges);
     if (!trial) return;
     SystematicPart part;
     part.name = kShapePart;
@@ -181,7 +194,7 @@ class Parts {
             ? fmt::format("state psf: {} in the camera file: it fits better", model::PsfName(other))
             : std::string("nothing: the shape that the camera file states fits better");
     Include(*trial, &part);
-    if (!is_right) part.blur_ratio.setZero();
+    if (!is_right && OtherShapeIsRuledOut()) part.blur_ratio.setZero();
     result_.systematic_parts.push_back(part);
     if (!is_right) return;
     result_.warnings.push_back(fmt::format(
@@ -190,6 +203,49 @@ class Parts {
         "{:.4f}; state psf: {} in the camera file",
         model::PsfName(other), model::PsfName(sweep_.camera.psf), trial->fit.chi2_per_dof,
         fit_.chi2_per_dof, trial->fit.values[kBlurRatio], model::PsfName(other)));
+  }
+
+  // How far the tails may depart from the family's: to what the frames themselves ask for, as far
+  // as a pupil law makes that; beyond where they ask for it beyond doubt.
+  std::optional<Eigen::Vector2d> TailsRange(const Eigen::Vector2d& of_laws) const {
+    if (evidence_.spectrum < 0 || evidence_.blur.variance_by_tails.size() == 0) return std::nullopt;
+    const model::Estimate& tails = evidence_.blur.tails;
+    Eigen::Vector2d range(std::min(0.0, std::max(tails.value - kReach * tails.sigma, of_laws.x())),
+                          std::max(0.0, std::min(tails.value + kReach * tails.sigma, of_laws.y())));
+    // One step of a fit says too little of tails as large as they are beyond doubt.
+    if (tails.value < -kDoubtless * tails.sigma)
+      range.x() = std::min({range.x(), tails.value, of_laws.x()});
+    if (tails.value > kDoubtless * tails.sigma)
+      range.y() = std::max({range.y(), tails.value, of_laws.y()});
+    return range;
+  }
+
+  // What the shape of the blur's tails does to its second moment: pupil laws differ by it.
+  void AddTails() {
+    const double kappa = fit_.values[kBlurRatio];
+    const double zf_mm = fit_.values[kFocusDepth];
+    if (!(kappa > 0) || !(zf_mm > evidence_.setup.lens.front_focal_length_mm)) return;
+    const model::PupilOptics optics =
+        model::PupilOpticsOf(evidence_.setup.lens, sweep_.camera.psf, kappa, zf_mm);
+    SystematicPart part;
+    part.name = "tails of the blur";
+    part.remedy =
+        "a smaller aperture: of a wide one the light's spread over the pupil is known too little";
+    if (const auto range = TailsRange(TailsOfPupilLaws(optics))) {
+      for (const double tails : {range->x(), range->y()}) {
+        if (tails == 0) continue;
+        BlurSamples moved = FitSamples(evidence_, evidence_.blur, evidence_.region);
+        moved.variances_px2 += tails * evidence_.blur.variance_by_tails;
+        if (const auto trial = With(moved, evidence_.spectrum)) Include(*trial, &part);
+      }
+    }
+    if (evidence_.edges >= 0) {
+      const Eigen::Vector2d ratios = EdgeRatiosOfPupilLaws(optics);
+      part.blur_ratio.x() = std::min(part.blur_ratio.x(), kappa * (1 / ratios.y() - 1));
+      part.blur_ratio.y() = std::max(part.blur_ratio.y(), kappa * (1 / ratios.x() - 1));
+    }
+    if (part.blur_ratio.isZero() && part.focus_depth_mm.isZero()) return;
+    result_.systematic_parts.push_back(part);
   }
 
   // Each meter alone, where there are two.

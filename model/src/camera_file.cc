@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "former_blur_ratio.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/yaml_reader.h"
@@ -13,7 +14,9 @@
 namespace thicklens::model {
 namespace {
 
-constexpr char kSchema[] = "thicklens/camera/1";
+constexpr char kSchema[] = "thicklens/camera/2";
+// Its blur ratio was another (former_blur_ratio.h).
+constexpr char kFormerSchema[] = "thicklens/camera/1";
 constexpr int kMaxImageSizePx = 100000;
 
 // A number, or {value: .., tolerance: .., assumed: ..}; what is stated about it goes into the
@@ -73,7 +76,7 @@ std::optional<Estimate> ReadEstimate(const YamlNode& parent, const std::string& 
 
 Evidence ReadEvidence(const YamlNode& node) {
   node.RequireKeys({"method", "frames_used", "frames_rejected", "chi2_per_dof", "focus_depth_mm",
-                    "data_sha256", "version", "date"});
+                    "blur_family", "blur_band", "data_sha256", "version", "date"});
   Evidence evidence;
   evidence.method = node.At("method").Text();
   if (const auto used = node.Find("frames_used")) evidence.frames_used = used->Integer(0, 1000000);
@@ -86,6 +89,9 @@ Evidence ReadEvidence(const YamlNode& node) {
   if (const auto chi2 = node.Find("chi2_per_dof"))
     evidence.chi2_per_dof = chi2->NonNegativeNumber();
   evidence.focus_depth_mm = ReadEstimate(node, "focus_depth_mm", &YamlNode::PositiveNumber);
+  if (const auto family = node.Find("blur_family"))
+    evidence.blur_family = family->OneOf({"gaussian", "disc"});
+  if (const auto band = node.Find("blur_band")) evidence.blur_band = band->PositiveNumber();
   if (const auto hash = node.Find("data_sha256")) evidence.data_sha256 = hash->Text();
   if (const auto version = node.Find("version")) evidence.version = version->Text();
   if (const auto date = node.Find("date")) evidence.date = date->Text();
@@ -240,6 +246,8 @@ class Writer {
     }
     if (evidence.chi2_per_dof) Number("chi2_per_dof", *evidence.chi2_per_dof);
     Measured("focus_depth_mm", evidence.focus_depth_mm);
+    if (!evidence.blur_family.empty()) Text("blur_family", evidence.blur_family);
+    if (evidence.blur_band) Number("blur_band", *evidence.blur_band);
     if (!evidence.data_sha256.empty()) Text("data_sha256", evidence.data_sha256);
     if (!evidence.version.empty()) Text("version", evidence.version);
     if (!evidence.date.empty()) Text("date", evidence.date);
@@ -254,7 +262,8 @@ class Writer {
 
 Camera ParseCamera(const std::string& text, const std::string& source_name) {
   const YamlNode root = YamlNode::Parse(text, source_name);
-  root.RequireSchema(kSchema);
+  const bool is_former = root.HasSchema(kFormerSchema);
+  if (!is_former) root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "name", "lens", "sensor", "psf", "calibration"});
   Camera camera;
   camera.name = root.At("name").Text();
@@ -273,6 +282,7 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
                                           : std::optional<YamlNode>();
     throw place.value_or(root).ErrorHere(why);
   }
+  if (is_former) ConvertFormerBlurRatio(&camera);
   return camera;
 }
 

@@ -39,25 +39,78 @@ double DiscSecondAntiderivative(double x, double radius) {
   return radius * radius * (u * u / 4 + bracket / kPi + 1.0 / 16);
 }
 
+// The same, px^2, for the step blurred by a ring of radius R, 1/2 + asin(u)/pi: derived by
+// integrating twice, R^2 {u^2/4 + [(u^2/2 + 1/4) asin u + 3/4 u s]/pi + 1/8}, and x^2/2 + R^2/4
+// behind.
+double RingSecondAntiderivative(double x, double radius) {
+  if (x <= -radius) return 0;
+  if (x >= radius) return x * x / 2 + radius * radius / 4;
+  const double u = x / radius;
+  const double s = std::sqrt(1 - u * u);
+  const double bracket = (u * u / 2 + 0.25) * std::asin(u) + 0.75 * u * s;
+  return radius * radius * (u * u / 4 + bracket / kPi + 0.125);
+}
+
 }  // namespace
 
 EdgeSpread::EdgeSpread(double angle_rad, double gaussian_sigma_px, double disc_radius_px,
                        bool pixel_box)
     : sigma_px_(gaussian_sigma_px), radius_px_(disc_radius_px), pixel_box_(pixel_box) {
-  const double a = std::abs(std::cos(angle_rad));
-  const double b = std::abs(std::sin(angle_rad));
-  wide_box_px_ = std::max(a, b);
-  narrow_box_px_ = std::max(std::min(a, b), kNarrowestBoxPx);
+  SetBoxes(angle_rad);
   reach_px_ = radius_px_ + kGaussianReach * sigma_px_ + (wide_box_px_ + narrow_box_px_) / 2;
   if (sigma_px_ > 0 && radius_px_ > 0) Tabulate(angle_rad);
 }
 
+EdgeSpread::EdgeSpread(double angle_rad, double gaussian_sigma_px, const PupilProfile& profile,
+                       double defocus_sigma_px, bool pixel_box)
+    : sigma_px_(gaussian_sigma_px),
+      profile_(&profile),
+      defocus_sigma_px_(defocus_sigma_px),
+      pixel_box_(pixel_box) {
+  SetBoxes(angle_rad);
+  double light_px = kGaussianReach * defocus_sigma_px;
+  if (profile.psf() == Psf::kDisc) {
+    light_px = 0;
+    for (const PupilProfile::Ring& ring : profile.rings())
+      light_px = std::max(light_px, ring.radius * defocus_sigma_px);
+  }
+  reach_px_ = light_px + kGaussianReach * sigma_px_ + (wide_box_px_ + narrow_box_px_) / 2;
+  if (sigma_px_ > 0 || profile.psf() == Psf::kGaussian) Tabulate(angle_rad);
+}
+
+// The widths of the pixel box across the edge.
+void EdgeSpread::SetBoxes(double angle_rad) {
+  const double a = std::abs(std::cos(angle_rad));
+  const double b = std::abs(std::sin(angle_rad));
+  wide_box_px_ = std::max(a, b);
+  narrow_box_px_ = std::max(std::min(a, b), kNarrowestBoxPx);
+}
+
+double EdgeSpread::DefocusTransferAt(double fx, double fy) const {
+  return profile_ == nullptr ? DiscTransfer(radius_px_, fx, fy)
+                             : profile_->Transfer(2 * kPi * defocus_sigma_px_ * std::hypot(fx, fy));
+}
+
 double EdgeSpread::SecondAntiderivative(double x) const {
+  if (profile_ != nullptr) {
+    double sum = 0;
+    for (const PupilProfile::Ring& ring : profile_->rings())
+      sum += ring.share * RingSecondAntiderivative(x, ring.radius * defocus_sigma_px_);
+    return sum;
+  }
   return radius_px_ > 0 ? DiscSecondAntiderivative(x, radius_px_)
                         : GaussianSecondAntiderivative(x, sigma_px_);
 }
 
 double EdgeSpread::BlurredStep(double x) const {
+  if (profile_ != nullptr) {
+    double sum = 0;
+    for (const PupilProfile::Ring& ring : profile_->rings()) {
+      const double u = std::clamp(x / (ring.radius * defocus_sigma_px_), -1.0, 1.0);
+      sum += ring.share * (0.5 + std::asin(u) / kPi);
+    }
+    return sum;
+  }
   if (radius_px_ > 0) {
     const double u = std::clamp(x / radius_px_, -1.0, 1.0);
     return 0.5 + (u * std::sqrt(1 - u * u) + std::asin(u)) / kPi;
@@ -72,7 +125,11 @@ double EdgeSpread::BlurredStep(double x) const {
 void EdgeSpread::Tabulate(double angle_rad) {
   // Steps of sigma/40: the cubic between four nodes is then good to 1e-8, and the Gaussian has long
   // ended the series before its highest term, 20/sigma cycles per px.
-  const double wanted_step_px = std::max(sigma_px_ / 40, 1e-4);
+  // So does the light of a Gaussian under a pupil law.
+  const double smooth_px = profile_ != nullptr && profile_->psf() == Psf::kGaussian
+                               ? std::hypot(sigma_px_, 0.85 * defocus_sigma_px_)
+                               : sigma_px_;
+  const double wanted_step_px = std::max(smooth_px / 40, 1e-4);
   const double period_px = 4.1 * (reach_px_ + 4 * wanted_step_px);
   const int nodes =
       2 * cv::getOptimalDFTSize(static_cast<int>(std::ceil(period_px / wanted_step_px / 2)));
@@ -87,7 +144,7 @@ void EdgeSpread::Tabulate(double angle_rad) {
     const double fy = k / period_px * std::sin(angle_rad);
     const double gaussian = GaussianTransfer(sigma_px_, fx, fy);
     if (gaussian < 1e-17) break;
-    coefficients[2 * static_cast<std::size_t>(k)] = -gaussian * DiscTransfer(radius_px_, fx, fy) *
+    coefficients[2 * static_cast<std::size_t>(k)] = -gaussian * DefocusTransferAt(fx, fy) *
                                                     (pixel_box_ ? PixelBoxTransfer(fx, fy) : 1) /
                                                     (kPi * k);
   }

@@ -19,6 +19,8 @@ constexpr double kOversampling = 1.5;
 
 // Frequencies whose Gaussian transfer is below this are left out.
 constexpr double kNegligibleTransfer = 1e-12;
+// Of its sigma, the Gaussian that falls no faster than one under a pupil law.
+constexpr double kLawReach = 0.85;
 
 // Rows transformed together: enough to spread the set-up of the FFT, few enough for the cache.
 constexpr int kBlock = 16;
@@ -44,12 +46,12 @@ struct AxisPlan {
   std::vector<double> taps;     // kTaps a pixel
 };
 
+// `gaussian_sigma_px` is the blur that separates; at least `reach_sigma_px` blurs in all.
 AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_sigma_px,
-                  bool pixel_box) {
+                  double reach_sigma_px, bool pixel_box) {
   AxisPlan plan;
   while (plan.limit < max_frequency &&
-         GaussianTransfer(gaussian_sigma_px, (plan.limit + 1) * axis.step, 0) >=
-             kNegligibleTransfer) {
+         GaussianTransfer(reach_sigma_px, (plan.limit + 1) * axis.step, 0) >= kNegligibleTransfer) {
     ++plan.limit;
   }
   const int band = 2 * plan.limit + 1;
@@ -139,12 +141,24 @@ std::complex<double> PeriodicPicture::Coefficient(int a, int b) const {
 
 cv::Mat PeriodicPicture::Evaluate(const AxisSampling& x, const AxisSampling& y,
                                   const FrameBlur& blur) const {
-  // Gaussians of both kinds are one Gaussian, and it separates; a disc does not.
-  const bool disc = blur.psf == Psf::kDisc && blur.defocus_sigma_px > 0;
+  // Gaussians of both kinds are one Gaussian, and it separates; a disc does not, nor does the light
+  // of a pupil law.
+  const bool separates =
+      blur.defocus_sigma_px == 0 || (blur.psf == Psf::kGaussian && blur.profile == nullptr);
   const double gaussian_sigma_px =
-      disc ? blur.floor_sigma_px : std::hypot(blur.floor_sigma_px, blur.defocus_sigma_px);
-  const AxisPlan x_plan = PlanAxis(x, max_x_, gaussian_sigma_px, blur.pixel_box);
-  const AxisPlan y_plan = PlanAxis(y, max_y_, gaussian_sigma_px, blur.pixel_box);
+      separates ? std::hypot(blur.floor_sigma_px, blur.defocus_sigma_px) : blur.floor_sigma_px;
+  // The transfer function of a Gaussian under a pupil law falls nearly as fast as its own.
+  const double reach_sigma_px =
+      separates || blur.psf == Psf::kDisc
+          ? gaussian_sigma_px
+          : std::hypot(blur.floor_sigma_px, kLawReach * blur.defocus_sigma_px);
+  const AxisPlan x_plan = PlanAxis(x, max_x_, gaussian_sigma_px, reach_sigma_px, blur.pixel_box);
+  const AxisPlan y_plan = PlanAxis(y, max_y_, gaussian_sigma_px, reach_sigma_px, blur.pixel_box);
+  const auto defocus_transfer = [&](double fx, double fy) {
+    return blur.profile == nullptr
+               ? DefocusTransfer(blur.psf, blur.defocus_sigma_px, fx, fy)
+               : blur.profile->Transfer(2 * kPi * blur.defocus_sigma_px * std::hypot(fx, fy));
+  };
 
   // First axis: row b of the spectrum to the pixels' columns; kept transposed for the second.
   const int rows = y_plan.limit + 1;
@@ -161,9 +175,7 @@ cv::Mat PeriodicPicture::Evaluate(const AxisSampling& x, const AxisSampling& y,
         const double row_factor = y_plan.factor[static_cast<std::size_t>(b)];
         for (int a = 0; a <= x_plan.limit; ++a) {
           double factor = row_factor * x_plan.factor[static_cast<std::size_t>(a)];
-          if (disc) {
-            factor *= DefocusTransfer(blur.psf, blur.defocus_sigma_px, a * x.step, b * y.step);
-          }
+          if (!separates) factor *= defocus_transfer(a * x.step, b * y.step);
           nodes[a] = Coefficient(a, b) * factor;
           if (a > 0) nodes[x_plan.grid_size - a] = Coefficient(-a, b) * factor;
         }

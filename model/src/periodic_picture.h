@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "thicklens/model/camera.h"
+#include "thicklens/model/pupil_law.h"
 
 namespace thicklens::model {
 
@@ -24,6 +25,8 @@ struct FrameBlur {
   Psf psf = Psf::kGaussian;
   double defocus_sigma_px = 0;
   bool pixel_box = true;  // else a pixel is the light at its centre
+  // The shape of the defocus blur where it is not that of `psf` itself; not owned.
+  const PupilProfile* profile = nullptr;
 };
 
 // A picture that is a finite Fourier series: it repeats in both directions and is band-limited by

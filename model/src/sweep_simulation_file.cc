@@ -129,7 +129,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   const YamlNode root = YamlNode::LoadFile(path);
   root.RequireSchema(kSchema);
   root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
-                    "drift_sigma_px", "noise", "bits", "effects", "without", "seed"});
+                    "drift_sigma_px", "noise", "bits", "pupil_law", "effects", "without", "seed"});
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
@@ -140,6 +140,11 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   ReadNumber(root, "drift_sigma_px", &options.drift_sigma_px);
   if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
+  if (const auto law = root.Find("pupil_law")) {
+    std::vector<std::string> names;
+    for (const PupilLaw each : AllPupilLaws()) names.push_back(PupilLawName(each));
+    options.pupil_law = PupilLawFromName(law->OneOf(names));
+  }
   ReadEffectChoice(root, &options.effects);
   if (const auto seed = root.Find("seed")) {
     options.seed = static_cast<std::uint64_t>(seed->Integer(0, std::numeric_limits<int>::max()));

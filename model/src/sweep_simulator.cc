@@ -16,7 +16,6 @@
 #include "sensor_noise.h"
 #include "sweep_target.h"
 #include "thicklens/error.h"
-#include "thicklens/model/weighed_aperture.h"
 #include "tilted_target.h"
 
 namespace thicklens::model {
@@ -25,6 +24,9 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 // Of a tilted target whose field is still drawn: what is five times as far away as its middle.
 constexpr double kLeastNearness = 0.2;
+// Sigma, px, beyond which a profile's transfer function is not tabulated up to one cycle per px: a
+// disc's has sunk below 1e-3 by then and is summed anew.
+constexpr double kSharpestTail = 12;
 
 bool IsEdge(TargetKind kind) {
   return kind == TargetKind::kPrintedEdge || kind == TargetKind::kKnifeEdge;
@@ -48,7 +50,7 @@ struct SweepSimulator::Impl {
     if (!options.IsValid(&why)) throw Error(why);
     Decide();
     frames = FramesWith(decision.on);
-    WeighAperture();
+    MakePupil();
     MakeTruth();
     MakeFalloff();
     if (!IsEdge(options.target.kind)) MakeTile(picture);
@@ -163,20 +165,24 @@ struct SweepSimulator::Impl {
     return states;
   }
 
-  // What fall-off makes of the aperture: the light of a point is spread less wide, and lies a
-  // little aside. Of a disc the second moment is kept and not the shape: its rim is darker than its
-  // middle, which takes at most .4 % of a wave's contrast at f/1.4.
-  void WeighAperture() {
-    if (!On(Effect::kFalloff) || !On(Effect::kDefocus)) return;
+  // How the light of a point spreads over the pupil. Its second moment is (kappa r)^2 under any
+  // law; the mean of the rays that a pixel off the axis gets lies a little aside.
+  void MakePupil() {
+    law = options.pupil_law.value_or(On(Effect::kFalloff) ? PupilLaw::kPaper : PupilLaw::kUniform);
+    if (law == PupilLaw::kUniform || !On(Effect::kDefocus) || options.camera.blur_ratio() == 0)
+      return;
     const Camera& camera = options.camera;
     const double scale_mm = DefocusScaleMm(camera.lens, camera.image_distance_mm());
     const double distance_mm = On(Effect::kThickness) ? camera.image_distance_mm() : scale_mm;
-    const WeighedAperture weighed = model::WeighAperture(
-        {stored_camera.psf, camera.blur_ratio() * camera.lens.aperture_radius_mm,
-         camera.focus_depth_mm(), distance_mm},
-        scale_mm);
-    seen_share = std::sqrt(weighed.variance_ratio);
-    mean_per_landing = weighed.mean_per_landing;
+    double most_px = 0;
+    for (const FrameState& frame : frames) most_px = std::max(most_px, frame.defocus_sigma_px);
+    // No frequency of a frame is above one cycle per px of either axis.
+    profile.emplace(
+        law,
+        PupilOptics{stored_camera.psf, camera.blur_ratio() * camera.lens.aperture_radius_mm,
+                    camera.focus_depth_mm(), distance_mm, scale_mm},
+        2 * kPi * std::sqrt(2.0) * std::min(most_px, kSharpestTail));
+    mean_per_landing = profile->mean_per_landing();
   }
   // How much larger what a pixel sees at a depth lies, for the mean of the rays that bring it.
   double SeenScale(double depth_mm) const {
@@ -194,11 +200,12 @@ struct SweepSimulator::Impl {
     truth.blur_ratio = camera.blur_ratio();
     truth.blur_floor_px = floor_px;
     truth.bench_offset_mm = options.bench_offset_mm;
+    truth.pupil_law = PupilLawName(law);
     if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
                               frames[i].reading_mm,
-                              std::hypot(floor_px, seen_share * frames[i].defocus_sigma_px)});
+                              std::hypot(floor_px, frames[i].defocus_sigma_px)});
     }
   }
 
@@ -321,8 +328,7 @@ struct SweepSimulator::Impl {
 
   // Sigma of defocus and light of a column that lies at a depth.
   double SeenDefocusPx(const FrameState& frame, double depth_mm) const {
-    return seen_share *
-           (IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm) : frame.defocus_sigma_px);
+    return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm) : frame.defocus_sigma_px;
   }
   double LampAt(const FrameState& frame, double depth_mm) const {
     const bool falls = options.lamp_falloff && On(Effect::kLampFalloff);
@@ -351,7 +357,8 @@ struct SweepSimulator::Impl {
                          down_mm / tile_frame.height_mm, sensor.height_px};
     const double defocus_px = SeenDefocusPx(frame, target.DepthMm(node_px - axis_px.x()));
     return tile_texture->Evaluate(x, y,
-                                  {floor_px, stored_camera.psf, defocus_px, On(Effect::kPixelBox)});
+                                  {floor_px, stored_camera.psf, defocus_px, On(Effect::kPixelBox),
+                                   profile ? &*profile : nullptr});
   }
 
   LinearPicture RenderTile(const FrameState& frame) const {
@@ -431,9 +438,13 @@ struct SweepSimulator::Impl {
     const double ink_px =
         options_of.kind == TargetKind::kPrintedEdge ? options_of.ink_sigma_mm / pixel_mm : 0;
     const bool disc = stored_camera.psf == Psf::kDisc;
-    const EdgeSpread edge(std::atan2(gradient.y(), gradient.x()),
-                          std::hypot(std::hypot(floor_px, ink_px), disc ? 0 : defocus_px),
-                          disc ? 2 * defocus_px : 0, On(Effect::kPixelBox));
+    const double angle_of_normal_rad = std::atan2(gradient.y(), gradient.x());
+    const double still_px = std::hypot(floor_px, ink_px);
+    const EdgeSpread edge =
+        profile && defocus_px > 0
+            ? EdgeSpread(angle_of_normal_rad, still_px, *profile, defocus_px, On(Effect::kPixelBox))
+            : EdgeSpread(angle_of_normal_rad, std::hypot(still_px, disc ? 0 : defocus_px),
+                         disc ? 2 * defocus_px : 0, On(Effect::kPixelBox));
     const double lamp = LampAt(frame, depth_mm);
     const double dark = lamp * (1 - options_of.contrast);
     const double step = 2 * lamp * options_of.contrast;
@@ -450,8 +461,9 @@ struct SweepSimulator::Impl {
   EffectDecision decision;
   Camera stored_camera;
   double floor_px = 0;
-  // What fall-off makes of the aperture: the share of sigma that is left, and where its middle is.
-  double seen_share = 1, mean_per_landing = 0;
+  PupilLaw law = PupilLaw::kUniform;
+  std::optional<PupilProfile> profile;  // none of the uniform law, whose blur is that of the PSF
+  double mean_per_landing = 0;
   std::vector<float> light_of_pixel;  // none without fall-off
   std::vector<FrameState> frames;
   SweepTruth truth;

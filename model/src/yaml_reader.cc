@@ -142,6 +142,10 @@ Error YamlNode::ErrorHere(const std::string& what) const {
                                    : fmt::format("{}: {}: {}", where, impl_->path, what));
 }
 
+bool YamlNode::HasSchema(const std::string& schema) const {
+  return IsMap() && Has("schema") && At("schema").Text() == schema;
+}
+
 void YamlNode::RequireSchema(const std::string& schema) const {
   if (!IsMap())
     throw ErrorHere(

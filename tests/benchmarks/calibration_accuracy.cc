@@ -13,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "benchmarks/accuracy/fault_study.h"
+#include "benchmarks/accuracy/pupil_law_study.h"
 #include "benchmarks/accuracy/tables.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
@@ -38,6 +39,7 @@ struct Arguments {
   std::string picture_path;
   std::string json_path;
   bool faults = false;
+  bool pupil_laws = false;
 };
 
 std::vector<std::string> TargetNames() {
@@ -93,6 +95,9 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
   app->add_flag("--map-field", arguments->settings.map_field, "fit tiles and channels, too");
   app->add_flag("--faults", arguments->faults,
                 "instead: one sweep of each case, damaged in one way after the other");
+  app->add_flag("--pupil-laws", arguments->pupil_laws,
+                "instead: sweeps under each law of the pupil, with a given and an unknown bench "
+                "zero: whether the intervals hold the truth");
   app->add_option("--json", arguments->json_path, "write the tables to a file");
 }
 
@@ -152,6 +157,9 @@ void RunStudy(Arguments arguments) {
   nlohmann::ordered_json json;
   if (arguments.faults) {
     json["faults"] = RunFaultStudy(arguments.cases, arguments.settings, arguments.threads);
+  } else if (arguments.pupil_laws) {
+    json["pupil_laws"] =
+        RunPupilLawStudy(arguments.cases, arguments.settings, arguments.sweeps, arguments.threads);
   } else {
     Run run;
     run.settings = arguments.settings;

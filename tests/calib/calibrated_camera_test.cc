@@ -23,6 +23,8 @@ Calibration Found() {
   c.covariance_order = {"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"};
   c.covariance = Eigen::Vector4d(1, 2, 3, 4).asDiagonal();
   c.blur.chi2_per_dof = 1.25;
+  c.blur.family = model::Psf::kDisc;
+  c.blur.band = 0.75;
   c.source.image_distance_mm = 17.1;
   c.source.blur_ratio = 2.5;
   c.source.focus_depth_mm = 380;
@@ -64,6 +66,8 @@ TEST(CalibratedCamera, TheJointFitHasEveryResultInItsPlace) {
   ExpectEstimate(c.evidence.focus_depth_mm, 400, 0.2);
   EXPECT_EQ(c.evidence.method, "joint-blur-fit");
   EXPECT_EQ(c.evidence.chi2_per_dof, 1.25);
+  EXPECT_EQ(c.evidence.blur_family, "disc");
+  EXPECT_EQ(c.evidence.blur_band, 0.75);
   EXPECT_THAT(c.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
   EXPECT_EQ(c.covariance(2, 2), 3);
@@ -80,6 +84,7 @@ TEST(CalibratedCamera, TheSourcesRecipeHasItsOwnNumbersAlone) {
   ExpectEstimate(c.bench_offset_mm, 30, 0.05);
   EXPECT_FALSE(c.blur_floor_px);
   EXPECT_EQ(c.evidence.method, "source-recipe");
+  EXPECT_EQ(c.evidence.blur_family, "");
   EXPECT_FALSE(c.evidence.chi2_per_dof);
   EXPECT_THAT(c.covariance_order, IsEmpty());
   EXPECT_EQ(c.covariance.size(), 0);

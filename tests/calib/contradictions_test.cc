@@ -42,8 +42,8 @@ Calibration Calibrated(const SimulatedSweep& simulated) {
 
 void ExpectCovers(const std::optional<Result>& result, double truth) {
   ASSERT_TRUE(result && result->systematic);
-  EXPECT_LT(result->systematic->x() - 2.5 * result->sigma, truth);
-  EXPECT_GT(result->systematic->y() + 2.5 * result->sigma, truth);
+  EXPECT_LT(result->systematic->x() - 3 * result->sigma, truth);
+  EXPECT_GT(result->systematic->y() + 3 * result->sigma, truth);
 }
 
 void ExpectCovers(const Calibration& c, const model::SweepTruth& truth) {

@@ -94,7 +94,7 @@ TEST(ChooseFloor, TakesWhatIsStated) {
 
 TEST(ChooseFloor, ASofterLensThanUsualIsAllowedForWhereTheTextureDoesNotExcludeIt) {
   for (const double floor_px : {0.5, 1.7}) {
-    model::SweepSimulationOptions options = testing::SweepCase("iv", 128, 31);
+    model::SweepSimulationOptions options = testing::SweepCase("iv", 128, 32);
     options.target.kind = model::TargetKind::kDeadLeaves;
     options.camera.calibration->blur_floor_px = model::Estimate{floor_px, 0};
     const testing::SimulatedSweep simulated = testing::Simulate(options);

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "thicklens/calib/focus_sweep.h"
+#include "thicklens/model/pupil_law.h"
 #include "thicklens/model/sweep_simulator.h"
-#include "thicklens/model/weighed_aperture.h"
 
 namespace thicklens::testing {
 
@@ -54,8 +54,8 @@ struct SimulatedSweep {
   model::SweepTruth truth;
   std::shared_ptr<std::vector<cv::Mat>> stored;  // what read_frame gives; a test may damage them
 
-  // Of the centre of perspective, which fall-off puts in front of the aperture: the size in a frame
-  // goes as one over the distance from there.
+  // Depth of the centre of perspective, which the pupil law puts before or behind the aperture: the
+  // size in a frame goes as one over the distance from there.
   double centre_mm = 0;
 
   cv::Mat& frame(int index) { return (*stored)[static_cast<std::size_t>(index)]; }
@@ -74,11 +74,9 @@ inline SimulatedSweep Simulate(const model::SweepSimulationOptions& options,
   result.truth = simulator.truth();
   result.stored = std::make_shared<std::vector<cv::Mat>>();
   result.sweep.camera = options.camera;
-  if (simulator.effects().on.Has(model::Effect::kFalloff)) {
-    result.centre_mm =
-        model::CentreOfPerspectiveMm(options.camera.lens, options.camera.psf,
-                                     result.truth.blur_ratio, result.truth.focus_depth_mm);
-  }
+  result.centre_mm = model::CentreOfPerspectiveMm(
+      options.camera.lens, options.camera.psf, model::PupilLawFromName(result.truth.pupil_law),
+      result.truth.blur_ratio, result.truth.focus_depth_mm);
   result.sweep.camera.calibration.reset();
   for (int i = 0; i < options.frame_count; ++i) {
     const auto index = static_cast<std::size_t>(i);

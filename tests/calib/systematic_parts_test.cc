@@ -209,11 +209,32 @@ TEST(AddSystematicParts, AnotherShapeMovesTheDepthAlone) {
   other.ratio *= 1.1;
   std::mt19937 random(1);
   s.evidence.other_psf = other.Relative(0.01, 1.2, &random);
+  s.evidence.gaussian_misfit = 1.0;
+  s.evidence.shape_dof = 1000;
+  // Worse by 20 in chi^2: its kappa is that of a shape that the blur does not have.
+  s.evidence.disc_misfit = 1.02;
   s.Add();
   const SystematicPart* part = s.Part("shape of the blur");
   ASSERT_TRUE(part);
   EXPECT_NEAR(part->focus_depth_mm[0], -0.5, 0.01);
   EXPECT_EQ(part->blur_ratio.norm(), 0);
+}
+
+// A family that the frames do not rule out may be the right one.
+TEST(AddSystematicParts, AFamilyThatIsNotRuledOutMovesTheRatio) {
+  Solved s = Texture(0);
+  BlurBench other = s.bench;
+  other.ratio *= 1.1;
+  std::mt19937 random(1);
+  s.evidence.other_psf = other.Relative(0.01, 1.2, &random);
+  s.evidence.gaussian_misfit = 1.0;
+  s.evidence.shape_dof = 1000;
+  s.evidence.disc_misfit = 1.01;
+  s.Add();
+  const SystematicPart* part = s.Part("shape of the blur");
+  ASSERT_TRUE(part);
+  EXPECT_NEAR(part->blur_ratio[1] / s.bench.ratio, 0.1, 0.01);
+  EXPECT_EQ(part->blur_ratio[0], 0);
 }
 
 TEST(AddSystematicParts, FramesThatWereThrownOutStayOut) {

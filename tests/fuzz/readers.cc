@@ -46,7 +46,7 @@ weights: [[1]]
 origin: {method: simulated}
 )";
 
-constexpr char kCamera[] = R"(schema: thicklens/camera/1
+constexpr char kCamera[] = R"(schema: thicklens/camera/2
 name: 50 mm at f/2.8
 lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, aperture_radius_mm: 8.9}
 sensor: {width_px: 512, height_px: 512, pixel_pitch_mm: 0.0045, principal_point_px: [255.5, 255.5], transfer: linear}

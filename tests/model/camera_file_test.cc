@@ -35,7 +35,7 @@ constexpr char kSensor[] =
 
 std::string Text(const std::string& rest, const std::string& lens = kLens,
                  const std::string& sensor = kSensor) {
-  return "schema: thicklens/camera/1\nname: bench\n" + lens + sensor + rest;
+  return "schema: thicklens/camera/2\nname: bench\n" + lens + sensor + rest;
 }
 
 std::string ErrorOfText(const std::string& text) {
@@ -99,8 +99,8 @@ TEST(CameraFile, EveryErrorNamesItsPlace) {
   EXPECT_THAT(ErrorWith("psf: gaussian", "psf: gaussian\npsf: disc"),
               StartsWith("c.yaml:6:1: key 'psf' stands here twice"));
   EXPECT_THAT(ErrorWith("name: bench\n", ""), HasSubstr("'name' is missing"));
-  EXPECT_THAT(ErrorWith("schema: thicklens/camera/1\n", ""), HasSubstr("schema"));
-  EXPECT_THAT(ErrorWith("camera/1", "camera/2"), HasSubstr("found 'thicklens/camera/2'"));
+  EXPECT_THAT(ErrorWith("schema: thicklens/camera/2\n", ""), HasSubstr("schema"));
+  EXPECT_THAT(ErrorWith("camera/2", "camera/3"), HasSubstr("found 'thicklens/camera/3'"));
 }
 
 TEST(CameraFile, SensorInFrontOfEveryImageIsRefusedWithTheNumber) {

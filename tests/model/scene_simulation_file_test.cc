@@ -31,7 +31,7 @@ class SceneSimulationFileTest : public ::testing::Test {
 
   void PutCamera(const std::string& calibration) {
     folder_.Put("camera.yaml",
-                "schema: thicklens/camera/1\n"
+                "schema: thicklens/camera/2\n"
                 "name: macro\n"
                 "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, "
                 "lens_thickness_mm: 0, aperture_radius_mm: 9}\n"

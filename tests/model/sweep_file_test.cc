@@ -76,7 +76,7 @@ TEST_F(SweepFolder, Floor) {
 std::string CameraText(double focal_mm, double radius_mm, double pitch_mm,
                        const std::string& calibration) {
   const std::string f = YamlNumber(focal_mm);
-  return "schema: thicklens/camera/1\nname: edge\n"
+  return "schema: thicklens/camera/2\nname: edge\n"
          "lens: {front_focal_length_mm: " +
          f + ", rear_focal_length_mm: " + f +
          ", lens_thickness_mm: 0, aperture_radius_mm: " + YamlNumber(radius_mm) +
@@ -259,7 +259,7 @@ TEST(FileFormatsPage, ExamplesAreRead) {
     return page.substr(begin, page.find("```", begin) - begin);
   };
   const TemporaryFolder folder;
-  EXPECT_EQ(ParseCamera(example("thicklens/camera/1"), "page").name, "bench-camera");
+  EXPECT_EQ(ParseCamera(example("thicklens/camera/2"), "page").name, "bench-camera");
 
   folder.Put("bench/frames/1.png");
   folder.Put("bench/positions.csv", "1.png,400\n");

@@ -873,7 +873,7 @@ class SweepSimulationFileTest : public ::testing::Test {
               (std::string("sweep_simulation_") + test->name());
     std::filesystem::create_directories(folder_);
     WriteFileAtomically((folder_ / "camera.yaml").string(),
-                        "schema: thicklens/camera/1\n"
+                        "schema: thicklens/camera/2\n"
                         "name: macro\n"
                         "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, "
                         "lens_thickness_mm: 0, aperture_radius_mm: 9}\n"

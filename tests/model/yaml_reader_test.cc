@@ -139,12 +139,12 @@ TEST(YamlKeys, OfSomethingThatIsNoMap) {
 
 TEST(YamlSchema, MissingOtherOrNoMap) {
   const auto error = [](const std::string& text) {
-    return ErrorOf([&] { Parse(text).RequireSchema("thicklens/camera/1"); });
+    return ErrorOf([&] { Parse(text).RequireSchema("thicklens/camera/2"); });
   };
-  EXPECT_EQ(error("schema: thicklens/camera/1"), "(no error)");
-  EXPECT_THAT(error("name: a"), HasSubstr("'schema: thicklens/camera/1' is missing"));
+  EXPECT_EQ(error("schema: thicklens/camera/2"), "(no error)");
+  EXPECT_THAT(error("name: a"), HasSubstr("'schema: thicklens/camera/2' is missing"));
   EXPECT_EQ(error("name: a\nschema: thicklens/sweep/1"),
-            "f.yaml:2:9: schema: 'thicklens/camera/1' is expected, found 'thicklens/sweep/1'");
+            "f.yaml:2:9: schema: 'thicklens/camera/2' is expected, found 'thicklens/sweep/1'");
   EXPECT_THAT(error("schema:"), HasSubstr("is missing"));
   EXPECT_THAT(error("just text"), HasSubstr("found 'just text'"));
   EXPECT_THAT(error("# nothing\n"), HasSubstr("f.yaml"));

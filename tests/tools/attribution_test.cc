@@ -48,7 +48,7 @@ class AttributionTest : public ::testing::Test {
   // A wide lens with a disc for its aperture, near its scene, so that all matters.
   std::string Scene() const {
     folder_.Put("camera.yaml",
-                "schema: thicklens/camera/1\nname: wide\n"
+                "schema: thicklens/camera/2\nname: wide\n"
                 "lens: {front_focal_length_mm: 6, rear_focal_length_mm: 6, lens_thickness_mm: 1.5, "
                 "aperture_radius_mm: 1.2}\n"
                 "sensor: {width_px: 64, height_px: 48, pixel_pitch_mm: 0.09, "

@@ -25,7 +25,7 @@ using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
 constexpr char kCamera[] =
-    "schema: thicklens/camera/1\n"
+    "schema: thicklens/camera/2\n"
     "name: small\n"
     "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, "
     "aperture_radius_mm: 5}\n"

@@ -24,7 +24,7 @@ using Arguments = std::vector<std::string>;
 
 // f1 = f2 = 50, zf = 300, so K = 60; 40 x 32 px.
 constexpr char kCameraWithEffects[] =
-    "schema: thicklens/camera/1\n"
+    "schema: thicklens/camera/2\n"
     "name: small\n"
     "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, "
     "aperture_radius_mm: 5}\n"

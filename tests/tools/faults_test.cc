@@ -54,7 +54,7 @@ bits: 8
 seed: 1
 )";
 
-constexpr char kBenchCamera[] = R"(schema: thicklens/camera/1
+constexpr char kBenchCamera[] = R"(schema: thicklens/camera/2
 name: 50 mm at f/2.8
 lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, aperture_radius_mm: 8.9}
 sensor: {width_px: 128, height_px: 128, pixel_pitch_mm: 0.0045, principal_point_px: [63.5, 63.5], transfer: linear}

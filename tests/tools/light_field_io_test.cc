@@ -299,7 +299,7 @@ TEST_F(LightFieldFolder, WhatIsNoLightFieldIsRefused) {
   folder_.Put("empty/readme.txt");
   EXPECT_THAT(Refusal(folder_ / "empty"),
               AllOf(HasSubstr("lightfield.yaml"), HasSubstr("input_Cam000.png")));
-  folder_.Put("broken/lightfield.yaml", "schema: thicklens/camera/1\n");
+  folder_.Put("broken/lightfield.yaml", "schema: thicklens/camera/2\n");
   EXPECT_THAT(Refusal(folder_ / "broken"), HasSubstr("lightfield.yaml:1:9"));
 }
 

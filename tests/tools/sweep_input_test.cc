@@ -22,7 +22,7 @@ using ::thicklens::testing::ErrorOf;
 using ::thicklens::testing::TemporaryFolder;
 
 std::string CameraText(const std::string& pitch_mm, const std::string& calibration) {
-  return "schema: thicklens/camera/1\nname: bench\n"
+  return "schema: thicklens/camera/2\nname: bench\n"
          "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, "
          "aperture_radius_mm: 9}\n"
          "sensor: {width_px: 9, height_px: 9, pixel_pitch_mm: " +

@@ -34,9 +34,7 @@ std::optional<BlurLaw> BlurLaw::Of(const FocusSweep& sweep, const Calibration& c
   if (!std::isfinite(calibration.blur_ratio->value) || !IsImageDistance(sweep, image_distance_mm))
     return std::nullopt;
   BlurLaw law(sweep, image_distance_mm);
-  const model::Camera& camera = sweep.camera;
-  law.seen_ = model::SeeBlurRatio(camera.lens, camera.psf, calibration.blur_ratio->value,
-                                  model::FocusDepthMm(camera.lens, image_distance_mm));
+  law.kappa_ = calibration.blur_ratio->value;
   law.TakeFloor(calibration);
   law.TakeCovariance(calibration);
   return law;
@@ -49,8 +47,7 @@ std::optional<BlurLaw> BlurLaw::OfSide(const FocusSweep& sweep, const Calibratio
       !std::isfinite(side.blur_ratio.value))
     return std::nullopt;
   BlurLaw law(sweep, model::ImageDistanceMm(lens, side.focus_depth_mm.value));
-  law.seen_ =
-      model::SeeBlurRatio(lens, sweep.camera.psf, side.blur_ratio.value, side.focus_depth_mm.value);
+  law.kappa_ = side.blur_ratio.value;
   if (!IsImageDistance(sweep, law.image_distance_mm_)) return std::nullopt;
   law.TakeFloor(calibration);
   return law;
@@ -59,8 +56,7 @@ std::optional<BlurLaw> BlurLaw::OfSide(const FocusSweep& sweep, const Calibratio
 BlurLaw BlurLaw::OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth) {
   BlurLaw law(sweep, truth.image_distance_mm);
   law.floor_squared_px2_ = truth.blur_floor_px * truth.blur_floor_px;
-  law.seen_.squared = truth.blur_ratio * truth.blur_ratio;
-  // Whether fall-off was on, and with what shape of the aperture, its frames tell.
+  // Whether defocus was simulated, the frames tell.
   double product = 0, square = 0;
   for (const model::SweepTruth::Frame& frame : truth.frames) {
     if (!IsDepth(frame.depth_mm)) continue;
@@ -68,12 +64,12 @@ BlurLaw BlurLaw::OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth
     product += defocus_px2 * (frame.blur_sigma_px * frame.blur_sigma_px - law.floor_squared_px2_);
     square += defocus_px2 * defocus_px2;
   }
-  if (square > 0) law.seen_.squared = std::max(0.0, product / square);
+  law.kappa_ = square > 0 ? std::sqrt(std::max(0.0, product / square)) : truth.blur_ratio;
   return law;
 }
 
 double BlurLaw::SigmaPx(double depth_mm) const {
-  return std::sqrt(floor_squared_px2_ + seen_.squared * std::pow(SignedDefocusPx(depth_mm), 2));
+  return std::sqrt(floor_squared_px2_ + kappa_ * kappa_ * std::pow(SignedDefocusPx(depth_mm), 2));
 }
 
 // With the signed q = r c(z)/p and c(z) = [f1 D - (D - f2) z]/(f2 z): sigma^2 = S0 + (kappa q)^2,
@@ -85,12 +81,12 @@ double BlurLaw::SlopePxPerMm(double depth_mm) const {
   const double slope_per_mm = -lens.front_focal_length_mm *
                               (image_distance_mm_ - lens.lens_thickness_mm) /
                               (lens.rear_focal_length_mm * depth_mm * depth_mm);
-  return seen_.squared * SignedDefocusPx(depth_mm) * slope_per_mm * lens.aperture_radius_mm /
+  return kappa_ * kappa_ * SignedDefocusPx(depth_mm) * slope_per_mm * lens.aperture_radius_mm /
          sweep_->camera.sensor.pixel_pitch_mm / sigma_px;
 }
 
 // Derivatives of sigma, besides that along z, through which the offset acts (derived here): by
-// kappa q^2/sigma d(kappa^2/2), by the floor floor/sigma, by d1 kappa^2 q dq/dD / sigma with dc/dD
+// kappa kappa q^2/sigma, by the floor floor/sigma, by d1 kappa^2 q dq/dD / sigma with dc/dD
 // = (f1 - z)/(f2 z).
 std::optional<double> BlurLaw::SigmaErrorPx(double depth_mm) const {
   const double sigma_px = SigmaPx(depth_mm);
@@ -100,8 +96,8 @@ std::optional<double> BlurLaw::SigmaErrorPx(double depth_mm) const {
   const double q_by_d1 = (lens.front_focal_length_mm - depth_mm) /
                          (lens.rear_focal_length_mm * depth_mm) * lens.aperture_radius_mm /
                          sweep_->camera.sensor.pixel_pitch_mm;
-  const Eigen::Vector4d gradient(seen_.squared * q_px * q_by_d1 / sigma_px,
-                                 seen_.by_blur_ratio * q_px * q_px / (2 * sigma_px),
+  const Eigen::Vector4d gradient(kappa_ * kappa_ * q_px * q_by_d1 / sigma_px,
+                                 kappa_ * q_px * q_px / sigma_px,
                                  std::sqrt(floor_squared_px2_) / sigma_px, SlopePxPerMm(depth_mm));
   const double variance_px2 = gradient.dot(*covariance_ * gradient);
   if (!std::isfinite(variance_px2)) return std::nullopt;
@@ -163,7 +159,7 @@ double BlurLaw::FloorSquaredFromFrames(const Calibration& calibration) const {
     const double sd_px2 = 2 * frame.blur_sigma_px * frame.blur_sigma_error_px;
     const double weight = frame.blur_fit_weight / (sd_px2 * sd_px2);
     sum += weight * (std::pow(frame.blur_sigma_px, 2) -
-                     seen_.squared * std::pow(SignedDefocusPx(frame.depth_mm), 2));
+                     kappa_ * kappa_ * std::pow(SignedDefocusPx(frame.depth_mm), 2));
     weight_sum += weight;
   }
   return weight_sum > 0 ? std::max(0.0, sum / weight_sum) : 0;

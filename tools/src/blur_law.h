@@ -7,7 +7,6 @@
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
-#include "thicklens/model/weighed_aperture.h"
 
 namespace thicklens::tools {
 
@@ -15,8 +14,7 @@ bool IsDepth(double depth_mm);  // finite and in front of the camera
 bool HasBlur(const calib::FrameMeasurement& frame);
 
 // Blur by the fitted law, sigma = sqrt(S0 + (kappa r_defocus/p)^2), px per axis, without the pixel
-// box, kappa^2 as it is seen with fall-off (model::SeeBlurRatio). Exact for all depths z > 0; at z
-// = zf it is the floor. The sweep must outlive it.
+// box. Exact for all depths z > 0; at z = zf it is the floor. The sweep must outlive it.
 class BlurLaw {
  public:
   // Nothing where the fit gave no image distance or no blur ratio that a lens can have.
@@ -52,7 +50,7 @@ class BlurLaw {
 
   const calib::FocusSweep* sweep_;
   double image_distance_mm_ = 0;
-  model::SeenBlurRatio seen_;
+  double kappa_ = 0;
   double floor_squared_px2_ = 0;
   bool floor_from_frames_ = false;
   // Of d1, kappa, floor and bench offset; rows of what is not in the fit's covariance are 0.

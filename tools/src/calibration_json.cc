@@ -204,6 +204,8 @@ json BlurFitJson(const calib::BlurFit& blur) {
           {"message", PrintableUtf8(blur.message)},
           {"frames_used", Count(blur.done, blur.frames_used)},
           {"meter", TextJson(blur.meter)},
+          {"family", model::PsfName(blur.family)},
+          {"band", blur.band ? json(*blur.band) : json(nullptr)},
           {"weak_direction", TextJson(blur.weak_direction)},
           {"better_psf", compared ? json(model::PsfName(blur.better_psf)) : json(nullptr)},
           {"gaussian_misfit_chi2_per_dof", Number(blur.gaussian_misfit)},

@@ -129,6 +129,7 @@ void PrintResult(const CommonOptions& options, const std::string& text) {
 }
 
 void TellAssumedFields(const model::Camera& camera) {
+  for (const std::string& notice : camera.notices) spdlog::warn("{}", PrintableUtf8(notice));
   const std::vector<std::string> fields = model::AssumedFields(camera);
   if (fields.empty()) return;
   spdlog::warn("camera '{}': assumed, neither published nor measured: {}",

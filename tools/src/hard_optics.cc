@@ -47,7 +47,7 @@ void WriteCamera(const fs::path& folder, const HardCamera& camera,
                  const std::string& name = kCameraFile) {
   model::WriteFileAtomically(
       (folder / name).string(),
-      fmt::format("schema: thicklens/camera/1\nname: hard\n"
+      fmt::format("schema: thicklens/camera/2\nname: hard\n"
                   "lens: {{front_focal_length_mm: {}, rear_focal_length_mm: {}, "
                   "lens_thickness_mm: {}, aperture_radius_mm: {}}}\n"
                   "sensor: {{width_px: 40, height_px: 30, pixel_pitch_mm: {}, "

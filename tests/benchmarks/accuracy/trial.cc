@@ -34,7 +34,9 @@ double ThreadSeconds() {
 }
 
 Measured Compare(const calib::Result& result, double truth) {
-  return {result.value - truth, result.sigma};
+  const Eigen::Vector2d interval =
+      result.systematic.value_or(Eigen::Vector2d(result.value, result.value));
+  return {result.value - truth, result.sigma, interval.x() - truth, interval.y() - truth};
 }
 
 void Fill(const calib::Calibration& c, const SimulatedSweep& simulated, Trial* trial) {
@@ -71,6 +73,7 @@ model::SweepSimulationOptions Simulation(const TrialKey& key, const TrialSetting
       testing::SweepCase(key.case_name, settings.size_px, Seed(key, settings));
   options.target.kind = key.target;
   options.camera.psf = settings.psf;
+  options.pupil_law = settings.pupil_law;
   return options;
 }
 
@@ -80,6 +83,7 @@ std::vector<Trial> RunTrials(const TrialKey& key, const TrialSettings& settings,
   SimulatedSweep simulated = testing::Simulate(options, settings.picture);
   if (key.target == model::TargetKind::kKnifeEdge)
     simulated.sweep.target = model::SweepTarget::kKnifeEdge;
+  if (!settings.zero_is_known) simulated.sweep.offset_mm.reset();
   calib::CalibrationOptions how;
   how.map_field = settings.map_field;
   how.threads = settings.calibration_threads;

@@ -22,6 +22,8 @@ std::string FloorName(Floor floor);
 struct TrialSettings {
   int size_px = 192;
   model::Psf psf = model::Psf::kGaussian;
+  std::optional<model::PupilLaw> pupil_law;  // absent: the simulator's own choice
+  bool zero_is_known = true;                 // the calibration is told the bench zero
   std::uint64_t first_seed = 1;
   bool map_field = false;
   int calibration_threads = 1;
@@ -37,8 +39,9 @@ struct TrialKey {
 };
 
 struct Measured {
-  double error = 0;  // value minus truth
-  double sigma = 0;  // as the calibration states it: statistical
+  double error = 0;                            // value minus truth
+  double sigma = 0;                            // as the calibration states it: statistical
+  double interval_low = 0, interval_high = 0;  // the systematic interval minus the truth
   double z() const { return error / sigma; }
 };
 

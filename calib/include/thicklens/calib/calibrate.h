@@ -112,9 +112,12 @@ struct ScaleLaw {
   bool shows_no_scale = false;  // the target looks the same at every scale (spokes): not looked for
   int reference_frame = -1;
   Result offset_mm;  // the bench zero: where the aperture is
-  // Where the size on the sensor goes to infinity lies this far in front of the aperture, because
-  // fall-off weighs its rays (model::CentreOfPerspectiveMm); reckoned with in offset_mm.
+  // The depth at which the size on the sensor goes to infinity, from the aperture: the light of a
+  // point off the axis spreads unevenly over the pupil (model::CentreOfPerspectiveMm, by the
+  // paper's law). It is part of offset_mm.
   double centre_mm = 0;
+  // The lowest and the highest offset_mm that the known pupil laws give.
+  Eigen::Vector2d offset_of_pupil_laws_mm{0, 0};
   // Of the reference frame, from there: 1/scale = (line_zero_mm + direction reading)/it.
   double reference_depth_mm = 0;
   double line_zero_mm() const { return offset_mm.value - centre_mm; }
@@ -198,6 +201,10 @@ struct BlurFit {
   std::string weak_direction;             // the combination of parameters that is known worst
   double weak_correlation = 0;            // theirs
   std::string meter;                      // "edges" or "relative spectrum"
+  // The PSF family whose second moment the blur ratio is, and, of spectra, the band of the fit: up
+  // to this 2 pi^2 sigma^2 nu^2, with sigma the blur beyond that of the sharpest frame.
+  model::Psf family = model::Psf::kGaussian;
+  std::optional<double> band;
   model::Psf better_psf = model::Psf::kGaussian;       // the shape that describes the frames better
   std::optional<double> gaussian_misfit, disc_misfit;  // chi^2 per dof of the meter with each
   double outside_mm = 0;  // how far the focus lies outside the sweep; 0: inside

@@ -55,6 +55,10 @@ struct Evidence {
   std::vector<RejectedFrame> frames_rejected;
   std::optional<double> chi2_per_dof;
   std::optional<Estimate> focus_depth_mm;
+  // The PSF family whose second moment blur_ratio is (a Psf's name; empty: not stated), and the
+  // band of the fit, its largest 2 pi^2 sigma^2 nu^2.
+  std::string blur_family;
+  std::optional<double> blur_band;
   std::string data_sha256;  // over the frames' bytes and the readings
   std::string version;      // of thicklens
   std::string date;         // ISO 8601
@@ -63,8 +67,9 @@ struct Evidence {
 // What `thicklens calibrate` adds to a camera. A parameter that did not converge is absent.
 struct CameraCalibration {
   std::optional<Estimate> image_distance_mm;  // d1
-  std::optional<Estimate> blur_ratio;         // kappa, dimensionless
-  std::optional<Estimate> blur_floor_px;      // sqrt(S0)
+  // kappa: second-moment sigma of the defocus blur of a point on the axis over the blur radius.
+  std::optional<Estimate> blur_ratio;
+  std::optional<Estimate> blur_floor_px;  // sqrt(S0)
   std::optional<Estimate> bench_offset_mm;
   // Covariance of the parameters named in `covariance_order`, in their units; may be empty.
   std::vector<std::string> covariance_order;
@@ -81,6 +86,8 @@ struct Camera {
   // "sensor.principal_point_px[0]". Only fields about which something is stated are present.
   std::map<std::string, Statement> statements;
   std::optional<CameraCalibration> calibration;
+  // What a reader should know of how the camera was read, one sentence each; not written.
+  std::vector<std::string> notices;
 
   // True if the numbers describe a possible camera; else `why` names field, value and constraint.
   bool IsValid(std::string* why) const;

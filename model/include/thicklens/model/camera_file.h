@@ -7,7 +7,7 @@
 
 namespace thicklens::model {
 
-// The camera file, schema thicklens/camera/1 (docs/file-formats.md). Unknown keys, wrong types,
+// The camera file, schema thicklens/camera/2 (docs/file-formats.md). Unknown keys, wrong types,
 // values out of range: Error with file:line:column.
 Camera ReadCamera(const std::string& path);
 Camera ParseCamera(const std::string& text, const std::string& source_name);

@@ -90,13 +90,13 @@ struct SweepTruth {
   double blur_ratio = 0;
   double blur_floor_px = 0;
   double bench_offset_mm = 0;
-  double tilt_deg = 0;  // of the target, as TargetOptions has it
+  double tilt_deg = 0;    // of the target, as TargetOptions has it
+  std::string pupil_law;  // PupilLawName; empty: not stated
   struct Frame {
     std::string image;
     double depth_mm = 0;    // true z
     double reading_mm = 0;  // as the bench showed it, with its error
-    // sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel box, with fall-off of the aperture
-    // that it weighs.
+    // sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel box: the second moment.
     double blur_sigma_px = 0;
   };
   std::vector<Frame> frames;

@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "thicklens/model/camera.h"
 #include "thicklens/model/effect_choice.h"
+#include "thicklens/model/pupil_law.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/sweep_file.h"
 
@@ -61,6 +63,9 @@ struct SweepSimulationOptions {
   double full_well_electrons = 0;  // shot noise: electrons at full scale; 0: no shot noise
   double read_noise_electrons = 0;
   int bits = 8;
+  // How the light of a point spreads over the pupil; its second moment is (kappa r)^2 in any case.
+  // Absent: the paper's law where fall-off is on, else uniform.
+  std::optional<PupilLaw> pupil_law;
   // Of SweepEffects; kAuto has them all.
   EffectChoice effects;
   std::uint64_t seed = 1;

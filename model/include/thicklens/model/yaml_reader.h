@@ -17,7 +17,9 @@ class YamlNode {
   static YamlNode LoadFile(const std::string& path);
   static YamlNode Parse(const std::string& text, const std::string& source_name);
 
-  // Throws unless this map's `schema` is the given one (e.g. "thicklens/camera/1").
+  // Whether this is a map with that `schema`.
+  bool HasSchema(const std::string& schema) const;
+  // Throws unless this map's `schema` is the given one (e.g. "thicklens/camera/2").
   void RequireSchema(const std::string& schema) const;
   // Throws for the first key that is not in the list, with a suggestion where one is close; a key
   // that differs only in its unit suffix is called a wrong unit. Throws if this is no map.
