@@ -179,8 +179,7 @@ TEST_F(EstimateTest, DepthByItsUnitAndACamera) {
                       "--depth-kind", "z", "--depth-unit", "m"},
                      camera));
   ASSERT_TRUE(in_mm.camera.has_value());
-  EXPECT_EQ(in_mm.origin.effects,
-            (std::vector<std::string>{"thickness", "defocus", "falloff", "occlusion"}));
+  EXPECT_EQ(in_mm.origin.effects, (std::vector<std::string>{"defocus", "falloff", "occlusion"}));
   EXPECT_GT(in_mm.weights(1, 1), in_mm.weights(0, 0));  // the camera's PSF is Gaussian
   double largest = 0;
   for (std::size_t i = 0; i < in_mm.values.size(); ++i) {
