@@ -1,0 +1,233 @@
+// Whether a stored calibration holds: the statistics, with numbers that can be worked out by hand.
+// With simulated sweeps: tests/tools/camera_verify_test.cc.
+#include "thicklens/calib/verification.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "thicklens/error.h"
+#include "thicklens/model/thick_lens.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr double kD1Mm = 60, kRatio = 0.45;
+
+// 50 mm at f/2.8, d1 = 60 mm.
+model::Camera StoredCamera(double d1_sigma, double ratio_sigma) {
+  model::Camera camera;
+  camera.name = "stored";
+  camera.lens = {50, 50, 0, 50 / (2 * 2.8)};
+  camera.sensor = {512, 512, 0.0045, {255.5, 255.5}, model::TransferCurve::Linear()};
+  model::CameraCalibration calibration;
+  calibration.image_distance_mm = model::Estimate{kD1Mm, d1_sigma};
+  calibration.blur_ratio = model::Estimate{kRatio, ratio_sigma};
+  calibration.evidence.method = "joint-blur-fit";
+  camera.calibration = calibration;
+  return camera;
+}
+
+Calibration FoundCalibration(double d1_mm, double d1_sigma, double ratio, double ratio_sigma) {
+  Calibration found;
+  found.outcome = Outcome::kOk;
+  found.image_distance_mm = Result{d1_mm, d1_sigma, std::nullopt};
+  const model::ThickLens lens = StoredCamera(0, 0).lens;
+  const double zf = model::FocusDepthMm(lens, d1_mm);
+  found.focus_depth_mm =
+      Result{zf, d1_sigma / std::abs(model::ImageDistanceSlope(lens, zf)), std::nullopt};
+  found.blur_ratio = Result{ratio, ratio_sigma, std::nullopt};
+  found.covariance_order = {"image_distance_mm", "blur_ratio"};
+  found.covariance = Eigen::Vector2d(d1_sigma * d1_sigma, ratio_sigma * ratio_sigma).asDiagonal();
+  return found;
+}
+
+const ComparedParameter& Named(const Verification& verification, const std::string& name) {
+  for (const ComparedParameter& parameter : verification.parameters) {
+    if (parameter.name == name) return parameter;
+  }
+  ADD_FAILURE() << name << " is not there";
+  static const ComparedParameter none;
+  return none;
+}
+
+// Tables of the chi-square distribution.
+TEST(ChiSquare, AgreesWithPublishedQuantiles) {
+  EXPECT_NEAR(ChiSquareTail(3.841459, 1), 0.05, 1e-7);
+  EXPECT_NEAR(ChiSquareTail(5.991465, 2), 0.05, 1e-7);
+  EXPECT_NEAR(ChiSquareTail(7.814728, 3), 0.05, 1e-7);
+  EXPECT_NEAR(ChiSquareTail(13.276704, 4), 0.01, 1e-7);
+  EXPECT_NEAR(ChiSquareTail(124.342113, 100), 0.05, 1e-7);
+  EXPECT_EQ(ChiSquareTail(0, 3), 1);
+  EXPECT_NEAR(ChiSquareExceeded(0.01, 4), 13.276704, 1e-5);
+  EXPECT_NEAR(ChiSquareExceeded(0.0026997961, 1), 9, 1e-5);  // three sigma
+}
+
+TEST(VerifyCalibration, AddsTheVariancesOfBoth) {
+  // 0.004 mm with 0.003 and 0.004 mm of sigma, 0.001 with none but 0.001.
+  const Verification result =
+      VerifyCalibration(StoredCamera(0.003, 0), {},
+                        FoundCalibration(kD1Mm + 0.004, 0.004, kRatio + 0.001, 0.001), {});
+  EXPECT_EQ(result.verdict, Verdict::kHolds) << result.reason;
+  EXPECT_EQ(result.degrees_of_freedom, 2);
+  EXPECT_NEAR(Named(result, "image_distance_mm").deviation(), 0.8, 1e-9);
+  EXPECT_NEAR(Named(result, "blur_ratio").deviation(), 1, 1e-9);
+  EXPECT_NEAR(result.chi_square, 0.64 + 1, 1e-8);
+  EXPECT_NEAR(result.p_value, std::exp(-0.82), 1e-8);
+  EXPECT_FALSE(Named(result, "focus_depth_mm").counted);
+  // zf moves against d1, by as many sigmas but for the curvature of (13).
+  EXPECT_NEAR(Named(result, "focus_depth_mm").deviation(), -0.8, 0.01);
+  ASSERT_THAT(result.warnings, SizeIs(1));
+  EXPECT_THAT(result.warnings[0], HasSubstr("blur_ratio: taken as exact"));
+}
+
+TEST(VerifyCalibration, AChangeOfFiveSigmaIsFound) {
+  const Verification result =
+      VerifyCalibration(StoredCamera(0.003, 0.003), {},
+                        FoundCalibration(kD1Mm + 5 * 0.005, 0.004, kRatio, 0.004), {});
+  EXPECT_EQ(result.verdict, Verdict::kDoesNotHold);
+  EXPECT_NEAR(result.chi_square, 25, 1e-6);
+  EXPECT_THAT(result.reason, HasSubstr("image_distance_mm 60.025, stored 60 (+5.0 sigma)"));
+}
+
+// Both matrices are correlated: along the direction that both know badly a difference is no news,
+// across it is.
+TEST(VerifyCalibration, UsesTheCorrelationOfBothMatrices) {
+  model::Camera stored = StoredCamera(0.01, 0.01);
+  stored.calibration->covariance_order = {"blur_ratio", "image_distance_mm"};  // another order
+  stored.calibration->covariance = (Eigen::Matrix2d() << 1e-4, 0.9e-4, 0.9e-4, 1e-4).finished();
+  Calibration along = FoundCalibration(kD1Mm + 0.02, 0.01, kRatio + 0.02, 0.01);
+  along.covariance = (Eigen::Matrix2d() << 1e-4, 0.9e-4, 0.9e-4, 1e-4).finished();
+  Calibration across = along;
+  across.blur_ratio->value = kRatio - 0.02;
+  // C = 2e-4 [1 .9; .9 1]: d^2/(2e-4)/(1 +- .9) * 2.
+  const Verification one = VerifyCalibration(stored, {}, along, {});
+  const Verification other = VerifyCalibration(stored, {}, across, {});
+  EXPECT_NEAR(one.chi_square, 2 * 4e-4 / 2e-4 / 1.9, 1e-8);
+  EXPECT_NEAR(other.chi_square, 2 * 4e-4 / 2e-4 / 0.1, 1e-8);
+  EXPECT_EQ(other.verdict, Verdict::kDoesNotHold);
+}
+
+// An unknown bench zero leaves d1 open; where the camera has not moved on the bench, what is known
+// of both together counts.
+TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
+  model::Camera stored = StoredCamera(0.01, 0.001);
+  stored.calibration->bench_offset_mm = model::Estimate{100, 1};
+  stored.calibration->covariance_order = {"image_distance_mm", "blur_ratio", "bench_offset_mm"};
+  const double covariance = -0.999 * 0.01 * 1;
+  Eigen::Matrix3d matrix = Eigen::Vector3d(1e-4, 1e-6, 1).asDiagonal();
+  matrix(0, 2) = matrix(2, 0) = covariance;
+  stored.calibration->covariance = matrix;
+  // d1 alone is off by one sigma, with the bench zero where it was.
+  Calibration found = FoundCalibration(kD1Mm + std::sqrt(2.0) * 0.01, 0.01, kRatio, 0.001);
+  found.bench_offset_mm = Result{100, 1, std::nullopt};
+  found.covariance_order = stored.calibration->covariance_order;
+  found.covariance = matrix;
+  const Verification moved = VerifyCalibration(stored, {}, found, {});
+  EXPECT_NEAR(moved.chi_square, 1, 1e-8);
+  EXPECT_THAT(Named(moved, "bench_offset_mm").why_not_counted, HasSubstr("place on the bench"));
+  VerificationOptions options;
+  options.same_bench = true;
+  const Verification same = VerifyCalibration(stored, {}, found, options);
+  EXPECT_EQ(same.degrees_of_freedom, 3);
+  // Of the correlation matrix [1 -.999; -.999 1], 1/(1 - .999^2).
+  EXPECT_NEAR(same.chi_square, 1 / (1 - 0.999 * 0.999), 1e-4);
+  EXPECT_EQ(same.verdict, Verdict::kDoesNotHold);
+  // What the sweep states it does not measure.
+  FocusSweep stated;
+  stated.offset_mm = model::Estimate{100, 0.1};
+  EXPECT_EQ(VerifyCalibration(stored, stated, found, options).degrees_of_freedom, 2);
+}
+
+TEST(VerifyCalibration, SystematicPartsOfTheNewSweepWidenWhatTheCameraFileDoesNotCause) {
+  Calibration found = FoundCalibration(kD1Mm + 0.01, 0.001, kRatio, 0.001);
+  SystematicPart floor, focal;
+  floor.name = "lens floor";
+  floor.image_distance_mm = {-0.01, 0.02};
+  focal.name = "lens.front_focal_length_mm";
+  focal.image_distance_mm = {-1, 1};
+  found.systematic_parts = {floor, focal};
+  const Verification result = VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {});
+  const ComparedParameter& d1 = Named(result, "image_distance_mm");
+  EXPECT_NEAR(d1.systematic_sigma, 0.03 / std::sqrt(12.0), 1e-12);
+  EXPECT_NEAR(d1.sigma, std::sqrt(2e-6 + 0.0009 / 12), 1e-12);
+  found.systematic_parts.clear();
+  EXPECT_EQ(VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {}).verdict,
+            Verdict::kDoesNotHold);
+}
+
+// A change that is stated as the smallest detectable one is found in at least 95 % of the cases,
+// and not in many more.
+TEST(VerifyCalibration, TheSmallestDetectableChangeIsFoundAsOftenAsItSays) {
+  const model::Camera stored = StoredCamera(0.003, 0.001);
+  const double detectable =
+      Named(VerifyCalibration(stored, {}, FoundCalibration(kD1Mm, 0.004, kRatio, 0.002), {}),
+            "image_distance_mm")
+          .smallest_detectable;
+  EXPECT_NEAR(detectable, (std::sqrt(-2 * std::log(0.0027)) + 1.645) * 0.005, 1e-6);
+  std::mt19937 engine(11);
+  std::normal_distribution<double> normal;
+  int found = 0;
+  constexpr int kTrials = 4000;
+  for (int i = 0; i < kTrials; ++i) {
+    const double d1 = kD1Mm + detectable + 0.005 * normal(engine);
+    const double ratio = kRatio + std::hypot(0.001, 0.002) * normal(engine);
+    if (VerifyCalibration(stored, {}, FoundCalibration(d1, 0.004, ratio, 0.002), {}).verdict ==
+        Verdict::kDoesNotHold) {
+      ++found;
+    }
+  }
+  EXPECT_GE(found, 0.945 * kTrials);
+  EXPECT_LE(found, 0.98 * kTrials);
+}
+
+TEST(VerifyCalibration, WhatWouldNotShowAChangeCannotTell) {
+  // Of this lens: kappa r (1 - f1/zf)/(f2 p) px a mm of d1.
+  const Verification coarse = VerifyCalibration(StoredCamera(0.001, 0.001), {},
+                                                FoundCalibration(kD1Mm, 0.05, kRatio, 0.001), {});
+  EXPECT_EQ(coarse.verdict, Verdict::kCannotTell);
+  const double px_per_mm = kRatio * (50 / 5.6) * (1 - 50.0 / 300) / (50 * 0.0045);
+  const double detectable = Named(coarse, "image_distance_mm").smallest_detectable;
+  EXPECT_NEAR(coarse.detectable_blur_px, px_per_mm * detectable, 1e-6);
+  EXPECT_THAT(coarse.reason, HasSubstr("0.5 px are needed"));
+  const Verification ratio = VerifyCalibration(StoredCamera(0.001, 0.001), {},
+                                               FoundCalibration(kD1Mm, 0.001, kRatio, 0.05), {});
+  EXPECT_EQ(ratio.verdict, Verdict::kCannotTell);
+  EXPECT_THAT(ratio.reason, HasSubstr("blur_ratio"));
+}
+
+TEST(VerifyCalibration, ASweepIsComparedInWhatItDetermines) {
+  Calibration found = FoundCalibration(kD1Mm, 0.002, kRatio, 0.001);
+  found.blur_ratio.reset();
+  const Verification result = VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {});
+  EXPECT_EQ(result.verdict, Verdict::kHolds) << result.reason;
+  EXPECT_EQ(result.degrees_of_freedom, 1);
+  found.outcome = Outcome::kRefused;
+  found.reason = "too few frames";
+  const Verification refused = VerifyCalibration(StoredCamera(0.001, 0.001), {}, found, {});
+  EXPECT_EQ(refused.verdict, Verdict::kCannotTell);
+  EXPECT_THAT(refused.reason, HasSubstr("too few frames"));
+  EXPECT_THAT(refused.parameters, IsEmpty());
+}
+
+TEST(VerifyCalibration, RefusesWhatCannotBeMeant) {
+  model::Camera none = StoredCamera(0.001, 0.001);
+  none.calibration.reset();
+  EXPECT_THROW(VerifyCalibration(none, {}, {}, {}), Error);
+  VerificationOptions options;
+  options.significance = 1;
+  std::string why;
+  EXPECT_FALSE(options.IsValid(&why));
+  EXPECT_THAT(why, HasSubstr("significance is 1"));
+  EXPECT_THROW(VerifyCalibration(StoredCamera(0.001, 0.001), {}, {}, options), Error);
+}
+
+}  // namespace
+}  // namespace thicklens::calib
