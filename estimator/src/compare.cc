@@ -106,19 +106,35 @@ ViewScores CompareView(const model::LightField& reference, const model::LightFie
   return view;
 }
 
-// Views that equal the reference have no finite PSNR; the mean is that of the others, so that one
-// perfect view does not hide them.
-PictureScores MeanOf(const std::vector<PictureScores>& scores) {
+using Scores = std::vector<PictureScores>;
+
+bool HasFinitePsnr(const PictureScores& scores) { return !std::isinf(scores.psnr_db); }
+
+// Which of the views a mean of PSNRs is over: those that differ from the reference, so that one
+// perfect view does not hide the others, and of two means that stand beside each other those that
+// differ in both, unless there are none. `beside` may be empty.
+std::vector<bool> ViewsOfPsnrMean(const Scores& scores, const Scores& beside) {
+  std::vector<bool> own, both;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    own.push_back(HasFinitePsnr(scores[i]));
+    both.push_back(own.back() && (beside.empty() || HasFinitePsnr(beside[i])));
+  }
+  return std::find(both.begin(), both.end(), true) == both.end() ? own : both;
+}
+
+PictureScores MeanOf(const Scores& scores, const Scores& beside) {
   PictureScores mean;
-  int finite_psnrs = 0;
+  const std::vector<bool> in_psnr = ViewsOfPsnrMean(scores, beside);
+  int psnrs = 0;
   int standins = 0;
   double standin_sum = 0;
-  for (const PictureScores& one : scores) {
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const PictureScores& one = scores[i];
     mean.ssim += one.ssim;
     mean.delta_e94_mean += one.delta_e94_mean;
-    if (!std::isinf(one.psnr_db)) {
+    if (in_psnr[i]) {
       mean.psnr_db += one.psnr_db;
-      ++finite_psnrs;
+      ++psnrs;
     }
     if (one.macade_standin) {
       standin_sum += *one.macade_standin;
@@ -128,8 +144,7 @@ PictureScores MeanOf(const std::vector<PictureScores>& scores) {
   const auto count = static_cast<double>(scores.size());
   mean.ssim /= count;
   mean.delta_e94_mean /= count;
-  mean.psnr_db =
-      finite_psnrs > 0 ? mean.psnr_db / finite_psnrs : std::numeric_limits<double>::infinity();
+  mean.psnr_db = psnrs > 0 ? mean.psnr_db / psnrs : std::numeric_limits<double>::infinity();
   if (standins > 0) mean.macade_standin = standin_sum / standins;
   return mean;
 }
@@ -141,25 +156,27 @@ double DistanceSquared(const model::LightField& light_field, const ViewScores& v
   return a * a + b * b;
 }
 
-struct Means {
-  PictureScores all, centre, corner;
+// Of all views, of those nearest to the middle, and of those farthest from it.
+struct Groups {
+  Scores all, centre, corner;
 };
-Means MeansOf(const model::LightField& light_field, const std::vector<ViewScores>& views,
-              const std::function<const PictureScores&(const ViewScores&)>& scores_of) {
+using ScoresOfView = std::function<const PictureScores&(const ViewScores&)>;
+Groups GroupsOf(const model::LightField& light_field, const std::vector<ViewScores>& views,
+                const ScoresOfView& scores_of) {
   double nearest = std::numeric_limits<double>::infinity();
   double farthest = 0;
   for (const ViewScores& view : views) {
     nearest = std::min(nearest, DistanceSquared(light_field, view));
     farthest = std::max(farthest, DistanceSquared(light_field, view));
   }
-  std::vector<PictureScores> all, centre, corner;
+  Groups groups;
   for (const ViewScores& view : views) {
     const double distance = DistanceSquared(light_field, view);
-    all.push_back(scores_of(view));
-    if (distance == nearest) centre.push_back(scores_of(view));
-    if (distance == farthest) corner.push_back(scores_of(view));
+    groups.all.push_back(scores_of(view));
+    if (distance == nearest) groups.centre.push_back(scores_of(view));
+    if (distance == farthest) groups.corner.push_back(scores_of(view));
   }
-  return {MeanOf(all), MeanOf(centre), MeanOf(corner)};
+  return groups;
 }
 
 }  // namespace
@@ -190,19 +207,20 @@ LightFieldScores CompareLightFields(const model::LightField& reference,
       throw Error(fmt::format("view ({}, {}): {}", k, l, error.what()));
     }
   });
-  const Means means =
-      MeansOf(reference, result.views,
-              [](const ViewScores& view) -> const PictureScores& { return view.scores; });
-  result.mean = means.all;
-  result.centre = means.centre;
-  result.corner = means.corner;
-  if (!dibr) return result;
-  const Means dibr_means =
-      MeansOf(reference, result.views,
-              [](const ViewScores& view) -> const PictureScores& { return *view.dibr; });
-  result.dibr_mean = dibr_means.all;
-  result.dibr_centre = dibr_means.centre;
-  result.dibr_corner = dibr_means.corner;
+  const Groups own =
+      GroupsOf(reference, result.views,
+               [](const ViewScores& view) -> const PictureScores& { return view.scores; });
+  Groups warped;
+  if (dibr) {
+    warped = GroupsOf(reference, result.views,
+                      [](const ViewScores& view) -> const PictureScores& { return *view.dibr; });
+    result.dibr_mean = MeanOf(warped.all, own.all);
+    result.dibr_centre = MeanOf(warped.centre, own.centre);
+    result.dibr_corner = MeanOf(warped.corner, own.corner);
+  }
+  result.mean = MeanOf(own.all, warped.all);
+  result.centre = MeanOf(own.centre, warped.centre);
+  result.corner = MeanOf(own.corner, warped.corner);
   return result;
 }
 

@@ -452,6 +452,31 @@ TEST(CompareLightFields, WarpsThePhotographIntoEachView) {
   EXPECT_GT(wrong.dibr_centre->psnr_db, 100);  // needs no disparity
 }
 
+// Two means that stand beside each other are over the same views, although each has another view
+// without difference.
+TEST(CompareLightFields, MeansOfEstimateAndBaselineAreOverTheSameViews) {
+  const StoredValues texture = Noise(kWide, kHigh, 1, 15);
+  const model::LightField truth = ShiftedTexture(texture, 2);
+  model::LightField other = ShiftedTexture(texture, 1);
+  model::SetView(&other, 0, 0, model::ViewPicture(truth, 0, 0));
+  model::SetView(&other, 1, 1, model::ViewPicture(other, 0, 0));
+  // By a disparity of 1 px, and not of 2, warping has no error in the middle alone.
+  const LightFieldScores scores = CompareLightFields(truth, other, 6, DibrOf(texture, 1), 1);
+  double own = 0, warped = 0;
+  int count = 0;
+  for (const ViewScores& view : scores.views) {
+    const bool is_own_finite = std::isfinite(view.scores.psnr_db);
+    EXPECT_EQ(is_own_finite, view.u != 0 || view.v != 0);
+    if (!is_own_finite || !std::isfinite(view.dibr->psnr_db)) continue;
+    own += view.scores.psnr_db;
+    warped += view.dibr->psnr_db;
+    ++count;
+  }
+  ASSERT_GE(count, 7);
+  EXPECT_NEAR(scores.mean.psnr_db, own / count, 1e-9);
+  EXPECT_NEAR(scores.dibr_mean->psnr_db, warped / count, 1e-9);
+}
+
 TEST(CompareLightFields, GivesTheSameOnAnyNumberOfThreads) {
   const StoredValues texture = Noise(kWide, kHigh, 1, 14);
   const model::LightField truth = ShiftedTexture(texture, 1);

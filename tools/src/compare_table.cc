@@ -54,6 +54,17 @@ std::size_t CountIdentical(const LightFieldScores& scores) {
                     [](const ViewScores& view) { return IsIdentical(view.scores); }));
 }
 
+// Views that the means of PSNR are over, as CompareLightFields takes them.
+std::size_t ViewsInPsnrMean(const LightFieldScores& scores) {
+  std::size_t own = 0, both = 0;
+  for (const ViewScores& view : scores.views) {
+    if (IsIdentical(view.scores)) continue;
+    ++own;
+    if (!view.dibr || !IsIdentical(*view.dibr)) ++both;
+  }
+  return both > 0 ? both : own;
+}
+
 nlohmann::json ViewJson(const ViewScores& view) {
   return {{"u", view.u},
           {"v", view.v},
@@ -99,6 +110,12 @@ std::string LightFieldScoresText(const LightFieldScores& scores, const model::Li
     text += fmt::format("{} of {} views are identical{}\n", identical, views,
                         identical < views ? " and left out of the means of PSNR" : "");
   }
+  if (scores.dibr_mean && ViewsInPsnrMean(scores) < views - CountIdentical(scores)) {
+    text += fmt::format(
+        "means of PSNR, with and without DIBR: of the {} of {} views that differ from the "
+        "reference in both\n",
+        ViewsInPsnrMean(scores), views);
+  }
   if (scores.dibr_mean)
     text += fmt::format("views above DIBR (PSNR): {} of {}\n", ViewsAboveDibr(scores), views);
   if (!per_view) return text;
@@ -118,6 +135,7 @@ nlohmann::json LightFieldScoresJson(const LightFieldScores& scores,
                          {"centre", PictureScoresJson(scores.centre)},
                          {"corner", PictureScoresJson(scores.corner)},
                          {"identical_views", CountIdentical(scores)},
+                         {"views_in_psnr_mean", ViewsInPsnrMean(scores)},
                          {"per_view", nlohmann::json::array()},
                          {"dibr", nullptr},
                          {"views_above_dibr", nullptr}};

@@ -62,7 +62,8 @@ struct ViewScores {
   std::optional<PictureScores> dibr;
 };
 // Of scores, the mean; of PSNRs, the mean of the finite ones (inf if there are none), so that views
-// equal to the reference do not hide the others.
+// equal to the reference do not hide the others. With a baseline, both means of PSNR are over the
+// views where both are finite, unless there are none.
 struct LightFieldScores {
   std::vector<ViewScores> views;  // those present in both
   // Of all views; of those nearest to the middle (one for odd counts, two or four where counts are
