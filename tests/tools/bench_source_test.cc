@@ -94,7 +94,13 @@ TEST_F(BenchSourceTest, LargePicturesAreSampledAndSaySo) {
       Rows({"source", "--size", "160x160", "--views", "2", "--table", "1", "--device", "cpu"});
   ASSERT_GE(rows.size(), 2U);
   for (const auto& row : rows) {
-    if (row["implementation"] == "scene tv") {
+    // Every row is judged on the same four areas; what is extrapolated has keys of its own.
+    EXPECT_EQ(row["scored_area"], nlohmann::json({{"parts", 4}, {"size_px", {32, 32}}}));
+    const bool is_whole = row["implementation"] == "scene tv";
+    EXPECT_EQ(row["seconds"].is_null(), !is_whole);
+    EXPECT_EQ(row["extrapolated_seconds"].is_null(), is_whole);
+    EXPECT_EQ(row["times_faster_unlike"].is_null(), row["threads"] == 1 && !is_whole);
+    if (is_whole) {
       EXPECT_TRUE(row["extrapolated_from"].is_null());
     } else {
       EXPECT_EQ(row["extrapolated_from"]["blocks"], 64);
@@ -103,6 +109,7 @@ TEST_F(BenchSourceTest, LargePicturesAreSampledAndSaySo) {
     EXPECT_NE(row["implementation"], "opencl");
   }
   EXPECT_THAT(result_.out, HasSubstr("64 of 100 of 160x160 with 2x2 views; --full runs all"));
+  EXPECT_THAT(result_.out, HasSubstr("160x160, 2 x 2 views: scores are of 4 areas of 32 x 32 px"));
   EXPECT_THAT(result_.err, HasSubstr("rows of OpenCL are left out"));
 }
 
@@ -231,12 +238,20 @@ TEST(SourceTableText, PutsThePublishedBesideTheMeasured) {
   opencl.published = PublishedSeconds(2, "opencl", 'K', 7);
   opencl.extrapolated = BlockSample{4, 9};
   const std::string text = SourceTableText(2, {cpu, opencl});
-  // 2 s over .5 s; 27.4475 over .3325.
-  EXPECT_THAT(text, ::testing::ContainsRegex("0.5 .. 0.5 +4 +0.33 +82.5"));
+  // 2 s measured over 0.5 s extrapolated, which is unlike; 27.4475 over 0.3325.
+  EXPECT_THAT(text, ::testing::ContainsRegex("- +0.5 +0.5 .. 0.5 +- +4 +0.33 +82.5"));
   EXPECT_THAT(text, AllOf(HasSubstr("27.45"), HasSubstr("0.5 .. 0.5"), HasSubstr("1 .. 3"),
                           HasSubstr("4 of 9 of K")));
   const nlohmann::json json = SourceRowJson(opencl, {cpu, opencl});
-  EXPECT_EQ(json["times_faster"], 4);
+  EXPECT_TRUE(json["times_faster"].is_null());
+  EXPECT_EQ(json["times_faster_unlike"], 4);
+  EXPECT_TRUE(json["seconds"].is_null());
+  EXPECT_EQ(json["extrapolated_seconds"], 0.5);
+  // Measured as the other, on as many threads: the same work.
+  opencl.extrapolated.reset();
+  EXPECT_EQ(SourceRowJson(opencl, {cpu, opencl})["times_faster"], 4);
+  opencl.threads = 2;
+  EXPECT_EQ(SourceRowJson(opencl, {cpu, opencl})["times_faster_unlike"], 4);
   EXPECT_EQ(json["times_faster_than"], "cpu");
   EXPECT_NEAR(json["published_seconds"].get<double>(), 0.3325, 1e-12);
   EXPECT_EQ(json["published_seconds_of_pictures"].size(), 4U);

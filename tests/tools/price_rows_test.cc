@@ -96,6 +96,23 @@ TEST(PriceTable, TellsFailuresAndMarksTheFront) {
   EXPECT_THAT(table, HasSubstr("\n  scene tv"));
 }
 
+TEST(PriceTable, ExtrapolatedSecondsStandInAColumnOfTheirOwn) {
+  std::vector<PriceRow> rows = {RowOf("a", "tv", 2, 39), RowOf("a", "ridge", 64, 40)};
+  rows[1].sample = BlockSample{64, 256};
+  rows[0].scored = rows[1].scored = ScoredArea{4, 32, 32};
+  const std::string table = PriceTable(rows);
+  EXPECT_THAT(table, HasSubstr("scores of 4 areas of 32 x 32 px"));
+  EXPECT_THAT(table, ::testing::ContainsRegex("scene tv +2 +- +2 .. 2"));
+  EXPECT_THAT(table, ::testing::ContainsRegex("scene ridge +- +64 +64 .. 64"));
+  EXPECT_TRUE(PriceRowJson(rows[1])["seconds"].is_null());
+  EXPECT_TRUE(PriceRowJson(rows[1])["solve_seconds"].is_null());
+  EXPECT_EQ(PriceRowJson(rows[1])["extrapolated_seconds"], 64);
+  EXPECT_EQ(PriceRowJson(rows[0])["seconds"], 2);
+  EXPECT_THAT(PricePage(rows, ""), ::testing::AllOf(HasSubstr("seconds, extrapolated"),
+                                                    HasSubstr("64 s extrapolated, 40.00 dB"),
+                                                    HasSubstr("4 areas of 32 x 32 px")));
+}
+
 TEST(PriceCsv, HasAsManyCellsInEachLineAsNames) {
   std::vector<PriceRow> rows = SomeRows();
   rows.front().plan.tolerance = 0.01;  // a name with a comma

@@ -291,7 +291,9 @@ std::vector<std::string> AttributionNotes(const Attribution& attribution) {
   if (attribution.scene && attribution.sweep) {
     notes.emplace_back("*: not in the picture of a scene; as in the frames of the sweep.");
   }
-  notes.emplace_back("Seconds are of one run without the effect.");
+  notes.emplace_back(
+      "Seconds are of one run without the effect; the run with all effects came first, before "
+      "which nothing was in memory.");
   return notes;
 }
 

@@ -1,10 +1,10 @@
 // thicklens bench: what the solvers cost on this machine, and what they give for it.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -15,6 +15,7 @@
 #include "bench_inpainting.h"
 #include "bench_machine.h"
 #include "bench_options.h"
+#include "bench_parts.h"
 #include "bench_scene.h"
 #include "bench_solvers.h"
 #include "bench_source.h"
@@ -23,6 +24,7 @@
 #include "light_field_options.h"
 #include "option_values.h"
 #include "progress_line.h"
+#include "solvers_table.h"
 #include "stopwatch.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
@@ -46,9 +48,8 @@ struct BenchOptions {
 
 struct Contender {
   LightFieldSolver way;
-  const BenchScene* scene = nullptr;
-  std::vector<double> seconds;
-  double psnr_db = 0;
+  bool by_blocks = false;
+  SolversRow row;
 };
 
 std::pair<int, int> SizeOf(const std::string& text) {
@@ -60,110 +61,125 @@ std::pair<int, int> SizeOf(const std::string& text) {
   return {parts[0], parts[1]};
 }
 
-std::vector<Contender> Contenders(const BenchScene& whole, const BenchScene& sample, int threads,
-                                  kernels::Backend* backend) {
+std::vector<Contender> Contenders(int threads, kernels::Backend* backend) {
   std::vector<Contender> contenders;
+  const auto add = [&](LightFieldSolver solver, bool by_blocks) {
+    SolversRow row;
+    row.solver = solver.solver;
+    row.block_solver = solver.block_solver;
+    row.prior = solver.prior;
+    contenders.push_back({std::move(solver), by_blocks, std::move(row)});
+  };
   for (const auto solver : {estimator::BlockSolver::kUmfpack, estimator::BlockSolver::kCholmod,
                             estimator::BlockSolver::kEigen}) {
-    if (!estimator::IsBuiltIn(solver)) continue;
-    contenders.push_back({SolverByBlocks(solver, threads, backend), &sample, {}, 0});
+    if (estimator::IsBuiltIn(solver)) add(SolverByBlocks(solver, threads, backend), true);
   }
-  for (LightFieldSolver& solver : WholePictureSolvers(threads)) {
-    contenders.push_back({std::move(solver), &whole, {}, 0});
-  }
+  for (LightFieldSolver& solver : WholePictureSolvers(threads)) add(std::move(solver), false);
   return contenders;
 }
 
-double PsnrDb(const BenchScene& scene, const model::LightField& estimate, int threads) {
-  const int border_px =
-      std::min(20, std::min(scene.input.picture.width_px, scene.input.picture.height_px) / 4);
-  return estimator::CompareLightFields(scene.truth, estimate, border_px, std::nullopt, threads)
+// The picture, and the part in its middle that blocks solve, and all are judged on.
+SampledPicture WithPartInTheMiddle(BenchScene whole, bool full) {
+  SampledPicture picture;
+  picture.whole = std::move(whole);
+  const model::LinearPicture& pixels = picture.whole.input.picture;
+  if (full || (pixels.width_px == kSamplePx && pixels.height_px == kSamplePx)) {
+    picture.rects = {{0, 0, pixels.width_px, pixels.height_px}};
+    picture.parts = {picture.whole};
+    return picture;
+  }
+  picture.rects = {{(pixels.width_px - kSamplePx) / 2, (pixels.height_px - kSamplePx) / 2,
+                    kSamplePx, kSamplePx}};
+  picture.parts = {PartOf(picture.whole, picture.rects.front())};
+  picture.sample = BlockSample{};
+  picture.pixels_per_part_pixel =
+      static_cast<double>(pixels.width_px) * pixels.height_px / (kSamplePx * kSamplePx);
+  return picture;
+}
+
+double PsnrOfWholeDb(const BenchScene& scene, const model::LightField& estimate, int threads) {
+  return estimator::CompareLightFields(scene.truth, estimate, BorderPx(scene.input.picture),
+                                       std::nullopt, threads)
       .mean.psnr_db;
 }
 
-// Round by round, so that what else the machine does falls on all alike.
-void Measure(const BenchOptions& options, int threads, std::vector<Contender>* contenders) {
+void JudgeSolver(const SampledPicture& picture, const model::LightField& estimate, bool is_whole,
+                 int threads, SolversRow* row) {
+  const std::vector<model::LightField> parts =
+      is_whole ? PartsOf(picture, estimate) : std::vector<model::LightField>{estimate};
+  row->psnr_part_db = ScoresOfViews(picture, parts, threads).psnr_mean_db;
+  if (is_whole) row->psnr_whole_db = PsnrOfWholeDb(picture.whole, estimate, threads);
+}
+
+// Round by round, so that what else the machine does falls on all alike; a first run of each, on
+// the part, is not counted.
+void Measure(const BenchOptions& options, const SampledPicture& picture, int threads,
+             std::vector<Contender>* contenders) {
   ProgressLine progress("measuring", options.common.quiet);
   const int total = options.repeat * static_cast<int>(contenders->size());
   int done = 0;
   for (int round = 0; round < options.repeat; ++round) {
     for (Contender& contender : *contenders) {
       ThrowIfInterrupted();
+      const bool is_sampled = contender.by_blocks && picture.sample.has_value();
+      const BenchScene& scene = is_sampled ? picture.parts.front() : picture.whole;
+      if (round == 0) {
+        WarmUpWhole(picture,
+                    [&](const estimator::EstimateInput& input) { contender.way.estimate(input); });
+      }
       const Clock::time_point start = Clock::now();
-      const model::LightField estimate = contender.way.estimate(contender.scene->input);
-      contender.seconds.push_back(SecondsSince(start));
-      if (round == 0) contender.psnr_db = PsnrDb(*contender.scene, estimate, threads);
+      const model::LightField estimate = contender.way.estimate(scene.input);
+      contender.row.time.seconds.push_back(SecondsSince(start) *
+                                           (is_sampled ? picture.pixels_per_part_pixel : 1));
+      contender.row.time.is_extrapolated = is_sampled;
+      if (round == 0) JudgeSolver(picture, estimate, !is_sampled, threads, &contender.row);
       progress.Show(++done, total);
     }
   }
 }
 
 CommandResult BenchSolvers(const BenchOptions& options) {
-  const auto [width_px, height_px] = SizeOf(options.size);
-  auto [u_count, v_count] = ViewCounts(options.views);
-  if (u_count == 0) u_count = v_count = 7;
-  const int threads = model::ResolveThreads(options.common.threads);
-  BenchScene whole;
+  SolversRun run;
+  std::tie(run.width_px, run.height_px) = SizeOf(options.size);
+  std::tie(run.u_count, run.v_count) = ViewCounts(options.views);
+  if (run.u_count == 0) run.u_count = run.v_count = 7;
+  run.threads = model::ResolveThreads(options.common.threads);
+  run.repeat = options.repeat;
+  SampledPicture picture;
   {
     ProgressLine progress("simulating", options.common.quiet);
-    whole = MakeBenchScene(width_px, height_px, u_count, v_count, options.seed, 0,
-                           [&](int done, int total) {
-                             ThrowIfInterrupted();
-                             progress.Show(done, total);
-                           });
+    picture = WithPartInTheMiddle(
+        MakeBenchScene(run.width_px, run.height_px, run.u_count, run.v_count, options.seed, 0,
+                       [&](int done, int total) {
+                         ThrowIfInterrupted();
+                         progress.Show(done, total);
+                       }),
+        options.full);
   }
-  const BenchScene sample = options.full ? whole : MiddleOf(whole, kSamplePx, kSamplePx);
+  run.part = ScoredAreaOf(picture);
+  run.is_sampled = picture.sample.has_value();
+  run.pixels_ratio = picture.pixels_per_part_pixel;
+  run.solved_px = kSamplePx;
   const auto backend =
       kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
-  std::vector<Contender> contenders = Contenders(whole, sample, threads, backend.get());
-  Measure(options, threads, &contenders);
+  std::vector<Contender> contenders = Contenders(run.threads, backend.get());
+  Measure(options, picture, run.threads, &contenders);
 
-  const double pixels = static_cast<double>(width_px) * height_px;
-  const double share = pixels / (static_cast<double>(sample.input.picture.width_px) *
-                                 sample.input.picture.height_px);
-  std::string text = fmt::format(
-      "{} x {} px, {} x {} views, one channel, {} thread(s), medians of {}\n\n"
-      "{:<11}{:<9}{:<10}{:>10}{:>14}{:>10}\n",
-      width_px, height_px, u_count, v_count, threads, options.repeat, "solver", "", "prior",
-      "seconds", "times faster", "PSNR dB");
-  nlohmann::json rows = nlohmann::json::array();
-  std::optional<double> blocks_seconds;
-  bool extrapolated_any = false;
-  for (const Contender& contender : contenders) {
-    const bool extrapolated = contender.scene != &whole && !options.full;
-    const double seconds = Median(contender.seconds) * (extrapolated ? share : 1);
-    if (!blocks_seconds) blocks_seconds = seconds;
-    extrapolated_any = extrapolated_any || extrapolated;
-    const auto or_null = [](const std::string& name) {
-      return name.empty() ? nlohmann::json() : nlohmann::json(name);
-    };
-    rows.push_back({{"solver", contender.way.solver},
-                    {"block_solver", or_null(contender.way.block_solver)},
-                    {"prior", or_null(contender.way.prior)},
-                    {"size", {width_px, height_px}},
-                    {"views", {u_count, v_count}},
-                    {"threads", threads},
-                    {"extrapolated_from",
-                     extrapolated ? nlohmann::json({kSamplePx, kSamplePx}) : nlohmann::json()},
-                    {"seconds", seconds},
-                    {"seconds_of_runs", contender.seconds},
-                    {"psnr_db", contender.psnr_db}});
-    text += fmt::format("{:<11}{:<9}{:<10}{:>9.3g}{}{:>14.4g}{:>10.2f}\n", contender.way.solver,
-                        contender.way.block_solver, contender.way.prior, seconds,
-                        extrapolated ? "*" : " ", *blocks_seconds / seconds, contender.psnr_db);
-  }
-  if (extrapolated_any) {
-    text += fmt::format(
-        "\n* of {} x {} px in the middle of the picture, times {:.4g}; their PSNR is of that part. "
-        "--full measures all.\n",
-        kSamplePx, kSamplePx, share);
-  }
-  PrintResult(options.common, text);
+  std::vector<SolversRow> rows;
+  for (Contender& contender : contenders) rows.push_back(std::move(contender.row));
+  PrintResult(options.common, SolversTableText(run, rows));
+  nlohmann::json json_rows = nlohmann::json::array();
+  for (const SolversRow& row : rows) json_rows.push_back(SolversRowJson(run, row, rows.front()));
+  const model::PixelRect& rect = picture.rects.front();
   return {
       BenchSummary(
           {{"scene", {{"kind", "slanted plane of noise"}, {"channels", 1}, {"seed", options.seed}}},
            {"repeat", options.repeat},
-           {"rows", rows}}),
+           {"part", run.is_sampled
+                        ? nlohmann::json({{"rect_px", {rect.x, rect.y, rect.width, rect.height}},
+                                          {"scored", ScoredAreaJson(run.part)}})
+                        : nlohmann::json()},
+           {"rows", json_rows}}),
       ""};
 }
 

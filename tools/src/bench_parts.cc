@@ -1,5 +1,7 @@
 #include "bench_parts.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -66,6 +68,10 @@ void WarmUp(const SampledPicture& picture, const EstimatePlan& plan, kernels::Ba
   RunPlan(plan, block.input, 1, backend);
 }
 
+void WarmUpWhole(const SampledPicture& picture, const WholePictureRun& run) {
+  run(picture.parts.front().input);
+}
+
 std::vector<model::LightField> PartsOf(const SampledPicture& picture,
                                        const model::LightField& estimate) {
   std::vector<model::LightField> parts;
@@ -77,6 +83,22 @@ std::vector<model::LightField> PartsOf(const SampledPicture& picture,
 
 int BorderPx(const model::LinearPicture& picture) {
   return std::min(20, std::min(picture.width_px, picture.height_px) / 4);
+}
+
+ScoredArea ScoredAreaOf(const SampledPicture& picture) {
+  const model::LinearPicture& part = picture.parts.front().input.picture;
+  const int border_px = BorderPx(part);
+  return {static_cast<int>(picture.parts.size()), part.width_px - 2 * border_px,
+          part.height_px - 2 * border_px};
+}
+
+std::string ScoredAreaText(const ScoredArea& area) {
+  return fmt::format("{} area{} of {} x {} px", area.parts, area.parts == 1 ? "" : "s",
+                     area.width_px, area.height_px);
+}
+
+nlohmann::json ScoredAreaJson(const ScoredArea& area) {
+  return {{"parts", area.parts}, {"size_px", {area.width_px, area.height_px}}};
 }
 
 PartScores ScoresOfViews(const SampledPicture& picture,

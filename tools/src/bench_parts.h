@@ -1,6 +1,8 @@
 #ifndef THICKLENS_TOOLS_BENCH_PARTS_H_
 #define THICKLENS_TOOLS_BENCH_PARTS_H_
 
+#include <functional>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,6 +53,9 @@ PartsRun RunParts(const SampledPicture& picture, const EstimatePlan& plan, int t
                   kernels::Backend* backend);
 // One block, so that what a device does but once is done.
 void WarmUp(const SampledPicture& picture, const EstimatePlan& plan, kernels::Backend* backend);
+// A part, by a solver of the whole picture: as warm as those of blocks are.
+using WholePictureRun = std::function<void(const estimator::EstimateInput&)>;
+void WarmUpWhole(const SampledPicture& picture, const WholePictureRun& run);
 
 // The parts of an estimate of the whole.
 std::vector<model::LightField> PartsOf(const SampledPicture& picture,
@@ -58,6 +63,15 @@ std::vector<model::LightField> PartsOf(const SampledPicture& picture,
 
 // Pixels at the border of such a picture that are not judged.
 int BorderPx(const model::LinearPicture& picture);
+
+// What scores are of: the middles of so many parts, without their borders.
+struct ScoredArea {
+  int parts = 1;
+  int width_px = 0, height_px = 0;  // of each
+};
+ScoredArea ScoredAreaOf(const SampledPicture& picture);
+std::string ScoredAreaText(const ScoredArea& area);  // "4 areas of 32 x 32 px"
+nlohmann::json ScoredAreaJson(const ScoredArea& area);
 
 // Means over the parts, without their borders.
 struct PartScores {

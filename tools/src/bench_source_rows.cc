@@ -5,7 +5,9 @@
 #include <algorithm>
 
 #include "bench_machine.h"
+#include "printable_text.h"
 #include "thicklens/estimator/estimate.h"
+#include "whole_time.h"
 
 namespace thicklens::tools {
 namespace {
@@ -59,6 +61,14 @@ const SourceRow* BaseRow(const SourceRow& row, const std::vector<SourceRow>& row
   return base == rows.end() ? nullptr : &*base;
 }
 
+WholeTime TimeOf(const SourceRow& row) { return {row.seconds, row.extrapolated.has_value()}; }
+
+// Whether the ratio of two rows compares the same work: on as many threads, both measured or both
+// extrapolated from the same blocks.
+bool IsSameWork(const SourceRow& a, const SourceRow& b) {
+  return a.threads == b.threads && a.extrapolated.has_value() == b.extrapolated.has_value();
+}
+
 std::string Ratio(double base, double seconds) { return fmt::format("{:.3g}", base / seconds); }
 
 std::optional<double> BandwidthShare(const SourceRow& row) {
@@ -72,8 +82,7 @@ std::string NameColumns(const SourceRow& row) {
 }
 
 std::string TimeLine(const SourceRow& row, const std::vector<SourceRow>& rows) {
-  const double seconds = Median(row.seconds);
-  const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+  const WholeTime time = TimeOf(row);
   const SourceRow* base = BaseRow(row, rows);
   std::string published = "-", published_ratio = "-";
   if (row.published) {
@@ -89,17 +98,19 @@ std::string TimeLine(const SourceRow& row, const std::vector<SourceRow>& rows) {
                        row.relative_residual ? fmt::format("{:.1e}", *row.relative_residual) : "-",
                        row.converged.value_or(true) ? "" : " not converged");
   }
-  return fmt::format("{}{:>8}{:>10.4g}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n", NameColumns(row),
-                     row.threads, seconds, row.extrapolated ? "*" : "",
-                     fmt::format("{:.4g} .. {:.4g}", *least, *most),
-                     base == nullptr ? "-" : Ratio(Median(base->seconds), seconds), published,
+  const std::string ratio =
+      base == nullptr ? "-" : Ratio(Median(base->seconds), Median(row.seconds));
+  const bool is_same_work = base != nullptr && IsSameWork(*base, row);
+  return fmt::format("{}{:>8}{:>10}{:>10}{:>22}{:>9}{:>9}{:>11}{:>9}{:>9}{}\n", NameColumns(row),
+                     row.threads, time.MeasuredCell(), time.ExtrapolatedCell(), time.RangeCell(),
+                     is_same_work ? ratio : "-", is_same_work ? "-" : ratio, published,
                      published_ratio, OrDash(row.psnr_true_views_db, 2), more);
 }
 
 std::string FidelityLine(const SourceRow& row) {
   return fmt::format(
-      "{}{:>10.4g}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", NameColumns(row), Median(row.seconds),
-      row.extrapolated ? "*" : "", OrDash(row.macade_standin, 3), OrDash(row.delta_e94_mean, 2),
+      "{}{:>10}{:>10}{:>9}{:>8}{:>12}{:>8}{:>9}\n", NameColumns(row), TimeOf(row).MeasuredCell(),
+      TimeOf(row).ExtrapolatedCell(), OrDash(row.macade_standin, 3), OrDash(row.delta_e94_mean, 2),
       row.published_fidelity ? fmt::format("{:.3f}", MeanOf(row.published_fidelity->macade)) : "-",
       row.published_fidelity ? fmt::format("{:.2f}", MeanOf(row.published_fidelity->delta_e94_mean))
                              : "-",
@@ -107,14 +118,32 @@ std::string FidelityLine(const SourceRow& row) {
 }
 
 std::string Columns(int table) {
-  const std::string names = fmt::format("{:<9} {:>5}  {:<17}", "picture", "views", "");
+  const auto names = [](const char* picture, const char* views) {
+    return fmt::format("{:<9} {:>5}  {:<17}", picture, views, "");
+  };
   if (table == 4) {
-    return fmt::format("{}{:>10}{:<2}{:>9}{:>8}{:>12}{:>8}{:>9}\n", names, "seconds", "", "MACADE'",
+    constexpr char kForm[] = "{}{:>10}{:>10}{:>9}{:>8}{:>12}{:>8}{:>9}\n";
+    return fmt::format(kForm, names("", ""), "seconds", "seconds", "", "", "", "", "") +
+           fmt::format(kForm, names("picture", "views"), "measured", "extrapol.", "MACADE'",
                        "M-dE94", "published:", "", "PSNR dB");
   }
   const char* more = table == 2 ? "  bandwidth" : table == 3 ? "   residual" : "";
-  return fmt::format("{}{:>8}{:>10}{:<2}{:>19}{:>9}{:>11}{:>9}{:>9}{}\n", names, "threads",
-                     "seconds", "", "runs", "x faster", "published:", "x faster", "PSNR dB", more);
+  constexpr char kForm[] = "{}{:>8}{:>10}{:>10}{:>22}{:>9}{:>9}{:>11}{:>9}{:>9}{}\n";
+  return fmt::format(kForm, names("", ""), "", "seconds", "seconds", "", "x faster", "x faster", "",
+                     "", "", "") +
+         fmt::format(kForm, names("picture", "views"), "threads", "measured", "extrapol.", "runs",
+                     "as much", "unlike", "published:", "x faster", "PSNR dB", more);
+}
+
+// Rows of one picture with one number of views, whose scores are of the same area.
+std::string SourceGroupOf(const SourceRow& row) {
+  return fmt::format("{} {}", row.picture, row.views);
+}
+
+std::string GroupLine(const SourceRow& row) {
+  if (!row.scored || !(row.psnr_true_views_db || row.delta_e94_mean)) return "";
+  return fmt::format("{0}, {1} x {1} views: scores are of {2}\n", PrintableUtf8(row.picture),
+                     row.views, ScoredAreaText(*row.scored));
 }
 
 std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
@@ -132,7 +161,15 @@ std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
     std::string list;
     for (const std::string& sample : samples) list += (list.empty() ? "" : ", ") + sample;
     text += fmt::format(
-        "* extrapolated from blocks: {}; --full runs all. PSNRs are of these in every row\n", list);
+        "extrapol.: from blocks: {}; --full runs all. Residuals of blocks are the largest of "
+        "these\n",
+        list);
+  }
+  if (table != 4) {
+    text += fmt::format(
+        "x faster, as much: than the row of as many threads that does the same work; unlike: with "
+        "other threads{}\n",
+        samples.empty() ? "" : ",\nor a measured time against an extrapolated one");
   }
   if (table == 4) {
     text +=
@@ -163,20 +200,23 @@ json SourceRowJson(const SourceRow& row, const std::vector<SourceRow>& rows) {
               {"device", or_null(row.device)},
               {"failure", nullptr},
               {"threads", row.threads},
-              {"seconds", Median(row.seconds)},
-              {"seconds_of_runs", row.seconds},
               {"extrapolated_from", nullptr},
+              {"scored_area", row.scored ? ScoredAreaJson(*row.scored) : json()},
               {"published_seconds", nullptr},
               {"published_seconds_of_pictures", OrNull(row.published)},
               {"psnr_true_views_db", OrNull(row.psnr_true_views_db)}};
+  out.update(TimeOf(row).Json());
   if (row.extrapolated) {
     out["extrapolated_from"] = {{"blocks", row.extrapolated->solved},
                                 {"of", row.extrapolated->all}};
   }
   if (row.published) out["published_seconds"] = MeanOf(*row.published);
   const SourceRow* base = BaseRow(row, rows);
-  out["times_faster"] =
-      base == nullptr ? json() : json(Median(base->seconds) / Median(row.seconds));
+  out["times_faster"] = out["times_faster_unlike"] = nullptr;
+  if (base != nullptr) {
+    out[IsSameWork(*base, row) ? "times_faster" : "times_faster_unlike"] =
+        Median(base->seconds) / Median(row.seconds);
+  }
   out["times_faster_than"] = base == nullptr ? json() : json(base->implementation);
   if (row.table == 2) out["bandwidth_share"] = OrNull(BandwidthShare(row));
   if (row.table == 3) {
@@ -198,8 +238,11 @@ json SourceRowJson(const SourceRow& row, const std::vector<SourceRow>& rows) {
 
 std::string SourceTableText(int table, const std::vector<SourceRow>& rows) {
   std::string text = fmt::format("{}\n{}", Heading(table), Columns(table));
+  std::string group;
   for (const SourceRow& row : rows) {
     if (row.table != table) continue;
+    if (SourceGroupOf(row) != group) text += GroupLine(row);
+    group = SourceGroupOf(row);
     if (!row.failure.empty()) {
       text += fmt::format("{}  not run: {}\n", NameColumns(row), row.failure);
     } else {

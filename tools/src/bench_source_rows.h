@@ -23,6 +23,7 @@ struct SourceRow {
   int threads = 1;
   std::vector<double> seconds;                // of each run, for the whole picture
   std::optional<BlockSample> extrapolated;    // absent: all of it was run
+  std::optional<ScoredArea> scored;           // what scores are of; absent: there are none
   std::optional<PublishedFigures> published;  // seconds
   std::optional<double> psnr_true_views_db;
   // Table 2: the time in which the machine's triad moves the bytes of light field and picture.

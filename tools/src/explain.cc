@@ -129,6 +129,7 @@ EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
 
 void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {
   (*summary)["picture_seconds"] = costs.seconds;
+  (*summary)["seconds_are"] = "extrapolated from a part of the picture";
   for (nlohmann::json& effect : (*summary)["effects"]) {
     for (const auto& [of, seconds] : costs.of_effect) {
       if (effect["name"] == model::EffectName(of)) effect["cost_seconds"] = seconds;
@@ -139,7 +140,8 @@ void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {
 std::string CostsText(const EffectCosts& costs) {
   return fmt::format(
       "cost: how much longer a simulated picture of this size takes with the effect than without "
-      "it, in\nseconds of one core of this machine, all others being as they are here; with these "
+      "it,\nextrapolated from a part of it, in seconds of one core of this machine, all others "
+      "being as they are here; with these "
       "it "
       "takes {:.3g}, and\n~0 is nothing, or less than can be measured\n",
       costs.seconds);

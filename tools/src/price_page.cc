@@ -51,18 +51,22 @@ std::vector<PlotNote> FrontNotes(const std::vector<const PriceRow*>& front) {
 
 std::string Cells(const PriceRow& row) {
   if (!row.failure.empty()) {
-    return fmt::format("<td colspan=\"11\">{}</td>", EscapeXml(row.failure));
+    return fmt::format("<td colspan=\"12\">{}</td>", EscapeXml(row.failure));
   }
   const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+  const auto seconds = [&](bool is_extrapolated) {
+    return row.sample.has_value() == is_extrapolated ? fmt::format("{:.3g}", Median(row.seconds))
+                                                     : std::string("–");
+  };
   const auto or_dash = [](const auto& value, const char* form) {
     return value ? fmt::format(fmt::runtime(form), *value) : std::string("–");
   };
   std::string cells;
   for (const std::string& cell :
-       {fmt::format("{:.3g}{}", Median(row.seconds), row.sample ? "*" : ""),
-        fmt::format("{:.3g}–{:.3g}", *least, *most), or_dash(row.peak_memory_mib, "{:.0f}"),
-        or_dash(row.iterations, "{}"), or_dash(row.relative_residual, "{:.0e}"),
-        or_dash(row.rcond, "{:.0e}"), fmt::format("{:.2f}", row.scores.psnr_mean_db),
+       {seconds(false), seconds(true), fmt::format("{:.3g}–{:.3g}", *least, *most),
+        or_dash(row.peak_memory_mib, "{:.0f}"), or_dash(row.iterations, "{}"),
+        or_dash(row.relative_residual, "{:.0e}"), or_dash(row.rcond, "{:.0e}"),
+        fmt::format("{:.2f}", row.scores.psnr_mean_db),
         fmt::format("{:.2f}", row.scores.psnr_centre_db),
         fmt::format("{:.2f}", row.scores.psnr_corner_db),
         fmt::format("{:.4f}", row.scores.ssim_mean), fmt::format("{:.1f}", row.reprojection_db)}) {
@@ -73,7 +77,8 @@ std::string Cells(const PriceRow& row) {
 
 std::string TableOf(const std::vector<PriceRow>& rows) {
   std::string html =
-      "<div class=\"wide\"><table>\n<thead><tr><th></th><th class=\"number\">seconds</th>"
+      "<div class=\"wide\"><table>\n<thead><tr><th></th><th class=\"number\">seconds, measured</th>"
+      "<th class=\"number\">seconds, extrapolated</th>"
       "<th class=\"number\">from–to</th><th class=\"number\">MiB</th>"
       "<th class=\"number\">iterations</th><th class=\"number\">residual</th>"
       "<th class=\"number\">rcond</th><th class=\"number\">PSNR, dB</th>"
@@ -85,6 +90,14 @@ std::string TableOf(const std::vector<PriceRow>& rows) {
                         row.on_front ? " class=\"chosen\"" : "", EscapeXml(row.Name()), Cells(row));
   }
   return html + "</tbody></table></div>\n";
+}
+
+std::string ScoredParagraph(const std::vector<PriceRow>& rows) {
+  for (const PriceRow& row : rows) {
+    if (!row.failure.empty()) continue;
+    return fmt::format("<p class=\"soft\">Scores are of {}.</p>\n", ScoredAreaText(row.scored));
+  }
+  return "";
 }
 
 }  // namespace
@@ -121,9 +134,11 @@ Plot PriceFigure(const std::vector<PriceRow>& rows, const std::string& id) {
     series.mark = look.mark;
     for (const PriceRow& row : rows) {
       if (row.is_warping || row.plan.solver != look.solver || !row.failure.empty()) continue;
+      if (row.sample) series.label = std::string(look.solver) + " (extrapolated seconds)";
       series.x.push_back(Median(row.seconds));
       series.y.push_back(ErrorGreyLevels(row.scores.psnr_mean_db));
-      series.names.push_back(fmt::format("{}: {:.3g} s, {:.2f} dB", row.Name(), Median(row.seconds),
+      series.names.push_back(fmt::format("{}: {:.3g} s{}, {:.2f} dB", row.Name(),
+                                         Median(row.seconds), row.sample ? " extrapolated" : "",
                                          row.scores.psnr_mean_db));
     }
     plot.series.push_back(std::move(series));
@@ -158,12 +173,14 @@ std::string PricePage(const std::vector<PriceRow>& rows, const std::string& abou
                    "What each way to the views costs and gives",
                    "Rms difference from the true views, in grey levels of 255; down and to the "
                    "left is better. Pointed at, a mark tells its name.");
-    html += TableOf(group) + "</section>\n";
+    html += ScoredParagraph(group) + TableOf(group) + "</section>\n";
   }
   html +=
-      "<p class=\"soft\">Bold: on the front. * of four parts of the picture, extrapolated. MiB: at "
-      "most, beside what the program held before. PSNR and SSIM: of the middles of these parts, "
-      "without 16 px on each side, if some rows are of parts. Picture again: the PSNR of the "
+      "<p class=\"soft\">Bold: on the front, on which extrapolated seconds count as they are. "
+      "Extrapolated: from four parts of the picture; iterations, residual and rcond are then the "
+      "worst of these. MiB: at most, beside what the program held before. PSNR, SSIM and the "
+      "picture again are of the same area in all rows of a table, which its heading names. Picture "
+      "again: the PSNR of the "
       "photograph formed "
       "from the views, which a wrong light field can have, too.</p>\n";
   return html + "</main>\n</body>\n</html>\n";

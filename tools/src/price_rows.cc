@@ -42,13 +42,16 @@ std::string Quoted(const std::string& text) {
 std::string RowText(const PriceRow& row) {
   const std::string begin = fmt::format("{:<2}{:<32}", row.on_front ? ">" : "", row.Name());
   if (!row.failure.empty()) return fmt::format("{}  {}\n", begin, row.failure);
-  const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+  // Of a sample, what solving it took is in the extrapolated time alone.
+  const auto measured = [&](const std::vector<double>& seconds) {
+    return row.sample ? std::string("-") : fmt::format("{:.2g}", Median(seconds));
+  };
   return fmt::format(
-      "{}{:>8.3g}{:<2}{:>14}{:>8.2g}{:>8.2g}{:>8.2g}{:>6}{:>7}{:>9}{:>8}{:>7.2f}{:>7.2f}{:>7.2f}"
+      "{}{:>10}{:>10}{:>16}{:>8.2g}{:>8}{:>8}{:>6}{:>7}{:>9}{:>8}{:>7.2f}{:>7.2f}{:>7.2f}"
       "{:>7.3f}{:>6.1f}{}\n",
-      begin, Median(row.seconds), row.sample ? "*" : "",
-      fmt::format("{:.3g} .. {:.3g}", *least, *most), Median(row.setup_seconds),
-      Median(row.solve_seconds), Median(row.views_seconds), OrDash(row.peak_memory_mib, "{:.0f}"),
+      begin, row.time().MeasuredCell(), row.time().ExtrapolatedCell(), row.time().RangeCell(),
+      Median(row.setup_seconds), measured(row.solve_seconds), measured(row.views_seconds),
+      OrDash(row.peak_memory_mib, "{:.0f}"),
       row.iterations ? fmt::format("{}", *row.iterations) : "-",
       OrDash(row.relative_residual, "{:.0e}"), OrDash(row.rcond, "{:.0e}"), row.scores.psnr_mean_db,
       row.scores.psnr_centre_db, row.scores.psnr_corner_db, row.scores.ssim_mean,
@@ -81,12 +84,15 @@ json PriceRowJson(const PriceRow& row) {
               {"plan", row.is_warping ? json() : PlanJson(row.plan)},
               {"failure", row.failure.empty() ? json() : json(row.failure)}};
   if (!row.failure.empty()) return out;
-  out.update({{"seconds", Median(row.seconds)},
-              {"seconds_of_runs", row.seconds},
-              {"setup_seconds", Median(row.setup_seconds)},
-              {"solve_seconds", Median(row.solve_seconds)},
-              {"views_seconds", Median(row.views_seconds)},
+  const auto measured = [&](const std::vector<double>& seconds) {
+    return row.sample ? json() : json(Median(seconds));
+  };
+  out.update(row.time().Json());
+  out.update({{"setup_seconds", Median(row.setup_seconds)},
+              {"solve_seconds", measured(row.solve_seconds)},
+              {"views_seconds", measured(row.views_seconds)},
               {"extrapolated_from", nullptr},
+              {"scored_area", ScoredAreaJson(row.scored)},
               {"peak_memory_mib", or_null(row.peak_memory_mib)},
               {"iterations", or_null(row.iterations)},
               {"converged", row.converged},
@@ -113,12 +119,19 @@ std::string PriceTable(const std::vector<PriceRow>& rows) {
   for (const std::string& group : GroupsOf(rows)) {
     const auto first = std::find_if(rows.begin(), rows.end(),
                                     [&](const PriceRow& row) { return GroupOf(row) == group; });
+    const auto scored = std::find_if(first, rows.end(), [&](const PriceRow& row) {
+      return GroupOf(row) == group && row.failure.empty();
+    });
     text += fmt::format(
-        "\n{0}, {1} x {1} views\n{2:<34}{3:>8}{4:<2}{5:>14}{6:>8}{7:>8}{8:>8}"
-        "{9:>6}{10:>7}{11:>9}{12:>8}{13:>7}{14:>7}{15:>7}{16:>7}{17:>6}\n",
-        PrintableUtf8(first->scene), first->views, "", "seconds", "", "least .. most", "set-up",
-        "solve", "views", "MiB", "iter.", "residual", "rcond", "PSNR", "centre", "corner", "SSIM",
-        "photo");
+        "\n{0}, {1} x {1} views{2}\n", PrintableUtf8(first->scene), first->views,
+        scored == rows.end() ? std::string() : "; scores of " + ScoredAreaText(scored->scored));
+    constexpr char kForm[] =
+        "{:<34}{:>10}{:>10}{:>16}{:>8}{:>8}{:>8}{:>6}{:>7}{:>9}{:>8}{:>7}{:>7}{:>7}{:>7}{:>6}\n";
+    text += fmt::format(kForm, "", "seconds", "seconds", "", "", "", "", "", "", "", "", "", "", "",
+                        "", "");
+    text += fmt::format(kForm, "", "measured", "extrapol.", "least .. most", "set-up", "solve",
+                        "views", "MiB", "iter.", "residual", "rcond", "PSNR", "centre", "corner",
+                        "SSIM", "photo");
     for (const PriceRow& row : rows) {
       if (GroupOf(row) == group) text += RowText(row);
     }
@@ -129,7 +142,9 @@ std::string PriceTable(const std::vector<PriceRow>& rows) {
 std::string PriceCsv(const std::vector<PriceRow>& rows) {
   std::string csv =
       "scene,views,plan,seconds,least_seconds,most_seconds,setup_seconds,solve_seconds,"
-      "views_seconds,blocks_solved,blocks_in_all,peak_memory_mib,iterations,converged,"
+      "views_seconds,extrapolated_seconds,extrapolated_least_seconds,extrapolated_most_seconds,"
+      "blocks_solved,blocks_in_all,scored_parts,scored_width_px,scored_height_px,"
+      "peak_memory_mib,iterations,converged,"
       "relative_residual,rcond_min,psnr_mean_db,psnr_centre_db,psnr_corner_db,ssim_mean,"
       "ssim_centre,ssim_corner,reprojection_psnr_db,on_front,failure\n";
   const auto number = [](const auto& value) {
@@ -138,21 +153,28 @@ std::string PriceCsv(const std::vector<PriceRow>& rows) {
   for (const PriceRow& row : rows) {
     if (!row.failure.empty()) {
       csv += fmt::format("{},{},{}{}{}\n", Quoted(row.scene), row.views, Quoted(row.Name()),
-                         std::string(22, ','), Quoted(row.failure));
+                         std::string(28, ','), Quoted(row.failure));
       continue;
     }
     const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+    const auto cell = [&](double seconds, bool is_extrapolated) {
+      return row.sample.has_value() == is_extrapolated ? fmt::format("{:.6g}", seconds)
+                                                       : std::string();
+    };
+    const double seconds = Median(row.seconds);
     csv += fmt::format(
-        "{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},{},{},{},{},{},{:.4f},"
+        "{},{},{},{},{},{},{:.6g},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.4f},"
         "{:.4f},{:.4f},{:.6f},{:.6f},{:.6f},{:.4f},{},\n",
-        Quoted(row.scene), row.views, Quoted(row.Name()), Median(row.seconds), *least, *most,
-        Median(row.setup_seconds), Median(row.solve_seconds), Median(row.views_seconds),
-        row.sample ? fmt::format("{}", row.sample->solved) : "",
-        row.sample ? fmt::format("{}", row.sample->all) : "", number(row.peak_memory_mib),
-        number(row.iterations), row.converged ? 1 : 0, number(row.relative_residual),
-        number(row.rcond), row.scores.psnr_mean_db, row.scores.psnr_centre_db,
-        row.scores.psnr_corner_db, row.scores.ssim_mean, row.scores.ssim_centre,
-        row.scores.ssim_corner, row.reprojection_db, row.on_front ? 1 : 0);
+        Quoted(row.scene), row.views, Quoted(row.Name()), cell(seconds, false), cell(*least, false),
+        cell(*most, false), Median(row.setup_seconds), cell(Median(row.solve_seconds), false),
+        cell(Median(row.views_seconds), false), cell(seconds, true), cell(*least, true),
+        cell(*most, true), row.sample ? fmt::format("{}", row.sample->solved) : "",
+        row.sample ? fmt::format("{}", row.sample->all) : "", row.scored.parts, row.scored.width_px,
+        row.scored.height_px, number(row.peak_memory_mib), number(row.iterations),
+        row.converged ? 1 : 0, number(row.relative_residual), number(row.rcond),
+        row.scores.psnr_mean_db, row.scores.psnr_centre_db, row.scores.psnr_corner_db,
+        row.scores.ssim_mean, row.scores.ssim_centre, row.scores.ssim_corner, row.reprojection_db,
+        row.on_front ? 1 : 0);
   }
   return csv;
 }

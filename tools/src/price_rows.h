@@ -8,6 +8,7 @@
 
 #include "bench_parts.h"
 #include "estimate_plan.h"
+#include "whole_time.h"
 
 namespace thicklens::tools {
 
@@ -26,14 +27,17 @@ struct PriceRow {
   std::optional<int> iterations;
   bool converged = true;
   std::optional<double> relative_residual, rcond;
+  ScoredArea scored;           // what scores and the picture formed again are of
   PartScores scores;           // of the true views
   double reprojection_db = 0;  // PSNR of the picture formed again
   bool on_front = false;
 
+  WholeTime time() const { return {seconds, sample.has_value()}; }
   std::string Name() const { return is_warping ? "warping (DIBR)" : PlanName(plan); }
 };
 
-// Sets on_front: seconds against the mean PSNR, among rows of the same scene and views.
+// Sets on_front: seconds, extrapolated ones among them, against the mean PSNR, among rows of the
+// same scene and views.
 void MarkFront(std::vector<PriceRow>* rows);
 
 // Rms error of the true views in grey levels of 255.
