@@ -114,6 +114,23 @@ TEST(MarkFront, LeavesOutWhatMostSweepsDidNotGive) {
   EXPECT_THAT(Marked({half, Row(1, 5)}), ElementsAre(false, true));
 }
 
+// A method that refuses what is hard has smaller errors in what it leaves.
+TEST(CalibrationRowsText, RowsOfFewerSweepsHaveATableOfTheirOwn) {
+  const CalibrationRow all =
+      MakeCalibrationRow("fit", 31, 64, {SolvedTrial(4, 1, 2), SolvedTrial(6, 1, 2)});
+  const CalibrationRow fewer =
+      MakeCalibrationRow("peak", 8, 64, {SolvedTrial(0.25, 1, 1), RefusedTrial("too hard")});
+  EXPECT_TRUE(all.IsOfAllSweeps());
+  EXPECT_FALSE(fewer.IsOfAllSweeps());
+  EXPECT_THAT(Marked({fewer, all}), ElementsAre(false, true));
+  const std::string text = CalibrationRowsText({all, fewer});
+  const std::size_t second = text.find("Of fewer sweeps than all");
+  ASSERT_NE(second, std::string::npos);
+  EXPECT_EQ(text.substr(0, second).find("0.25"), std::string::npos);
+  EXPECT_THAT(text.substr(second), HasSubstr("0.25"));
+  EXPECT_EQ(CalibrationRowJson(fewer)["errors_are_of_all_sweeps"], false);
+}
+
 TEST(BenchSweep, PartsAreOfTheSamePhotographs) {
   const BenchSweep bench = MakeBenchSweep(BenchSweepOptions(), {}, 96, 3);
   const calib::FocusSweep all = PartOfSweep(bench, 31, 96);

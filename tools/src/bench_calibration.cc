@@ -308,8 +308,7 @@ std::string TextOf(const std::string& about, int sweeps, const std::vector<Calib
          fmt::format(
              "\n* on the Pareto front: no other row has as small an error of d1 in as little "
              "time.\n"
-             "Errors: medians of magnitudes over the sweeps that gave a result. 68, 95: percent "
-             "of\n"
+             "Errors: medians of magnitudes over all sweeps. 68, 95: percent of\n"
              "the intervals stated for that level that hold the truth; of all sweeps, chance "
              "moves\n"
              "them by {:.0f} and {:.0f}. peak and source come out of one run that ends before the\n"

@@ -39,12 +39,24 @@ std::string CoverageHtml(const IntervalCoverage& coverage) {
                                             100 * coverage.fraction_95());
 }
 
+constexpr const char* kErrorNames[] = {"zf, mm",       "d1, µm",       "kappa, %",
+                                       "zf: 68, 95 %", "d1: 68, 95 %", "kappa: 68, 95 %"};
+
+std::vector<std::string> ErrorCellsHtml(const CalibrationRow& row) {
+  return {ErrorHtml(row.focus_depth_mm),
+          ErrorHtml(row.image_distance_um),
+          ErrorHtml(row.blur_ratio_percent),
+          CoverageHtml(row.focus_depth_mm.coverage),
+          CoverageHtml(row.image_distance_um.coverage),
+          CoverageHtml(row.blur_ratio_percent.coverage)};
+}
+
 std::string TableHtml(const std::vector<CalibrationRow>& rows) {
   std::string html = "<div class=\"wide\"><table>\n<thead><tr><th></th>";
-  for (const char* name : {"seconds", "from–to", "zf, mm", "d1, µm", "kappa, %", "zf: 68, 95 %",
-                           "d1: 68, 95 %", "kappa: 68, 95 %", "refused", "in part"}) {
+  for (const char* name : {"seconds", "from–to", "refused", "in part"}) {
     html += fmt::format("<th class=\"number\">{}</th>", name);
   }
+  for (const char* name : kErrorNames) html += fmt::format("<th class=\"number\">{}</th>", name);
   html += "</tr></thead>\n<tbody>\n";
   for (const CalibrationRow& row : rows) {
     const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
@@ -52,16 +64,38 @@ std::string TableHtml(const std::vector<CalibrationRow>& rows) {
                         EscapeXml(NameOf(row)));
     for (const std::string& cell :
          {fmt::format("{:.3g}", Median(row.seconds)), fmt::format("{:.3g}–{:.3g}", *least, *most),
-          ErrorHtml(row.focus_depth_mm), ErrorHtml(row.image_distance_um),
-          ErrorHtml(row.blur_ratio_percent), CoverageHtml(row.focus_depth_mm.coverage),
-          CoverageHtml(row.image_distance_um.coverage),
-          CoverageHtml(row.blur_ratio_percent.coverage), fmt::format("{}", row.refused),
-          fmt::format("{}", row.partial)}) {
+          fmt::format("{}", row.refused), fmt::format("{}", row.partial)}) {
       html += TableCell(EscapeXml(cell));
+    }
+    for (const std::string& cell : ErrorCellsHtml(row)) {
+      html += TableCell(EscapeXml(row.IsOfAllSweeps() ? cell : "–"));
     }
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>\n";
+}
+
+// Errors of rows that some sweeps did not give.
+std::string TableOfFewerHtml(const std::vector<CalibrationRow>& rows) {
+  std::string body;
+  for (const CalibrationRow& row : rows) {
+    const int most = std::max(
+        {row.focus_depth_mm.count, row.image_distance_um.count, row.blur_ratio_percent.count});
+    if (row.IsOfAllSweeps() || most == 0) continue;
+    body += fmt::format(
+        "<tr><th scope=\"row\">{}</th>{}", EscapeXml(NameOf(row)),
+        TableCell(fmt::format("{}, {}, {}", row.focus_depth_mm.count, row.image_distance_um.count,
+                              row.blur_ratio_percent.count)));
+    for (const std::string& cell : ErrorCellsHtml(row)) body += TableCell(EscapeXml(cell));
+    body += "</tr>\n";
+  }
+  if (body.empty()) return "";
+  std::string html =
+      "<p>Of fewer sweeps than all, and not to be compared with the rows above: what a method "
+      "refuses is harder than what it does not.</p>\n<div class=\"wide\"><table>\n<thead><tr>"
+      "<th></th><th class=\"number\">sweeps with zf, d1, kappa</th>";
+  for (const char* name : kErrorNames) html += fmt::format("<th class=\"number\">{}</th>", name);
+  return html + "</tr></thead>\n<tbody>\n" + body + "</tbody></table></div>\n";
 }
 
 }  // namespace
@@ -116,10 +150,11 @@ std::string CalibrationPricePage(const std::vector<CalibrationRow>& rows,
   html += Figure(SvgPlot(CalibrationPriceFigure(rows)), "Each method, by frames and field",
                  "Median over the sweeps of the error of d1; down and to the left is better. "
                  "Pointed at, a mark tells its name.");
-  html += TableHtml(rows);
+  html += TableHtml(rows) + TableOfFewerHtml(rows);
   html +=
-      "<p class=\"soft\">Bold: on the front. Errors: medians of magnitudes over the sweeps that "
-      "gave a result. 68, 95: percent of the intervals stated for that level that hold the truth. "
+      "<p class=\"soft\">Bold: on the front. Errors: medians of magnitudes over all sweeps. 68, "
+      "95: "
+      "percent of the intervals stated for that level that hold the truth. "
       "peak and source come out of one run that ends before the fit.</p>\n";
   return html + "</main>\n</body>\n</html>\n";
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstddef>
@@ -93,18 +94,51 @@ std::string CoverageCell(const IntervalCoverage& coverage) {
                                             100 * coverage.fraction_95());
 }
 
+std::string ErrorCells(const CalibrationRow& row) {
+  return fmt::format("{:>9}{:>9}{:>9}{:>8}{:>8}", ErrorCell(row.focus_depth_mm),
+                     ErrorCell(row.image_distance_um), ErrorCell(row.blur_ratio_percent),
+                     CoverageCell(row.focus_depth_mm.coverage),
+                     CoverageCell(row.blur_ratio_percent.coverage));
+}
+
 std::string RowText(const CalibrationRow& row) {
   return fmt::format(
-      "{}{:<13}{:>6}{:>7}{:>9.2g}{:>19}{:>9}{:>9}{:>9}{:>8}{:>8}{:>9}\n",
-      row.on_front ? "* " : "  ", row.method, row.field_px, row.frames, Median(row.seconds),
+      "{}{:<13}{:>6}{:>7}{:>9.2g}{:>19}{}{:>9}\n", row.on_front ? "* " : "  ", row.method,
+      row.field_px, row.frames, Median(row.seconds),
       fmt::format("{:.2g} to {:.2g}", Least(row.seconds), Most(row.seconds)),
-      ErrorCell(row.focus_depth_mm), ErrorCell(row.image_distance_um),
-      ErrorCell(row.blur_ratio_percent), CoverageCell(row.focus_depth_mm.coverage),
-      CoverageCell(row.blur_ratio_percent.coverage),
+      row.IsOfAllSweeps() ? ErrorCells(row)
+                          : fmt::format("{:>9}{:>9}{:>9}{:>8}{:>8}", "-", "-", "-", "-", "-"),
       row.refused + row.partial == 0 ? "0" : fmt::format("{}, {}", row.refused, row.partial));
 }
 
+// Errors of rows that some sweeps did not give, in a table of their own.
+std::string TextOfFewerSweeps(const std::vector<CalibrationRow>& rows) {
+  std::string text;
+  for (const CalibrationRow& row : rows) {
+    const std::array<int, 3> counts = {row.focus_depth_mm.count, row.image_distance_um.count,
+                                       row.blur_ratio_percent.count};
+    if (row.IsOfAllSweeps() || *std::max_element(counts.begin(), counts.end()) == 0) continue;
+    text +=
+        fmt::format("  {:<13}{:>6}{:>7}{:>14}{}\n", row.method, row.field_px, row.frames,
+                    fmt::format("{}, {}, {}", counts[0], counts[1], counts[2]), ErrorCells(row));
+  }
+  if (text.empty()) return "";
+  return fmt::format(
+             "\nOf fewer sweeps than all, and not to be compared with the rows above: what a "
+             "method refuses\nis harder than what it does not\n  "
+             "{:<13}{:>6}{:>7}{:>14}{:>9}{:>9}{:>9}{:>8}{:>8}\n",
+             "method", "field", "frames", "sweeps", "zf mm", "d1 um", "kappa %", "zf", "kappa") +
+         text;
+}
+
 }  // namespace
+
+bool CalibrationRow::IsOfAllSweeps() const {
+  const std::array<int, 3> counts = {focus_depth_mm.count, image_distance_um.count,
+                                     blur_ratio_percent.count};
+  return std::all_of(counts.begin(), counts.end(),
+                     [&](int count) { return count == 0 || count == sweeps; });
+}
 
 double BinomialStandardError(double expected_fraction, int trials) {
   return std::sqrt(expected_fraction * (1 - expected_fraction) / trials);
@@ -173,6 +207,7 @@ json CalibrationRowJson(const CalibrationRow& row) {
           {"ok", row.ok},
           {"partial", row.partial},
           {"refused", row.refused},
+          {"errors_are_of_all_sweeps", row.IsOfAllSweeps()},
           {"reasons", row.reasons},
           {"seconds", Median(row.seconds)},
           {"seconds_least", Least(row.seconds)},
@@ -215,6 +250,7 @@ std::string CalibrationRowsText(const std::vector<CalibrationRow>& rows) {
     text += RowText(row);
     for (const auto& [reason, count] : row.reasons) reasons[reason][row.method] += count;
   }
+  text += TextOfFewerSweeps(rows);
   for (const auto& [reason, by_method] : reasons) {
     text += "\n";
     for (const auto& [method, count] : by_method) {

@@ -56,8 +56,11 @@ struct CalibrationRow {
   CalibrationErrors focus_depth_mm, image_distance_um, blur_ratio_percent;
   bool on_front = false;
 
-  // Whether its d1 can be compared with others': more than half of the sweeps gave it.
-  bool IsComparable() const { return 2 * image_distance_um.count > sweeps; }
+  // Whether all sweeps gave what the row gives at all: errors of rows that some sweeps did not give
+  // are of other, easier sweeps.
+  bool IsOfAllSweeps() const;
+  // Whether its d1 can be compared with others'.
+  bool IsComparable() const { return IsOfAllSweeps() && image_distance_um.count == sweeps; }
 };
 CalibrationRow MakeCalibrationRow(const std::string& method, int frames, int field_px,
                                   const std::vector<CalibrationTrial>& trials);
