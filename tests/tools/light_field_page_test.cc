@@ -810,6 +810,24 @@ TEST_F(ReportProgram, RefusesFilesThatDoNotFit) {
       {estimate, "--estimate",
        folder_.Put("e.json", R"({"solver": "blocks", "views": [5, 5], "size": [40, 24]})")},
       {"e.json: it is of 5x5 views of 40x24 px", "3x3"});
+  // Scores of another part, or of other views, would stand beside these.
+  for (const char* area :
+       {R"("views": [3, 3], "size": [20, 24])", R"("views": [5, 5], "size": [40, 24])"}) {
+    ExpectRefused(
+        {estimate, "--comparison",
+         folder_.Put("c.json", fmt::format("{{{}, \"mean\": {{\"psnr_db\": 30}}}}", area))},
+        {"c.json: it compares", "3x3 of 40x24 px"});
+  }
+}
+
+TEST_F(ReportProgram, SaysOfWhichAreaTheScoresAre) {
+  const std::string estimate = Write(SeenByCamera(3, 3), "est");
+  const ProgramResult result =
+      Run({estimate, "--comparison",
+           folder_.Put("c.json", R"({"views": [3, 3], "size": [40, 24], "border_px": 5,)"
+                                 R"( "mean": {"psnr_db": 30}})")});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(ContentOf(page_), HasSubstr("without a border of 5 px"));
 }
 
 TEST_F(ReportProgram, RefusalsStandInTheJson) {

@@ -219,6 +219,11 @@ ComparisonRecord ReadComparisonRecord(const std::string& path) {
   RequireResults(parsed, "mean", path, kind);
   const Fields fields(parsed, path, "");
   ComparisonRecord record;
+  if (fields.Has("views")) {
+    std::tie(record.u_count, record.v_count) = fields.TwoCounts("views");
+  }
+  if (fields.Has("size")) std::tie(record.s_count, record.t_count) = fields.TwoCounts("size");
+  record.border_px = fields.Count("border_px");
   record.mean = *Scores(fields, "mean");
   record.centre = Scores(fields, "centre");
   record.corner = Scores(fields, "corner");

@@ -41,6 +41,10 @@ struct ViewRecord {
 };
 // What `thicklens compare TRUE_LF LF --json` wrote.
 struct ComparisonRecord {
+  // What was compared: views, pixels of each, and the border that was left out; 0, 0 and absent
+  // where the file does not say it.
+  int u_count = 0, v_count = 0, s_count = 0, t_count = 0;
+  std::optional<int> border_px;
   ScoresRecord mean;
   std::optional<ScoresRecord> centre, corner;
   std::optional<ScoresRecord> dibr_mean, dibr_centre, dibr_corner;

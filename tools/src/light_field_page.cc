@@ -180,9 +180,19 @@ std::string ScoresTable(const ComparisonRecord& comparison) {
     if (row.estimate && row.dibr)
       html += "<tr>" + TableCell("DIBR", "soft") + ScoreCells(row.dibr) + "</tr>\n";
   }
+  std::string area;
+  if (comparison.u_count > 0 && comparison.s_count > 0) {
+    area = fmt::format(", {} views of {} px{}", Times(comparison.u_count, comparison.v_count),
+                       Times(comparison.s_count, comparison.t_count),
+                       comparison.border_px.value_or(0) > 0
+                           ? fmt::format(" without a border of {} px", *comparison.border_px)
+                           : std::string());
+  }
   return html +
-         "</tbody></table></div>\n<p class=\"soft\">Against the true views, on stored values. "
-         "PSNR, "
+         fmt::format(
+             "</tbody></table></div>\n<p class=\"soft\">Against the true views{}, on stored "
+             "values. PSNR, ",
+             area) +
          "SSIM and the MACADE stand-in (agreement of edge directions; the definition of MACADE "
          "itself could not be had): higher is better. ΔE94, the difference of colours as seen: "
          "lower is better. DIBR is the photograph warped to each view by its depth.</p>\n";

@@ -257,6 +257,26 @@ EstimateRecord ReadMatchingRecord(const ReportOptions& options,
       light_field.t_count));
 }
 
+// Scores of another area would stand beside these views. Without a word in the record it is taken
+// as theirs.
+ComparisonRecord ReadMatchingComparison(const ReportOptions& options,
+                                        const model::LightField& light_field) {
+  ComparisonRecord record = ReadComparisonRecord(options.comparison_path);
+  const bool has_views = record.u_count > 0, has_size = record.s_count > 0;
+  const bool matches =
+      (!has_views ||
+       (record.u_count == light_field.u_count && record.v_count == light_field.v_count)) &&
+      (!has_size ||
+       (record.s_count == light_field.s_count && record.t_count == light_field.t_count));
+  if (matches) return record;
+  throw Error(fmt::format(
+      "{}: it compares {}x{} views of {}x{} px, the page shows {}x{} of {}x{} px of {}: a "
+      "comparison of the same views and the same part is expected (--views, --crop)",
+      options.comparison_path, record.u_count, record.v_count, record.s_count, record.t_count,
+      light_field.u_count, light_field.v_count, light_field.s_count, light_field.t_count,
+      options.light_field_path));
+}
+
 CommandResult Report(const ReportOptions& options) {
   model::OutputFile output(options.output_path);
   const model::LightField light_field =
@@ -280,7 +300,7 @@ CommandResult Report(const ReportOptions& options) {
   }
   if (!options.estimate_path.empty()) input.estimate = ReadMatchingRecord(options, light_field);
   if (!options.comparison_path.empty()) {
-    input.comparison = ReadComparisonRecord(options.comparison_path);
+    input.comparison = ReadMatchingComparison(options, light_field);
   }
   input.version = Version();
   input.date = NowIso8601();
