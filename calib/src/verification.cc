@@ -37,7 +37,7 @@ double SpreadOf(const Eigen::Vector2d& interval) {
   return (interval.y() - interval.x()) / std::sqrt(12.0);
 }
 
-// What the numbers of the camera file cause moves the stored calibration as it moves the new one.
+// A part that the numbers of the camera file cause moves both calibrations alike.
 bool IsOfCameraFile(const SystematicPart& part) {
   return part.name.rfind("lens.", 0) == 0 || part.name.rfind("sensor.", 0) == 0;
 }

@@ -8,6 +8,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "camera_verify.h"
 #include "commands.h"
 #include "image_io.h"
 #include "option_values.h"
@@ -240,6 +241,7 @@ model::Camera DescribedCamera(const CameraDescription& description,
 void AddCameraCommand(CLI::App* program, CommandAction* action) {
   CLI::App* camera = program->add_subcommand("camera", "Camera files");
   camera->require_subcommand(1);
+  AddCameraVerifyCommand(camera, action);
   CLI::App* command = camera->add_subcommand(
       "init", "A camera file from a data sheet's numbers or from a photograph's EXIF");
   const auto options = std::make_shared<CameraInitOptions>();

@@ -51,7 +51,7 @@ struct Verification {
   int degrees_of_freedom = 0;                 // parameters that are counted
   double chi_square = 0;
   double p_value = 1;
-  // What the smallest detectable change of d1 does to the blur far from focus, px of sigma.
+  // The change of the blur far from focus, px of sigma, by the smallest detectable change of d1.
   double detectable_blur_px = 0;
   std::vector<std::string> warnings;  // one line each
 };
@@ -60,7 +60,7 @@ struct Verification {
 // sweep was calibrated with. Both covariance matrices count; stored values have no systematic
 // interval in the file, so that those parts of the new sweep that the numbers of the camera file do
 // not cause (they move both alike) are counted once, as if even over their intervals. The depth of
-// focus follows from d1 and is told, not counted. Throws Error if `stored` has no calibration.
+// focus follows from d1: it is listed and not counted. Throws Error if `stored` has no calibration.
 Verification VerifyCalibration(const model::Camera& stored, const FocusSweep& sweep,
                                const Calibration& found, const VerificationOptions& options);
 

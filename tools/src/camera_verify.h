@@ -1,0 +1,22 @@
+#ifndef THICKLENS_TOOLS_CAMERA_VERIFY_H_
+#define THICKLENS_TOOLS_CAMERA_VERIFY_H_
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "commands.h"
+#include "thicklens/calib/verification.h"
+
+namespace thicklens::tools {
+
+// What `thicklens camera verify` prints, and what its --json has beside the names of the files.
+std::string VerificationText(const calib::Verification& verification);
+nlohmann::json VerificationJson(const calib::Verification& verification);
+
+// thicklens camera verify CAMERA SWEEP.
+void AddCameraVerifyCommand(CLI::App* camera, CommandAction* action);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_CAMERA_VERIFY_H_
