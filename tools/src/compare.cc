@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "aperture_statement.h"
 #include "commands.h"
 #include "compare_table.h"
 #include "depth_io.h"
@@ -179,6 +180,10 @@ CommandResult CompareFolders(const CompareOptions& options) {
   model::LightField other = ReadLightField(options.other_path, reading);
   if (IsToCrop(crop, other.s_count, other.t_count))
     other = NamingTheFile(options.other_path, [&] { return model::CropViews(other, *crop); });
+  if (const auto warning =
+          DifferentApertures(options.reference_path, reference, options.other_path, other)) {
+    spdlog::warn("{}", *warning);
+  }
   TakeCommonViews(options, &reference, &other);
   const std::optional<estimator::DibrInput> dibr = ReadDibr(options, crop, reference);
   const estimator::LightFieldScores scores = NamingTheFile(options.other_path, [&] {

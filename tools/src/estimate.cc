@@ -310,7 +310,7 @@ std::string Page(const EstimateOptions& options, PreparedEstimate prepared,
                           options.common.json_path);
   if (outcome.scene) page.maps = &outcome.maps;
   page.warnings = std::move(warnings);
-  page.sources = SourcesOf(options, prepared.aperture, summary);
+  page.sources = SourcesOf(options, prepared.aperture.InWords(), summary);
   page.mosaic = true;
   page.version = Version();
   page.date = outcome.light_field.origin.date;

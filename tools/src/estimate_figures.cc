@@ -20,7 +20,7 @@ namespace {
 constexpr int kMapPx = 890;
 constexpr int kMosaicPx = 1780;
 constexpr int kMosaicGapPx = 2;
-constexpr double kGreyLevels = 255;
+constexpr double kLevelsOfFigure = 255;
 
 // What is known of a pixel; of several, the one that stands last here.
 enum class Confidence : std::size_t { kSeen, kPartlySeen, kBlurred, kFilledIn };
@@ -60,7 +60,7 @@ double ResidualRange(const std::vector<float>& residual) {
   const auto at = sizes.begin() + static_cast<std::ptrdiff_t>((sizes.size() - 1) * 99 / 100);
   std::nth_element(sizes.begin(), at, sizes.end());
   for (const double levels : {1, 2, 5, 10, 20, 50, 100}) {
-    if (kGreyLevels * static_cast<double>(*at) <= levels) return levels / kGreyLevels;
+    if (kLevelsOfFigure * static_cast<double>(*at) <= levels) return levels / kLevelsOfFigure;
   }
   return 1;
 }
@@ -115,10 +115,10 @@ std::string ResidualFigure(const LightFieldPageInput& input) {
   const cv::Mat shown =
       GreyMapped(input.maps->residual, light_field.s_count, light_field.t_count, range, kMapPx);
   const std::string scale =
-      ColourScale("residual", -kGreyLevels * range, kGreyLevels * range, "grey levels of 255",
-                  [range](double levels) {
+      ColourScale("residual", -kLevelsOfFigure * range, kLevelsOfFigure * range,
+                  "grey levels of 255", [range](double levels) {
                     const cv::Mat shown_value =
-                        GreyMapped({static_cast<float>(levels / kGreyLevels)}, 1, 1, range, 1);
+                        GreyMapped({static_cast<float>(levels / kLevelsOfFigure)}, 1, 1, range, 1);
                     const std::uint8_t grey = shown_value.at<std::uint8_t>(0, 0);
                     return Css({grey, grey, grey});
                   });
@@ -131,7 +131,8 @@ std::string ResidualFigure(const LightFieldPageInput& input) {
     caption += fmt::format(
         " Its rms is {:.2f} grey levels, the photograph's noise {:.2f} per "
         "channel.",
-        kGreyLevels * *input.estimate->residual_rms, kGreyLevels * *input.estimate->noise_sigma);
+        kLevelsOfFigure * *input.estimate->residual_rms,
+        kLevelsOfFigure * *input.estimate->noise_sigma);
   }
   return Figure(
       fmt::format("<div class=\"pictures\" style=\"--columns: 1\"><div>{}{}</div></div>\n",

@@ -6,14 +6,12 @@
 #include <algorithm>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 
 #include "commands.h"
 #include "depth_io.h"
 #include "image_io.h"
 #include "light_field_effects.h"
-#include "light_field_io.h"
 #include "naming_the_file.h"
 #include "option_values.h"
 #include "thicklens/error.h"
@@ -25,52 +23,10 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr int kDefaultViews = 7;
-
 model::StoredPicture ReadPhoto(const std::string& path) {
   const model::StoredPicture picture = ToStoredPicture(ReadPictureFile(path));
   if (picture.channels == 4) spdlog::warn("{}: its alpha channel is left out", path);
   return WithoutAlpha(picture);
-}
-
-model::ApertureShape ShapeFor(const EstimateOptions& options,
-                              const std::optional<model::Camera>& camera) {
-  const model::ApertureShape usual = IsLeftOut(options.effects, model::Effect::kApertureShape)
-                                         ? model::ApertureShape::kGaussian
-                                     : camera ? model::ApertureShapeOf(camera->psf)
-                                              : model::ApertureShape::kUniform;
-  return ApertureShapeOr(options.aperture_shape, usual);
-}
-
-// The share of each view in the photograph, and how many views there are.
-Eigen::ArrayXXd ViewWeights(const EstimateOptions& options,
-                            const std::optional<model::Camera>& camera) {
-  if (!options.aperture_of.empty()) {
-    LightFieldReading reading;
-    reading.grid = options.grid;
-    reading.sparse = options.sparse;
-    std::tie(reading.u_count, reading.v_count) = ViewCounts(options.views);
-    const model::LightField light_field = ReadLightField(options.aperture_of, reading);
-    Eigen::ArrayXXd weights = light_field.weights;
-    for (int l = 0; l < light_field.v_count; ++l) {
-      for (int k = 0; k < light_field.u_count; ++k) {
-        if (!light_field.IsPresent(k, l)) weights(l, k) = 0;
-      }
-    }
-    return weights / weights.sum();
-  }
-  auto [u_count, v_count] = ViewCounts(options.views);
-  if (u_count == 0) u_count = v_count = kDefaultViews;
-  return model::ApertureWeights(ShapeFor(options, camera), u_count, v_count);
-}
-
-std::string ApertureInWords(const EstimateOptions& options,
-                            const std::optional<model::Camera>& camera) {
-  if (!options.aperture_of.empty()) return "of " + options.aperture_of;
-  const std::string shape = model::ApertureShapeName(ShapeFor(options, camera));
-  if (!options.aperture_shape.empty()) return shape;
-  const bool is_the_cameras = camera && !IsLeftOut(options.effects, model::Effect::kApertureShape);
-  return shape + (is_the_cameras ? " (as the camera says)" : " (assumed)");
 }
 
 // The camera behind a picture, which may be a part of its sensor, and of that the crop.
@@ -226,10 +182,13 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   input.camera = CameraFor(options, full_width_px, full_height_px, crop);
   input.transfer = TransferFor(options, input.camera);
   input.picture = model::ToLinear(stored, input.transfer);
-  input.weights = ViewWeights(options, input.camera);
-  prepared.aperture = ApertureInWords(options, input.camera);
+  prepared.aperture = ApertureFor(options, input.camera ? &*input.camera : nullptr);
+  input.weights = prepared.aperture.weights;
   CheckViewCounts(input.weights);
-  if (input.camera) input.grid = GridFor(options, *input.camera, input.weights);
+  if (input.camera) {
+    input.grid = GridFor(options, *input.camera, input.weights);
+    WarnOfOtherSteps(options, prepared.aperture, *input.grid);
+  }
   prepared.depth =
       PrepareDepth(map, options.depth_path, options.depth, input.picture,
                    input.camera ? &*input.camera : nullptr, input.grid ? &*input.grid : nullptr);

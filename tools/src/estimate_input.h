@@ -2,9 +2,9 @@
 #define THICKLENS_TOOLS_ESTIMATE_INPUT_H_
 
 #include <optional>
-#include <string>
 #include <utility>
 
+#include "estimate_aperture.h"
 #include "estimate_options.h"
 #include "light_field_options.h"
 #include "thicklens/estimator/aperture_blur.h"
@@ -18,7 +18,7 @@ struct PreparedEstimate {
   PreparedDepth depth;  // without its disparity, which is the input's
   // Of the disparity, px per view step: as it was, and what is left of it where it was smoothed.
   std::optional<double> depth_noise_px, depth_noise_left_px;
-  std::string aperture;                                  // its shape and who says so, for people
+  EstimateAperture aperture;
   std::optional<estimator::ApertureBlur> aperture_blur;  // with a camera
 };
 

@@ -84,8 +84,11 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
   AddViewsOption(command, &options->views, "Views across and down; default 7x7");
   AddApertureShapeOption(command, &options->aperture_shape);
   command
-      ->add_option("--aperture-of", options->aperture_of,
-                   "Take the views, and which of them the photograph saw, from this light field")
+      ->add_option(
+          "--aperture-of", options->aperture_of,
+          "Take the views, and which of them the photograph saw, from this light field; how "
+          "it weighs them too, where its lightfield.yaml states that, else by "
+          "--aperture-shape")
       ->type_name("LF");
   command->add_option("--grid", options->grid, "Of --aperture-of: row length of the HCI numbering")
       ->check(CLI::Range(1, 1000))
@@ -350,8 +353,6 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
   needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
   needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
-  needs(!options.aperture_shape.empty(), !aperture_of,
-        "--aperture-shape and --aperture-of exclude each other");
   needs(IsLeftOut(options.effects, model::Effect::kApertureShape),
         options.aperture_shape.empty() && !aperture_of,
         "--aperture-shape and --aperture-of say which shape the aperture has; without the effect "

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "peak_memory.h"
+#include "printable_text.h"
 
 namespace thicklens::tools {
 namespace {
@@ -207,7 +208,7 @@ std::string ApertureBlurText(const estimator::ApertureBlur& blur) {
     return fmt::format("{:.4g} mm along {} ({:+.2f} % in the corners)", blur.sigma_mm[axis], name,
                        100 * blur.corner_change[axis]);
   };
-  return fmt::format("aperture     blur sigma {}, {}; calibrated {:.4g} mm\n", along(0, "u"),
+  return fmt::format("blur         aperture sigma {}, {}; calibrated {:.4g} mm\n", along(0, "u"),
                      along(1, "v"), blur.calibrated_sigma_mm);
 }
 
@@ -336,6 +337,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
               {"channels", light_field.channels},
               {"transfer", prepared.input.transfer.Name()},
               {"transfer_from", TransferFrom(options)},
+              {"aperture", prepared.aperture.Json()},
               {"seconds",
                {{"read", seconds.read},
                 {"setup", seconds.setup},
@@ -388,6 +390,7 @@ std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome
   text += fmt::format("light field  {} x {} views of {} x {} px, {} channel(s)\n",
                       light_field.u_count, light_field.v_count, light_field.s_count,
                       light_field.t_count, light_field.channels);
+  text += fmt::format("aperture     {}\n", PrintableUtf8(prepared.aperture.InWords()));
   if (prepared.aperture_blur) text += ApertureBlurText(*prepared.aperture_blur);
   text += SolverText(summary, outcome);
   text += fmt::format("device       {}, {} thread(s)\n", summary["device"].get<std::string>(),

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "aperture_statement.h"
 #include "commands.h"
 #include "image_io.h"
 #include "interrupt.h"
@@ -174,9 +175,12 @@ Eigen::ArrayXXd WeightsOf(const RenderOptions& options, const model::LightField&
     return estimator::WeightsForRadius(light_field, *options.aperture_radius);
   }
   if (options.aperture_shape.empty()) {
-    (*details)["aperture_shape"] = "own";
+    const bool is_stated = StatesAperture(options.light_field);
+    (*details)["aperture_shape"] = is_stated ? "own" : "uniform";
+    (*details)["aperture_from"] = is_stated ? "light-field" : "assumed";
     return light_field.weights;
   }
+  (*details)["aperture_from"] = "option";
   (*details)["aperture_shape"] = options.aperture_shape;
   return model::ApertureWeights(model::ApertureShapeFromName(options.aperture_shape),
                                 light_field.u_count, light_field.v_count);
@@ -187,8 +191,9 @@ std::string ApertureText(const RenderOptions& options, const model::LightField& 
     return fmt::format("an aperture of {:g} {}", *options.aperture_radius,
                        light_field.camera ? "mm" : "view steps");
   }
-  return options.aperture_shape.empty() ? "the light field's own aperture"
-                                        : fmt::format("a {} aperture", options.aperture_shape);
+  if (!options.aperture_shape.empty()) return fmt::format("a {} aperture", options.aperture_shape);
+  return StatesAperture(options.light_field) ? "the light field's own aperture"
+                                             : "a uniform aperture (assumed)";
 }
 
 // Those of the effects that are on.

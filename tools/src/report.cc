@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "aperture_statement.h"
 #include "build_info.h"
 #include "commands.h"
 #include "depth_io.h"
@@ -102,6 +103,10 @@ model::LightField ReadTruth(const ReportOptions& options, const model::LightFiel
                             light_field.channels));
   }
   RequireSameViewpoints(options, truth, light_field);
+  if (const auto warning =
+          DifferentApertures(options.truth_path, truth, options.light_field_path, light_field)) {
+    spdlog::warn("{}", *warning);
+  }
   if (truth.u_count == light_field.u_count && truth.v_count == light_field.v_count) return truth;
   return NamingTheFile(options.truth_path, [&] {
     return model::InnerViews(truth, light_field.u_count, light_field.v_count);

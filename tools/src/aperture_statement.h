@@ -1,0 +1,41 @@
+#ifndef THICKLENS_TOOLS_APERTURE_STATEMENT_H_
+#define THICKLENS_TOOLS_APERTURE_STATEMENT_H_
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "thicklens/model/light_field.h"
+#include "thicklens/model/light_field_grid.h"
+
+namespace thicklens::tools {
+
+// Whether the folder of a light field states how the aperture weighs its views. The `weights` of
+// lightfield.yaml do; the HCI layout has no place for it, and its views are read as equal shares.
+bool StatesAperture(const std::string& light_field_path);
+
+// What `shape` gives the views that there are, V x U, sum 1.
+Eigen::ArrayXXd ShapeOfPresentViews(model::ApertureShape shape,
+                                    const model::LightField& light_field);
+// The light field's own weights of the views that there are, sum 1.
+Eigen::ArrayXXd OwnWeightsOfPresentViews(const model::LightField& light_field);
+
+// The name of the shape whose weights the light field has, or "weights of no known shape".
+std::string OwnApertureInWords(const model::LightField& light_field);
+
+// Throws Error with both values where the light field's file states an aperture and its weights are
+// not those of `shape`. `asked` says who asks for that shape: "--aperture-shape gaussian".
+void RequireStatedAperture(const std::string& light_field_path,
+                           const model::LightField& light_field, model::ApertureShape shape,
+                           const std::string& asked);
+
+// One line where the files of two light fields state apertures of different shapes: their views are
+// the same, but an estimate for another aperture than the photograph's is worse for it.
+std::optional<std::string> DifferentApertures(const std::string& path,
+                                              const model::LightField& light_field,
+                                              const std::string& other_path,
+                                              const model::LightField& other);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_APERTURE_STATEMENT_H_
