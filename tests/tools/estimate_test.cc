@@ -307,6 +307,7 @@ TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
               HasSubstr("--device cpu is not for"));
   EXPECT_THAT(Refusal(With(relative, {"--sparse"}), 2), HasSubstr("--aperture-of"));
   EXPECT_THAT(Refusal(With(relative, {"--grid", "9"}), 2), HasSubstr("--aperture-of"));
+  EXPECT_THAT(Refusal(With(relative, {"--ignore-exif"}), 2), HasSubstr("--camera"));
   for (const Arguments& of_scene :
        std::vector<Arguments>{{"--prior", "tv"}, {"--strength", "auto"}}) {
     EXPECT_THAT(Refusal(With(relative, of_scene), 2),

@@ -134,6 +134,7 @@ SourcePicture Given(const BenchSourceOptions& options, int views) {
   EstimateOptions given = options.given;
   given.common = options.common;
   given.views.text = fmt::format("{0}x{0}", views);
+  given.ignore_exif = true;  // times do not depend on it
   PreparedEstimate prepared = PrepareEstimate(given);
   SourcePicture picture;
   picture.name = std::filesystem::path(given.picture_path).stem().string();

@@ -10,6 +10,7 @@
 
 #include "commands.h"
 #include "depth_io.h"
+#include "exif_check.h"
 #include "image_io.h"
 #include "light_field_effects.h"
 #include "naming_the_file.h"
@@ -31,12 +32,16 @@ model::StoredPicture ReadPhoto(const std::string& path) {
 
 // The camera behind a picture, which may be a part of its sensor, and of that the crop.
 std::optional<model::Camera> CameraFor(const EstimateOptions& options, int width_px, int height_px,
-                                       const std::optional<model::PixelRect>& crop) {
+                                       const std::optional<model::PixelRect>& crop,
+                                       nlohmann::json* exif) {
   if (options.camera_path.empty()) return std::nullopt;
   model::Camera camera = model::ReadCamera(options.camera_path);
   if (!options.transfer.empty())
     camera.sensor.transfer = model::TransferCurve::FromName(options.transfer);
   TellAssumedFields(camera);
+  *exif =
+      RequireSameCamera(options.picture_path, options.camera_path, camera,
+                        {width_px, height_px, !options.sensor_origin.empty()}, options.ignore_exif);
   if (!options.sensor_origin.empty()) {
     const auto origin = SplitPixels("--sensor-origin", options.sensor_origin, ',', "X,Y");
     if (origin.size() != 2) {
@@ -179,7 +184,7 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   }
   PreparedEstimate prepared;
   estimator::EstimateInput& input = prepared.input;
-  input.camera = CameraFor(options, full_width_px, full_height_px, crop);
+  input.camera = CameraFor(options, full_width_px, full_height_px, crop, &prepared.exif);
   input.transfer = TransferFor(options, input.camera);
   input.picture = model::ToLinear(stored, input.transfer);
   prepared.aperture = ApertureFor(options, input.camera ? &*input.camera : nullptr);

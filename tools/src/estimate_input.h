@@ -1,6 +1,7 @@
 #ifndef THICKLENS_TOOLS_ESTIMATE_INPUT_H_
 #define THICKLENS_TOOLS_ESTIMATE_INPUT_H_
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
@@ -20,6 +21,8 @@ struct PreparedEstimate {
   std::optional<double> depth_noise_px, depth_noise_left_px;
   EstimateAperture aperture;
   std::optional<estimator::ApertureBlur> aperture_blur;  // with a camera
+  // How the photograph's EXIF agrees with the camera file; null: there is none, or no camera.
+  nlohmann::json exif;
 };
 
 // Least and largest disparity, px per view step along u, or along v where there is one view in u.

@@ -62,6 +62,9 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
       ->add_option("--sensor-origin", options->sensor_origin,
                    "Where on the camera's sensor a picture of a part of it begins, px")
       ->type_name("X,Y");
+  command->add_flag("--ignore-exif", options->ignore_exif,
+                    "Go on where the photograph's EXIF says that it was taken with another lens, "
+                    "setting or sensor than the camera file describes");
   command->add_option("-o,--output", options->output_folder, "Folder for the light field")
       ->required()
       ->type_name("LF");
@@ -351,6 +354,7 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   const bool camera = !options.camera_path.empty();
   const bool aperture_of = !options.aperture_of.empty();
   needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
+  needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, which EXIF may contradict");
   needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
   needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
   needs(IsLeftOut(options.effects, model::Effect::kApertureShape),

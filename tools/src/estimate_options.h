@@ -30,6 +30,7 @@ struct EstimateOptions {
   int grid = 0;
   bool sparse = false;
   std::string sensor_origin;
+  bool ignore_exif = false;  // of the photograph, where it contradicts the camera file
   std::optional<double> st_depth_mm;
   std::string transfer;
   std::string solver = "scene";

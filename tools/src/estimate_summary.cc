@@ -338,6 +338,7 @@ json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepar
               {"transfer", prepared.input.transfer.Name()},
               {"transfer_from", TransferFrom(options)},
               {"aperture", prepared.aperture.Json()},
+              {"exif", prepared.exif},
               {"seconds",
                {{"read", seconds.read},
                 {"setup", seconds.setup},

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdint>
+#include <exception>
 #include <exiv2/exiv2.hpp>
+#include <limits>
 
 #include "thicklens/error.h"
 
@@ -31,6 +34,40 @@ double ResolutionUnitMm(const Exiv2::ExifData& exif) {
   return 25.4;
 }
 
+std::optional<int> WholePixels(const Exiv2::ExifData& exif, const char* key) {
+  const std::optional<double> value = PositiveValue(exif, key);
+  constexpr double kMostPx = 1e6;
+  if (!value || *value != std::floor(*value) || *value > kMostPx) return std::nullopt;
+  return static_cast<int>(*value);
+}
+
+// EXIF 2.3: metres; all bits of the numerator set: infinity; 0: unknown.
+std::optional<double> SubjectDistanceMm(const Exiv2::ExifData& exif) {
+  constexpr char kKey[] = "Exif.Photo.SubjectDistance";
+  constexpr double kMmPerMetre = 1000;
+  const auto found = exif.findKey(Exiv2::ExifKey(kKey));
+  if (found == exif.end() || found->count() == 0) return std::nullopt;
+  if (found->toString().rfind("4294967295/", 0) == 0 || found->toRational().first == -1) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const std::optional<double> metres = PositiveValue(exif, kKey);
+  if (!metres) return std::nullopt;
+  return *metres * kMmPerMetre;
+}
+
+void TakePicture(const Exiv2::ExifData& exif, PhotoExif* photo) {
+  photo->subject_distance_mm = SubjectDistanceMm(exif);
+  photo->focal_length_35mm = PositiveValue(exif, "Exif.Photo.FocalLengthIn35mmFilm");
+  photo->digital_zoom = PositiveValue(exif, "Exif.Photo.DigitalZoomRatio");
+  photo->made_width_px = WholePixels(exif, "Exif.Photo.PixelXDimension");
+  photo->made_height_px = WholePixels(exif, "Exif.Photo.PixelYDimension");
+  const auto orientation = exif.findKey(Exiv2::ExifKey("Exif.Image.Orientation"));
+  if (orientation != exif.end() && orientation->count() > 0) {
+    const std::int64_t value = orientation->toLong();
+    if (value >= 1 && value <= 8) photo->orientation = static_cast<int>(value);
+  }
+}
+
 // The resolution is that of the picture as the camera made it: of a picture that was made smaller
 // or cut since, nobody knows which, it says nothing.
 void TakePitch(const Exiv2::ExifData& exif, int width_px, int height_px, PhotoExif* photo) {
@@ -39,6 +76,9 @@ void TakePitch(const Exiv2::ExifData& exif, int width_px, int height_px, PhotoEx
   if (!x_per_unit) {
     photo->why_no_pitch = "EXIF has no FocalPlaneXResolution";
     return;
+  }
+  if (!y_per_unit || std::abs(*y_per_unit / *x_per_unit - 1) <= kMaxPitchMismatch) {
+    photo->made_pixel_pitch_mm = ResolutionUnitMm(exif) / *x_per_unit;
   }
   const double made_width_px = PositiveValue(exif, "Exif.Photo.PixelXDimension").value_or(width_px);
   const double made_height_px =
@@ -59,6 +99,12 @@ void TakePitch(const Exiv2::ExifData& exif, int width_px, int height_px, PhotoEx
 
 }  // namespace
 
+bool PhotoExif::IsEmpty() const {
+  return !focal_length_mm && !f_number && !subject_distance_mm && !focal_length_35mm &&
+         !made_pixel_pitch_mm && !made_width_px && !made_height_px && !digital_zoom &&
+         orientation == 1;
+}
+
 PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px) {
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   PhotoExif photo;
@@ -71,10 +117,23 @@ PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px) {
     TakePitch(exif, width_px, height_px, &photo);
     const auto model = exif.findKey(Exiv2::ExifKey("Exif.Image.Model"));
     if (model != exif.end()) photo.model = model->toString();
+    TakePicture(exif, &photo);
   } catch (const Exiv2::AnyError& error) {
     throw Error(fmt::format("{}: its metadata cannot be read: {}", path, error.what()));
   }
   return photo;
+}
+
+PhotoExif ReadExifIfAny(const std::string& path, int width_px, int height_px, std::string* why) {
+  Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
+  why->clear();
+  try {
+    if (Exiv2::ImageFactory::getType(path) == Exiv2::ImageType::none) return {};
+    return ReadPhotoExif(path, width_px, height_px);
+  } catch (const std::exception& error) {
+    *why = error.what();
+    return {};
+  }
 }
 
 }  // namespace thicklens::tools
