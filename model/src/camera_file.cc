@@ -8,7 +8,7 @@
 
 #include "former_blur_ratio.h"
 #include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/model/input_file.h"
 #include "thicklens/model/yaml_reader.h"
 
 namespace thicklens::model {
@@ -286,7 +286,7 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
   return camera;
 }
 
-Camera ReadCamera(const std::string& path) { return ParseCamera(ReadWholeFile(path), path); }
+Camera ReadCamera(const std::string& path) { return ParseCamera(ReadTextFile(path), path); }
 
 std::string CameraToYaml(const Camera& camera) { return Writer(camera).Write(); }
 

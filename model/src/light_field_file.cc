@@ -8,7 +8,7 @@
 #include <cstddef>
 
 #include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/model/input_file.h"
 #include "thicklens/model/yaml_reader.h"
 
 namespace thicklens::model {
@@ -304,7 +304,7 @@ LightFieldDescription ParseLightFieldDescription(const std::string& text,
 }
 
 LightFieldDescription ReadLightFieldDescription(const std::string& path) {
-  return ParseLightFieldDescription(ReadWholeFile(path), path);
+  return ParseLightFieldDescription(ReadTextFile(path), path);
 }
 
 std::string LightFieldDescriptionToYaml(const LightFieldDescription& description) {

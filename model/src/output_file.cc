@@ -12,7 +12,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <new>
 #include <system_error>
@@ -361,24 +360,6 @@ void OutputFolder::Commit() {
 
 void WriteFileAtomically(const std::string& path, const std::string& content) {
   OutputFile(path).Commit(content);
-}
-
-std::string ReadWholeFile(const std::string& path) {
-  std::error_code ignored;
-  if (fs::is_directory(path, ignored))
-    throw Error(fmt::format("{}: is a folder; a file is expected", path));
-  errno = 0;
-  std::ifstream in(path, std::ios::binary);
-  if (!in)
-    throw Error(
-        fmt::format("{}: cannot be read: {}", path, std::strerror(errno != 0 ? errno : EIO)));
-  // Not by `<< in.rdbuf()`, which takes a read error for the end of the file.
-  std::string content;
-  char block[1 << 16];
-  while (in.read(block, sizeof block) || in.gcount() > 0)
-    content.append(block, static_cast<std::size_t>(in.gcount()));
-  if (in.bad()) throw Error(fmt::format("{}: cannot be read to its end", path));
-  return content;
 }
 
 }  // namespace thicklens::model

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/model/input_file.h"
 
 namespace thicklens::model {
 namespace {
@@ -53,7 +53,7 @@ std::optional<double> ToNumber(const std::string& cell) {
 }  // namespace
 
 std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
-  std::string text = ReadWholeFile(path);
+  std::string text = ReadTextFile(path);
   if (text.rfind("\xEF\xBB\xBF", 0) == 0) text.erase(0, 3);  // a spreadsheet's byte order mark
   csv_parser parser;
   if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL) != 0)

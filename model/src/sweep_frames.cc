@@ -11,6 +11,7 @@
 
 #include "readings_table.h"
 #include "thicklens/error.h"
+#include "thicklens/model/input_file.h"
 
 namespace thicklens::model {
 namespace {
@@ -73,6 +74,16 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
   return files;
 }
 
+// Frames are read long after their names are known.
+void RequireFrame(const std::string& path, const std::string& place) {
+  TellInput(path);
+  try {
+    RequireRegularFile(path);
+  } catch (const Error& error) {
+    throw Error(place + error.what());
+  }
+}
+
 // Brings table rows and picture files together by name; each must have its partner.
 std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
                                          const std::string& table,
@@ -83,7 +94,7 @@ std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
   for (const ReadingRow& row : rows) {
     std::string path = (fs::path(folder) / row.file).lexically_normal().string();
     std::error_code failure;
-    if (!fs::is_regular_file(path, failure)) {
+    if (!fs::exists(path, failure)) {
       const auto same_name = [&](const std::string& file) {
         return fs::path(file).filename() == row.file;
       };
@@ -99,6 +110,7 @@ std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
       }
       path = fs::path(*match).lexically_normal().string();
     }
+    RequireFrame(path, fmt::format("{}:{}: ", table, row.line));
     if (!used.insert(path).second) {
       throw Error(
           fmt::format("{}:{}: the file '{}' has a reading already", table, row.line, row.file));
@@ -151,8 +163,13 @@ std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit
     const YamlNode image = node.At("image");
     const std::string path = image.ResolvePath(image.Text());
     std::error_code failure;
-    if (!fs::is_regular_file(path, failure))
+    if (!fs::exists(path, failure))
       throw image.ErrorHere(fmt::format("the file '{}' does not exist", path));
+    try {
+      RequireRegularFile(path);
+    } catch (const Error& error) {
+      throw image.ErrorHere(error.what());
+    }
     if (!images.insert(path).second)
       throw image.ErrorHere(fmt::format("'{}' stands in this list twice", image.Text()));
     frames.push_back({path, node.At("reading_mm").Number()});

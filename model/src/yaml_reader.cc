@@ -11,7 +11,7 @@
 #include <set>
 #include <sstream>
 
-#include "thicklens/model/output_file.h"
+#include "thicklens/model/input_file.h"
 
 namespace thicklens::model {
 namespace {
@@ -118,7 +118,7 @@ struct YamlNode::Impl {
   std::string path;
 };
 
-YamlNode YamlNode::LoadFile(const std::string& path) { return Parse(ReadWholeFile(path), path); }
+YamlNode YamlNode::LoadFile(const std::string& path) { return Parse(ReadTextFile(path), path); }
 
 YamlNode YamlNode::Parse(const std::string& text, const std::string& source_name) {
   try {
@@ -287,8 +287,11 @@ const std::string& YamlNode::source() const { return impl_->source; }
 
 std::string YamlNode::ResolvePath(const std::string& relative) const {
   const std::filesystem::path path(relative);
-  if (path.is_absolute()) return relative;
-  return (std::filesystem::path(impl_->source).parent_path() / path).lexically_normal().string();
+  const std::filesystem::path folder = std::filesystem::path(impl_->source).parent_path();
+  const std::string resolved =
+      path.is_absolute() ? relative : (folder / path).lexically_normal().string();
+  TellInput(resolved);
+  return resolved;
 }
 
 std::string YamlNumber(double value) { return fmt::format("{}", value); }

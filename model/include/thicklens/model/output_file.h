@@ -62,7 +62,8 @@ class OutputFolder {
 // Claims, writes and commits in one step.
 void WriteFileAtomically(const std::string& path, const std::string& content);
 
-// The whole content of a file; throws Error naming the path and the reason.
+// The whole content of a file that is an input; throws Error naming the path and the reason. See
+// input_file.h for what is refused, and for texts.
 std::string ReadWholeFile(const std::string& path);
 
 }  // namespace thicklens::model
