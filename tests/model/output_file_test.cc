@@ -30,6 +30,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::MatchesRegex;
 using ::testing::StartsWith;
 using ::thicklens::testing::ContentOf;
 using ::thicklens::testing::ErrorOf;
@@ -50,7 +51,7 @@ int InChildProcess(const Work& work) {
 TEST(OutputFile, NothingAtTheTargetBeforeCommit) {
   const TemporaryFolder folder;
   OutputFile file(folder / "a.yaml");
-  EXPECT_THAT(folder.Entries(), ElementsAre(".a.yaml.part"));
+  EXPECT_THAT(folder.Entries(), ElementsAre(MatchesRegex("[.]a[.]yaml[.][0-9a-f]{16}[.]part")));
   file.Commit("content\n");
   EXPECT_THAT(folder.Entries(), ElementsAre("a.yaml"));
   EXPECT_EQ(ContentOf(folder / "a.yaml"), "content\n");
@@ -67,9 +68,9 @@ TEST(OutputFile, WithoutCommitTheOldFileStays) {
   EXPECT_EQ(ContentOf(folder / "a.yaml"), "new, shorter or longer");
 }
 
-TEST(OutputFile, StalePartIsTakenOverWithoutItsContent) {
+TEST(OutputFile, PartOfAKilledRunIsRemoved) {
   const TemporaryFolder folder;
-  folder.Put(".a.yaml.part", "left behind by a killed run, longer than what comes now");
+  folder.Put(".a.yaml.0123456789abcdef.part", "left behind by a killed run");
   WriteFileAtomically(folder / "a.yaml", "new");
   EXPECT_THAT(folder.Entries(), ElementsAre("a.yaml"));
   EXPECT_EQ(ContentOf(folder / "a.yaml"), "new");
@@ -97,7 +98,7 @@ TEST(OutputFile, LockOfAKilledRunIsGone) {
     auto* file = new OutputFile(folder / "a.yaml");
     return file->path().empty() ? 1 : 0;
   });
-  EXPECT_THAT(folder.Entries(), ElementsAre(".a.yaml.part"));
+  EXPECT_THAT(folder.Entries(), ElementsAre(HasSubstr(".part")));
   WriteFileAtomically(folder / "a.yaml", "new");
   EXPECT_THAT(folder.Entries(), ElementsAre("a.yaml"));
 }
@@ -136,8 +137,8 @@ TEST(OutputFile, MissingFolderAndFolderAsTarget) {
   EXPECT_THAT(ErrorOf([&] { OutputFile file(folder.path()); }), HasSubstr("is a folder"));
   EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / "a/"); }), HasSubstr("is a folder"));
   EXPECT_THAT(ErrorOf([&] { OutputFile file(""); }), HasSubstr("empty"));
-  EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / std::string(255, 'a')); }),
-              HasSubstr("cannot be written"));
+  EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / std::string(256, 'a')); }),
+              HasSubstr("cannot be written: File name too long"));
   EXPECT_THAT(folder.Entries(), IsEmpty());
 }
 
@@ -187,7 +188,7 @@ TEST(OutputFile, MovesWithItsClaim) {
   OutputFile b(std::move(a));
   OutputFile c(folder / "c");
   c = std::move(b);  // drops the claim on c
-  EXPECT_THAT(folder.Entries(), ElementsAre(".a.part"));
+  EXPECT_THAT(folder.Entries(), ElementsAre(HasSubstr(".a.")));
   c.Commit("x");
   EXPECT_THAT(folder.Entries(), ElementsAre("a"));
 }
@@ -349,7 +350,7 @@ TEST(OutputFolder, NobodysFolderIsInTheWay) {
 
 TEST(OutputFolder, StaleStagingIsEmptiedAndSecondClaimantRefused) {
   const TemporaryFolder folder;
-  folder.Put(".out.part/frames/stale.png", "x");
+  folder.Put(".out.0123456789abcdef.part/frames/stale.png", "x");
   OutputFolder out(folder / "out", kMarker);
   EXPECT_THAT(ErrorOf([&] { OutputFolder second(folder / "out/", kMarker); }),
               HasSubstr("another run"));
@@ -398,28 +399,31 @@ TEST(OutputFolder, VanishedMeanwhileIsAnError) {
   // Somebody who made the folders again has not made what was in them.
   fs::create_directory(parent);
   OutputFolder output(parent + "/out", "marker");
+  const std::string staging = output.staging_path();
   output.Write("marker", "1");
   vanish();
-  fs::create_directories(parent + "/.out.part");
+  fs::create_directories(staging);
   {
     OutputFolder dropped = std::move(output);
     EXPECT_THAT(ErrorOf([&] { dropped.Commit(); }), HasSubstr(why));
   }
   // What somebody else made there is not taken away.
-  EXPECT_TRUE(fs::exists(parent + "/.out.part"));
+  EXPECT_TRUE(fs::exists(staging));
 }
 
 TEST(OutputFile, VanishedMeanwhileIsAnError) {
   const TemporaryFolder folder;
+  std::string part;
   {
     OutputFile output(folder / "out");
-    fs::remove(folder / ".out.part");
-    folder.Put(".out.part", "of somebody else");
+    part = folder.Entries().at(0);
+    fs::remove(folder / part);
+    folder.Put(part, "of somebody else");
     EXPECT_THAT(ErrorOf([&] { output.Commit("mine"); }),
                 HasSubstr("was removed or renamed by somebody else"));
   }
   EXPECT_FALSE(fs::exists(folder / "out"));
-  EXPECT_EQ(ContentOf(folder / ".out.part"), "of somebody else");
+  EXPECT_EQ(ContentOf(folder / part), "of somebody else");
 }
 
 TEST(OutputFolder, IsThereAtEveryMomentWhileItIsReplaced) {

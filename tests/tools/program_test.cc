@@ -16,6 +16,7 @@
 
 #include "child_process.h"
 #include "image_io.h"
+#include "support/part_of.h"
 #include "support/temporary_folder.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/output_file.h"
@@ -481,10 +482,12 @@ TEST_F(ProgramTest, AFullDiskLeavesTheOlderOutputsWhole) {
 TEST_F(ProgramTest, AnInterruptLeavesNothingHalfWritten) {
   const std::string config = folder_.Put("config.yaml", SweepConfig(400, 2000));
   ChildProgram child({"simulate", "sweep", config, "-o", folder_ / "sweep"}, scratch_.path(), 0);
-  const fs::path frames = folder_ / ".sweep.part/frames";
   std::error_code not_yet;
-  while (child.Running() && !(fs::exists(frames, not_yet) && !fs::is_empty(frames, not_yet)))
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  const auto is_begun = [&] {
+    const fs::path frames = thicklens::testing::PartOf(folder_.path(), "sweep") + "/frames";
+    return fs::exists(frames, not_yet) && !fs::is_empty(frames, not_yet);
+  };
+  while (child.Running() && !is_begun()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   child.Interrupt();
   const ProgramResult result = child.Wait();
   EXPECT_EQ(result.exit_code, 1);

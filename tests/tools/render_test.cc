@@ -1,13 +1,11 @@
 // thicklens render as a person meets it.
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -22,6 +20,7 @@
 #include "image_io.h"
 #include "light_field_io.h"
 #include "picture_description.h"
+#include "support/part_of.h"
 #include "support/temporary_folder.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/output_file.h"
@@ -531,27 +530,20 @@ TEST_F(RenderTest, ABrokenOrMissingViewLeavesTheOlderOutput) {
   EXPECT_EQ(Rendered({folder_ / "hci", "--mosaic", "--sparse"}).bits, 8);
 }
 
-// The first view is a pipe, so that the program waits for it and is surely interrupted in time.
+// The program is held as soon as its output is claimed, so that it is surely interrupted in time.
 TEST_F(RenderTest, AnInterruptedRunLeavesTheOlderOutput) {
-  const std::string folder = Write("source", AtRandom(5, 5, 12));
+  const std::string folder = Write("source", AtRandom(9, 9, 12));
   const std::string out = folder_ / "lf";
   ASSERT_EQ(Run({folder, "--convert", "thicklens", "-o", out}).exit_code, 0);
   const std::string older = ContentOf(out + "/lightfield.yaml");
-  const std::string view = folder + "/views/view_00_00.tiff";
-  const std::string content = ContentOf(view);
-  fs::remove(view);
-  ASSERT_EQ(::mkfifo(view.c_str(), 0600), 0);
 
   ChildProgram child({"render", folder, "--convert", "thicklens", "-o", out}, scratch_.path(), 0);
-  int pipe = -1;
-  while (child.Running() && pipe < 0) {  // it opens once the program reads from it
-    pipe = ::open(view.c_str(), O_WRONLY | O_NONBLOCK);
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  ASSERT_GE(pipe, 0);
+  while (child.Running() && thicklens::testing::PartOf(folder_.path(), "lf").empty())
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  child.Send(SIGSTOP);
+  ASSERT_TRUE(child.Running());
   child.Interrupt();
-  EXPECT_EQ(::write(pipe, content.data(), content.size()), static_cast<ssize_t>(content.size()));
-  ::close(pipe);
+  child.Send(SIGCONT);
   const ProgramResult result = child.Wait();
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("interrupted"));

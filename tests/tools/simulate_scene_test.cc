@@ -17,6 +17,7 @@
 #include "depth_io.h"
 #include "image_io.h"
 #include "light_field_io.h"
+#include "support/part_of.h"
 #include "support/temporary_folder.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/scene_simulator.h"
@@ -320,7 +321,7 @@ TEST_F(SimulateSceneTest, AnInterruptLeavesNothingHalfWritten) {
   text.replace(text.find("[40, 30]"), 8, "[512, 512]");
   const std::string config = folder_.Put("scene.yaml", text);
   ChildProgram child({"simulate", "picture", config, "-o", folder_ / "out"}, scratch_.path(), 0);
-  while (child.Running() && !fs::exists(folder_ / ".out.part"))
+  while (child.Running() && thicklens::testing::PartOf(folder_.path(), "out").empty())
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   child.Interrupt();
   const ProgramResult result = child.Wait();

@@ -10,10 +10,17 @@ namespace thicklens::model {
 
 // An output file that appears whole or not at all.
 //
-// The constructor claims the name: it creates ".NAME.part" beside the target and locks it, so that
-// an unwritable folder or a second run with the same output is told before any work is done. Commit
-// writes, syncs and renames. Without Commit the destructor removes the part file and whatever stood
-// at the target stays as it was. A part file left by a killed run is taken over.
+// The constructor claims the name: it makes a new file ".NAME.RANDOM.part" beside the target and
+// locks it, so that an output that cannot be written, or that a second run is writing, is told
+// before any work is done. Commit writes, syncs and renames. Without Commit the destructor removes
+// the part file and whatever stood at the target stays as it was. A part file that a killed run has
+// left behind is removed. A symbolic link stays one: what it leads to is replaced. The file that is
+// replaced leaves its owner, group and permissions, as far as this user may give them, to the new
+// one.
+//
+// A file that cannot be replaced, because it is a mount point or its folder may not be written to,
+// is written into at Commit; a full disk then leaves it as it was, too, where the file system can
+// reserve space.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);  // throws Error
@@ -35,6 +42,11 @@ class OutputFile {
 // these are given; else the constructor and Commit throw Error that names what would be lost. An
 // own entry is the name of a file or folder, the folder with all that is in it, or "FOLDER/PATTERN"
 // for a folder that holds nothing but files whose names match one of its shell patterns.
+//
+// A folder that cannot be replaced, because it is a mount point or lies in a folder that may not be
+// written to, gets its new content at Commit entry by entry out of a part folder within it: the
+// older marker goes first, then the older content; the new marker comes last. "lost+found" in it is
+// left alone. What a run has left there that was killed meanwhile is removed by the next.
 class OutputFolder {
  public:
   OutputFolder(const std::string& path, const std::string& marker_file,
