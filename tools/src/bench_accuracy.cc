@@ -275,9 +275,13 @@ std::string AboutText(const BenchAccuracyOptions& options, const Backends& backe
       options.repeat, Version(), NowIso8601());
 }
 
+std::string ProfilePathOf(const BenchAccuracyOptions& options) {
+  return options.profile_path.empty() ? UserProfilePath() : options.profile_path;
+}
+
 // Claims a file in a folder that may have to be made.
 model::OutputFile ClaimProfile(const BenchAccuracyOptions& options) {
-  const std::string path = options.profile_path.empty() ? UserProfilePath() : options.profile_path;
+  const std::string path = ProfilePathOf(options);
   if (path.empty()) {
     throw UsageError(
         "--save-profile: neither XDG_CONFIG_HOME nor HOME is set; say which file is to be written");
@@ -431,8 +435,9 @@ void AddBenchAccuracyCommand(CLI::App* bench, CommandAction* action) {
       for (const std::string& scene : options->scenes) {
         if (!IsOfTheBench(scene)) files.push_back(scene);
       }
-      RequireDistinctFiles(
-          {options->common.json_path, options->report_folder, options->profile_path}, files);
+      RequireDistinctFiles({options->common.json_path, options->report_folder,
+                            options->save_profile ? ProfilePathOf(*options) : std::string()},
+                           files);
       RunCommand(options->common, [&] { return BenchAccuracy(*options); });
     };
   });

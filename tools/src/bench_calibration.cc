@@ -330,7 +330,6 @@ CommandResult BenchCalibration(const BenchCalibrationOptions& options) {
   const model::SweepSimulationOptions description =
       options.sweep_path.empty() ? BenchSweepOptions()
                                  : model::ReadSweepSimulation(options.sweep_path);
-  RequireDistinctFiles({options.report_folder, options.common.json_path}, {options.sweep_path});
   const Grid grid = GridOf(options, description);
   const int sweeps = options.sweeps.value_or(options.full ? kFullSweeps : kUsualSweeps);
   BenchReport report(options.report_folder);
@@ -386,6 +385,8 @@ void AddBenchCalibrationCommand(CLI::App* bench, CommandAction* action) {
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {
+      RequireDistinctFiles({options->report_folder, options->common.json_path},
+                           {options->sweep_path});
       RunCommand(options->common, [&] { return BenchCalibration(*options); });
     };
   });

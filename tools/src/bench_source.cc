@@ -290,7 +290,12 @@ void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
   AddDeviceOption(command, &options->device);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
-    *action = [options] { RunCommand(options->common, [&] { return BenchSource(*options); }); };
+    *action = [options] {
+      const EstimateOptions& given = options->given;
+      RequireDistinctFiles({options->common.json_path},
+                           {given.picture_path, given.depth_path, given.camera_path});
+      RunCommand(options->common, [&] { return BenchSource(*options); });
+    };
   });
 }
 

@@ -257,6 +257,12 @@ void AddCameraCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       ParseTexts(options.get());
+      if (options->output == "-") options->output.clear();
+      if (options->output.empty() && options->common.json_path == "-") {
+        throw UsageError(
+            "--json -: standard output is where the camera file goes; --output must name a file "
+            "for one of the two");
+      }
       RequireDistinctFiles({options->output, options->common.json_path}, {options->photo_path});
       RunCommand(options->common, [&] { return InitCamera(*options); });
     };

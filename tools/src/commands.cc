@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -13,9 +14,11 @@
 #include <system_error>
 
 #include "interrupt.h"
-#include "option_values.h"
+#include "printable_text.h"
+#include "run_files.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
+#include "thicklens/model/input_file.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/parallel.h"
 
@@ -25,70 +28,62 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMaxThreads = 1024;
+constexpr char kStandardOutput[] = "-";
 
 // File names may be any bytes, JSON may not: what is no UTF-8 is replaced.
 std::string JsonText(const nlohmann::json& summary) {
   return summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-bool SameFile(const std::string& a, const std::string& b) {
-  if (a.empty() || b.empty()) return false;
-  std::error_code failure;
-  if (fs::equivalent(a, b, failure)) return true;
-  return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal();
-}
-
-// The whole path, links followed as far as it exists, without a slash at its end.
-fs::path Resolved(const std::string& path) {
-  std::error_code failure;
-  fs::path resolved = fs::weakly_canonical(fs::absolute(path), failure);
-  if (failure) resolved = fs::absolute(path).lexically_normal();
-  return resolved.has_filename() ? resolved : resolved.parent_path();
-}
-
-// Whether `path` is somewhere below that folder.
-bool IsBelow(const std::string& path, const std::string& folder) {
-  if (path.empty() || folder.empty()) return false;
-  const fs::path inner = Resolved(path);
-  const fs::path outer = Resolved(folder);
-  const auto [in_inner, in_outer] =
-      std::mismatch(inner.begin(), inner.end(), outer.begin(), outer.end());
-  return in_outer == outer.end() && in_inner != inner.end();
-}
-
-// Every file in it is part of the light field or belongs beside it, not into it.
-bool IsLightField(const std::string& folder) {
-  std::error_code failure;
-  if (folder.empty() || !fs::is_directory(folder, failure)) return false;
-  if (fs::exists(fs::path(folder) / "lightfield.yaml", failure)) return true;
-  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end;
-       entry.increment(failure)) {
-    const fs::path name = entry->path().filename();
-    if (name.string().rfind("input_Cam", 0) == 0 && name.extension() == ".png") return true;
-  }
-  return false;
-}
-
-void RequireOutputBesideInput(const std::string& output, const std::string& input) {
-  if (SameFile(output, input))
-    throw UsageError(fmt::format("{}: this input would be overwritten", output));
+// Whether why nothing came of a run may be written there. A person who has mixed up names may have
+// meant one of the inputs, and a run that is refused early does not know all of them.
+bool MayTellRefusal(const std::string& path) {
   std::error_code ignored;
-  if (IsBelow(output, input) && IsLightField(input)) {
-    throw UsageError(
-        fmt::format("{}: lies in the light field {}, which is an input; choose a name outside of "
-                    "it",
-                    output, input));
-  }
-  if (IsBelow(input, output) && fs::is_directory(output, ignored)) {
-    throw UsageError(
-        fmt::format("{}: this folder holds the input {}; choose another name", output, input));
+  if (!fs::exists(path, ignored)) return true;
+  try {
+    const std::string older = model::ReadOwnFile(path, model::kMaxTextBytes);
+    const std::size_t first = older.find_first_not_of(" \t\r\n");
+    return first == std::string::npos || older[first] == '{';
+  } catch (const Error&) {
+    return false;
   }
 }
+
+// Where --json goes: a file that is claimed before anything is done, or standard output.
+class Summary {
+ public:
+  explicit Summary(const std::string& path) : path_(path) {
+    if (!path_.empty() && path_ != kStandardOutput) file_.emplace(path_);
+  }
+
+  void Write(const nlohmann::json& summary) {
+    const std::string text = JsonText(summary);
+    if (path_ == kStandardOutput) std::fwrite(text.data(), 1, text.size(), stdout);
+    if (!file_) return;
+    file_->Commit(text);
+    spdlog::debug("{} written", path_);
+  }
+  void WriteRefusal(const std::string& reason) {
+    if (file_ && !MayTellRefusal(path_)) {
+      spdlog::warn("{}: holds no JSON and is left as it is; the reason is not written there",
+                   PrintableUtf8(path_));
+      return;
+    }
+    Write({{"status", "refused"}, {"reason", reason}});
+  }
+
+ private:
+  std::string path_;
+  std::optional<model::OutputFile> file_;
+};
 
 }  // namespace
 
 void AddCommonOptions(CLI::App* command, CommonOptions* options) {
-  command->add_option("--json", options->json_path, "Write the results to this file, as JSON")
+  command
+      ->add_option(
+          "--json", options->json_path,
+          "Write the results to this file, as JSON; -: to standard output, in place of the text")
       ->type_name("FILE");
   CLI::Option* quiet = command->add_flag("--quiet", options->quiet, "Print no results");
   command->add_flag("--verbose", options->verbose, "Tell what is done")->excludes(quiet);
@@ -101,8 +96,8 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
   if (options.verbose) spdlog::set_level(spdlog::level::debug);
   // More than there are cores would not be faster, and the library below would complain.
   cv::setNumThreads(std::min(model::ResolveThreads(options.threads), model::ResolveThreads(0)));
-  std::optional<model::OutputFile> json;
-  if (!options.json_path.empty()) json.emplace(options.json_path);
+  EnterRunOutput(options.json_path);
+  Summary summary(options.json_path);
   CommandResult result;
   try {
     result = command();
@@ -110,13 +105,11 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
-    if (json) json->Commit(JsonText({{"status", "refused"}, {"reason", error.what()}}));
+    RethrowIfInputWouldBeLost();
+    summary.WriteRefusal(error.what());
     throw;
   }
-  if (json) {
-    json->Commit(JsonText(result.summary));
-    spdlog::debug("{} written", options.json_path);
-  }
+  summary.Write(result.summary);
   if (!result.refusal.empty()) throw Error(result.refusal);
 }
 
@@ -125,7 +118,8 @@ std::string NowIso8601() {
 }
 
 void PrintResult(const CommonOptions& options, const std::string& text) {
-  if (!options.quiet) std::fwrite(text.data(), 1, text.size(), stdout);
+  if (!options.quiet && options.json_path != kStandardOutput)
+    std::fwrite(text.data(), 1, text.size(), stdout);
 }
 
 void TellAssumedFields(const model::Camera& camera) {
@@ -134,17 +128,6 @@ void TellAssumedFields(const model::Camera& camera) {
   if (fields.empty()) return;
   spdlog::warn("camera '{}': assumed, neither published nor measured: {}",
                PrintableUtf8(camera.name), fmt::join(fields, ", "));
-}
-
-void RequireDistinctFiles(const std::vector<std::string>& outputs,
-                          const std::vector<std::string>& inputs) {
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      if (SameFile(outputs[i], outputs[j]))
-        throw UsageError(fmt::format("{}: two outputs have this name", outputs[i]));
-    }
-    for (const std::string& input : inputs) RequireOutputBesideInput(outputs[i], input);
-  }
 }
 
 }  // namespace thicklens::tools

@@ -7,13 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "run_files.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::tools {
 
 // What every command takes.
 struct CommonOptions {
-  std::string json_path;  // empty: none
+  std::string json_path;  // empty: none; "-": standard output, where no text goes then
   bool quiet = false;
   bool verbose = false;
   int threads = 0;  // 0: one per core
@@ -29,24 +30,18 @@ struct CommandResult {
 };
 
 // Runs a command with its --json file claimed before and written after it; an Error is written
-// there as `status: refused` with its reason. Throws what the command throws, and Error for a
-// refusal.
+// there as `status: refused` with its reason, unless an input might be lost by that. Throws what
+// the command throws, and Error for a refusal.
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command);
 
 // The moment, UTC, as in 2026-01-31T12:00:00Z.
 std::string NowIso8601();
 
-// Results go to stdout, unless --quiet.
+// Results go to stdout, unless --quiet or --json has it.
 void PrintResult(const CommonOptions& options, const std::string& text);
 
 // Names on stderr, in one line, which numbers of the camera are somebody's assumption.
 void TellAssumedFields(const model::Camera& camera);
-
-// Throws UsageError if two outputs, or an output and an input, are the same file, if an output lies
-// in an input that is the folder of a light field, or if an output is a folder that holds an input.
-// A folder of frames may well get its results. Empty paths are left out.
-void RequireDistinctFiles(const std::vector<std::string>& outputs,
-                          const std::vector<std::string>& inputs);
 
 // Each adds its command to the program. When the command line asks for it, `action` is set.
 using CommandAction = std::function<void()>;

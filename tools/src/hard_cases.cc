@@ -56,6 +56,7 @@ class Workplace {
       root_ = temporary_->path();
       return;
     }
+    if (keep_folder == "-") throw Error("--keep -: the name of a folder is expected");
     root_ = fs::absolute(keep_folder);
     std::error_code failure;
     fs::create_directories(root_, failure);

@@ -24,6 +24,7 @@
 #include "svg_plot.h"
 #include "thicklens/error.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/input_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "thicklens/model/parallel.h"
 
@@ -107,6 +108,23 @@ std::string ViewFile(int k, int l, const std::string& format) {
   return fmt::format("{}/{}.{}", kViewsFolder, model::ViewFileStem(k, l), format);
 }
 
+std::string ConfidenceFile(int k, int l) {
+  return fmt::format("{}/{}.png", kConfidenceFolder, model::ViewFileStem(k, l));
+}
+
+// Also those of views that nobody asks for: the light field as a whole is the input.
+void TellFilesOf(const std::string& folder, const model::LightFieldDescription& description) {
+  const model::LightField& frame = description.light_field;
+  for (int l = 0; l < frame.v_count; ++l) {
+    for (int k = 0; k < frame.u_count; ++k) {
+      if (!frame.IsPresent(k, l)) continue;
+      model::TellInput((fs::path(folder) / ViewFile(k, l, description.view_format)).string());
+      if (!description.has_confidence) continue;
+      model::TellInput((fs::path(folder) / ConfidenceFile(k, l)).string());
+    }
+  }
+}
+
 ViewSource OpenOwn(const std::string& folder, bool sparse) {
   const std::string description_path = (fs::path(folder) / kLightFieldMarker).string();
   const model::LightFieldDescription description =
@@ -133,6 +151,7 @@ ViewSource OpenOwn(const std::string& folder, bool sparse) {
     }
   }
   if (!missing.empty() && !sparse) throw MissingViews(folder, missing);
+  TellFilesOf(folder, description);
 
   const bool is_png = description.view_format == "png";
   source.read = [folder, is_png, format = description.view_format, transfer = frame.transfer](
@@ -174,7 +193,7 @@ int HciRowLength(const std::string& folder) {
   const std::string path = (fs::path(folder) / kHciMarker).string();
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return 0;
-  std::istringstream lines(model::ReadWholeFile(path));
+  std::istringstream lines(model::ReadTextFile(path));
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
     const auto equals = line.find('=');
@@ -209,6 +228,7 @@ ViewSource OpenHci(const std::string& folder, int grid, bool sparse) {
     throw Error(fmt::format("{}: no light field: neither {} nor {}, {}, ... are in it", folder,
                             kLightFieldMarker, HciFile(0), HciFile(1)));
   }
+  for (const int number : numbers) model::TellInput((fs::path(folder) / HciFile(number)).string());
   const int row = grid > 0 ? grid : InferredRowLength(folder, numbers);
   int first_u = row, last_u = 0;
   for (const int number : numbers) {
@@ -446,8 +466,7 @@ void LightFieldWriter::WriteView(int k, int l, const model::LinearPicture& view)
 void LightFieldWriter::WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
                                        int width_px) {
   const auto start = Clock::now();
-  folder_->Write(fmt::format("{}/{}.png", kConfidenceFolder, model::ViewFileStem(k, l)),
-                 EncodeBytesPng(confidence, width_px));
+  folder_->Write(ConfidenceFile(k, l), EncodeBytesPng(confidence, width_px));
   std::array<std::size_t, 256> counts{};
   for (const std::uint8_t value : confidence) ++counts[value];
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -487,7 +506,7 @@ model::OutputFolder ClaimHciFolder(const std::string& path) {
   const fs::path parameters = fs::path(path) / kHciMarker;
   std::error_code ignored;
   if (fs::exists(parameters, ignored) &&
-      model::ReadWholeFile(parameters.string()).rfind(kHciSignature, 0) != 0) {
+      model::ReadOwnFile(parameters.string(), model::kMaxTextBytes).rfind(kHciSignature, 0) != 0) {
     throw Error(
         fmt::format("{}: this folder holds a light field that thicklens did not write, and is not "
                     "replaced; choose another name",

@@ -12,6 +12,7 @@ namespace fs = std::filesystem;
 
 ReportFolder::ReportFolder(const std::string& path) : path_(path) {
   std::error_code failure;
+  if (path == "-") throw Error("-: a report cannot go to standard output; name a folder");
   if (path.empty() || fs::exists(path, failure)) return;
   made_ = fs::create_directory(path, failure);
   if (failure)

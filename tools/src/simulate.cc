@@ -156,7 +156,8 @@ void AddSimulateCommand(CLI::App* program, CommandAction* action) {
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {
-      RequireDistinctFiles({options->common.json_path}, {options->config_path});
+      RequireDistinctFiles({options->common.json_path, options->output_folder},
+                           {options->config_path});
       RunCommand(options->common, [&] { return SimulateSweep(*options); });
     };
   });

@@ -268,7 +268,7 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
       if (!picture->sweep_path.empty() && !picture->attribute) {
         throw UsageError("--sweep belongs to --attribute");
       }
-      RequireDistinctFiles({picture->common.json_path},
+      RequireDistinctFiles({picture->common.json_path, picture->output_folder},
                            {picture->config_path, picture->sweep_path});
       RunCommand(picture->common, [&] { return SimulatePicture(*picture); });
     };
@@ -291,7 +291,7 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
       ->type_name("NAME");
   command->callback([views, action] {
     *action = [views] {
-      RequireDistinctFiles({views->common.json_path}, {views->config_path});
+      RequireDistinctFiles({views->common.json_path, views->output_folder}, {views->config_path});
       RunCommand(views->common, [&] { return SimulateLightField(*views); });
     };
   });

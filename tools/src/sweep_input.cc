@@ -13,6 +13,7 @@
 #include "option_values.h"
 #include "thicklens/error.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/input_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -157,6 +158,8 @@ std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
   const fs::path beside = fs::path(sweep_yaml).parent_path() / kTruthName;
   std::error_code failure;
   if (!fs::is_regular_file(beside, failure)) return std::nullopt;
+  // Also where it is not used: it belongs to the sweep.
+  model::TellInput(beside.string());
   try {
     return model::ReadSweepTruth(beside.string());
   } catch (const Error& error) {
@@ -168,7 +171,7 @@ std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
 }  // namespace
 
 std::vector<std::string> SweepArguments::Files() const {
-  return {input, readings_csv, truth_path, floor_from};
+  return {input, readings_csv, camera_path, truth_path, floor_from};
 }
 
 SweepInput ReadSweepInput(const SweepArguments& arguments) {
