@@ -14,7 +14,7 @@
 #include "build_info.h"
 #include "stopwatch.h"
 #include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/model/input_file.h"
 
 namespace thicklens::tools {
 
@@ -162,7 +162,7 @@ json ProfileJson(const EstimateProfile& profile) {
 }
 
 EstimateProfile ReadProfile(const std::string& path) {
-  EstimateProfile profile = Parse(model::ReadWholeFile(path), path);
+  EstimateProfile profile = Parse(model::ReadTextFile(path), path);
   profile.is_own = true;
   return profile;
 }
@@ -172,7 +172,9 @@ EstimateProfile DefaultProfile() { return Parse(DefaultProfileText(), "the profi
 std::string UserProfilePath() {
   const auto folder = [](const char* variable) -> std::filesystem::path {
     const char* value = std::getenv(variable);  // NOLINT: nothing sets it meanwhile
-    return value == nullptr ? "" : value;
+    // A relative path would lead to the current folder, which may be anybody's.
+    const std::filesystem::path path = value == nullptr ? "" : value;
+    return path.is_absolute() ? path : std::filesystem::path();
   };
   std::filesystem::path config = folder("XDG_CONFIG_HOME");
   if (config.empty() && !folder("HOME").empty()) config = folder("HOME") / ".config";

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "thicklens/error.h"
+#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -109,7 +110,11 @@ PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px) {
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   PhotoExif photo;
   try {
-    const auto image = Exiv2::ImageFactory::open(path);
+    // Not by its name, which Exiv2 may take for an address in a network or for standard input.
+    const std::string bytes = model::ReadWholeFile(path);
+    const auto image = Exiv2::ImageFactory::open(
+        reinterpret_cast<const Exiv2::byte*>(bytes.data()),  // NOLINT: bytes
+        static_cast<long>(bytes.size()));
     image->readMetadata();
     const Exiv2::ExifData& exif = image->exifData();
     photo.focal_length_mm = PositiveValue(exif, "Exif.Photo.FocalLength");

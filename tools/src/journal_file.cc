@@ -17,6 +17,7 @@
 
 #include "data_hash.h"
 #include "thicklens/error.h"
+#include "thicklens/model/input_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -28,6 +29,39 @@ constexpr std::size_t kLongestLine = sizeof(kWord) - 1 + 20 + 1 + kHashDigits + 
 
 Error Failure(const std::string& path, const std::string& what, int error) {
   return Error(fmt::format("{}: {}: {}", path, what, std::strerror(error)));
+}
+
+Error NoRegularFile(const std::string& path, const struct stat& info) {
+  return Error(fmt::format("{}: is no regular file but {}; name another", path,
+                           model::KindOfFile(info.st_mode)));
+}
+
+bool IsTaken(int error) { return error == EEXIST || error == ENOENT || error == ELOOP; }
+
+// An existing file is looked at before it is opened, and links to it are followed; a new one is
+// made where nothing is, not even a link to nothing. -1: it was made or removed between the two.
+int OpenOrMake(const std::string& path) {
+  constexpr int kAlways = O_RDWR | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW;
+  constexpr char kWhat[] = "cannot be opened; name a file in a folder that can be written to";
+  struct stat info {};
+  const bool is_there = ::lstat(path.c_str(), &info) == 0;
+  if (!is_there && errno != ENOENT) throw Failure(path, kWhat, errno);
+  if (!is_there) {
+    const int made = ::open(path.c_str(), kAlways | O_CREAT | O_EXCL, 0666);
+    if (made < 0 && errno != EEXIST) throw Failure(path, kWhat, errno);
+    return made;
+  }
+  const bool is_link = S_ISLNK(info.st_mode);
+  std::error_code failure;
+  const std::string followed = std::filesystem::canonical(path, failure).string();
+  if (failure && is_link) throw Failure(path, "is a link that cannot be followed", failure.value());
+  if (failure || ::lstat(followed.c_str(), &info) != 0) return -1;
+  if (!S_ISREG(info.st_mode)) throw NoRegularFile(path, info);
+  const int opened = ::open(followed.c_str(), kAlways);
+  if (opened < 0 && !IsTaken(errno)) throw Failure(path, kWhat, errno);
+  if (opened < 0 || (::fstat(opened, &info) == 0 && S_ISREG(info.st_mode))) return opened;
+  ::close(opened);
+  throw NoRegularFile(path, info);
 }
 
 bool IsNamed(int file, const std::string& path) {
@@ -58,16 +92,13 @@ JournalFile::~JournalFile() {
 }
 
 void JournalFile::Open() {
+  if (path_ == "-") {
+    throw Error("-: what is kept for the next run cannot go to standard output; name a file");
+  }
   constexpr int kMostTries = 100;
   for (int i = 0; i < kMostTries; ++i) {
-    file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
-    if (file_ < 0) {
-      throw Failure(path_, "cannot be opened; name a file in a folder that can be written to",
-                    errno);
-    }
-    struct stat info {};
-    if (::fstat(file_, &info) != 0) throw Failure(path_, "cannot be opened", errno);
-    if (!S_ISREG(info.st_mode)) throw Error(fmt::format("{}: is no regular file", path_));
+    file_ = OpenOrMake(path_);
+    if (file_ < 0) continue;
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
       if (errno != EWOULDBLOCK) throw Failure(path_, "cannot be locked", errno);
       throw Error(fmt::format(

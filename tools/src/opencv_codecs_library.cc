@@ -1,4 +1,6 @@
 // The library that opencv_codecs.h speaks of. Nothing else of the program may include imgcodecs.
+#include <cstddef>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -21,6 +23,10 @@ cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
 }
 
 cv::Mat Decode(const std::string& bytes, std::string* why) {
+  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
+    *why = "it is larger than the 2 GiB that OpenCV decodes";
+    return {};
+  }
   try {
     // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
     // pixels as the sensor gave them.

@@ -1,0 +1,104 @@
+// Inputs are read and outputs are written in one place (input_file.h, output_file.h of model),
+// which looks at what is there: a source that opens files in another way must be known here.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <istream>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+namespace thicklens {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::regex& WaysToOpenAFile() {
+  static const std::regex ways(
+      R"(\bstd::[io]?fstream\b|\bfopen\s*\(|(^|[^\w])::open(at)?\s*\(|\bcreat\s*\(|\bim(read|write)\s*\()"
+      R"(|\bTIFF(Fd)?Open\w*\s*\(|ImageFactory::open\(\s*\w*path|\bcairo_\w+_surface_create\s*\(\s*\w*path)",
+      std::regex::ECMAScript | std::regex::multiline);
+  return ways;
+}
+
+// Sources that open files, and why.
+const std::set<std::string>& Known() {
+  static const std::set<std::string> known = {
+      "model/src/input_file.cc",            // the reader
+      "model/src/output_file.cc",           // the writers
+      "model/src/output_folder.cc",         //
+      "model/src/output_part.cc",           //
+      "model/src/output_target.cc",         //
+      "tools/src/journal_file.cc",          // grows while a run is on its way
+      "tools/src/float_tiff.cc",            // a file in an output folder
+      "tools/src/picture_kind.cc",          // libtiff, from memory
+      "tools/src/standard_descriptors.cc",  // the null device
+      "kernels/src/guarded_child.cc",       // the null device
+      "estimator/src/run_cost.cc",          // files of /proc
+      "tools/src/bench_machine.cc",         //
+      "tools/src/block_checkpoint.cc",      //
+      "tools/src/memory_available.cc",      //
+      "tools/src/peak_memory.cc"};          //
+  return known;
+}
+
+// Regular expressions take long, and most lines hold no word of these.
+bool MayOpenAFile(const std::string& line) {
+  for (const char* word : {"fstream", "fopen", "::open", "creat", "imread", "imwrite", "TIFF",
+                           "ImageFactory", "_surface_create"}) {
+    if (line.find(word) != std::string::npos) return true;
+  }
+  return false;
+}
+
+// The call by which a source file opens files; empty: there is none.
+std::string WayToOpenAFile(std::istream* source) {
+  for (std::string line; std::getline(*source, line);) {
+    line.resize(std::min(line.size(), line.find("//")));
+    std::smatch way;
+    if (MayOpenAFile(line) && std::regex_search(line, way, WaysToOpenAFile())) return way.str();
+  }
+  return "";
+}
+
+TEST(FileAccess, IsInKnownPlacesAlone) {
+  const fs::path root(THICKLENS_SOURCE_DIR);
+  std::set<std::string> found;
+  for (const char* module : {"model", "calib", "kernels", "estimator", "tools"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / module)) {
+      const std::string ending = entry.path().extension().string();
+      if (ending != ".cc" && ending != ".h") continue;
+      std::ifstream file(entry.path());
+      const std::string way = WayToOpenAFile(&file);
+      if (way.empty()) continue;
+      const std::string name = fs::relative(entry.path(), root).string();
+      found.insert(name);
+      EXPECT_EQ(Known().count(name), 1U)
+          << name << " opens files by '" << way
+          << "': model::ReadTextFile, ReadWholeFile, OutputFile or OutputFolder is expected";
+    }
+  }
+  EXPECT_EQ(found, Known()) << "what opens no files any more is not to be known";
+}
+
+TEST(FileAccess, WaysAreSeen) {
+  for (const char* line :
+       {"std::ifstream file(path);", "std::fopen(path, \"r\")", "  const int fd = ::open(path, 0);",
+        "cv::imread(path)", "TIFFOpen(path, \"w\")", "Exiv2::ImageFactory::open(path)"}) {
+    std::istringstream source(line);
+    EXPECT_NE(WayToOpenAFile(&source), "") << line;
+  }
+  for (const char* other :
+       {"cv::Mat open(rows, columns, CV_32F)", "file.open();", "ImageFactory::open(bytes, size)",
+        "OpenBackend(request)", "// std::ifstream"}) {
+    std::istringstream source(other);
+    EXPECT_EQ(WayToOpenAFile(&source), "") << other;
+  }
+}
+
+}  // namespace
+}  // namespace thicklens
