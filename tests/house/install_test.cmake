@@ -1,7 +1,7 @@
 # Installs the build tree into a fresh prefix, then builds and runs a project that uses it.
 cmake_minimum_required(VERSION 3.25)
 
-foreach(name IN ITEMS build_dir config work_dir configs_dir bin data generator compiler)
+foreach(name IN ITEMS build_dir config work_dir configs_dir bin data generator compiler house_test)
   if("${${name}}" STREQUAL "")
     message(FATAL_ERROR "install test: give -D ${name}=...")
   endif()
@@ -21,6 +21,10 @@ unset(ENV{DESTDIR})
 set(prefix "${work_dir}/prefix")
 file(REMOVE_RECURSE "${work_dir}")
 run(${CMAKE_COMMAND} --install "${build_dir}" --config ${config} --prefix "${prefix}")
+
+# No program or library looks for another in the current folder.
+run(${CMAKE_COMMAND} -E env "THICKLENS_INSTALLED=${prefix}" "${house_test}"
+    --gtest_filter=ElfSearchPaths.*)
 
 run("${prefix}/${bin}/thicklens" --help)
 # What it loads itself is not on the system's search path.

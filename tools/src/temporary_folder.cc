@@ -13,7 +13,9 @@ namespace fs = std::filesystem;
 
 TemporaryFolder::TemporaryFolder(const std::string& purpose) {
   std::error_code failure;
-  const fs::path parent = fs::temp_directory_path(failure);
+  fs::path parent = fs::temp_directory_path(failure);
+  // An absolute path leads to the same folder later, whatever the current one is then.
+  if (!failure) parent = fs::canonical(parent, failure);
   std::string name = (parent / ("thicklens-" + purpose + "-XXXXXX")).string();
   if (failure || mkdtemp(name.data()) == nullptr) {
     const char* value = std::getenv("TMPDIR");  // NOLINT: nothing sets it meanwhile

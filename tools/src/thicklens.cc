@@ -20,10 +20,12 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "option_values.h"
+#include "printable_text.h"
 #include "program_memory.h"
 #include "sanitized.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
+#include "trusted_environment.h"
 
 namespace {
 
@@ -35,6 +37,7 @@ void SetUpMessages() {
   // Libraries keep still: what goes wrong is told by whoever asked them, with the file's name.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   FLAGS_minloglevel = google::GLOG_FATAL;  // Ceres logs through glog
+  FLAGS_logtostderr = true;                // and not into files of /tmp or the current folder
   google::InitGoogleLogging("thicklens");
   spdlog::set_default_logger(spdlog::stderr_logger_mt("thicklens"));
   spdlog::set_pattern("thicklens: %l: %v");
@@ -43,7 +46,7 @@ void SetUpMessages() {
 int Fail(std::string message, ExitCode code) {
   while (!message.empty() && message.back() == '\n') message.pop_back();
   std::replace(message.begin(), message.end(), '\n', ' ');
-  spdlog::error("{}", message);
+  spdlog::error("{}", tools::PrintableUtf8(message));  // names of files may hold any byte
   return code;
 }
 
@@ -70,6 +73,7 @@ int Main(int argc, char** argv) {
   tools::KeepFreedMemory();
   SetUpMessages();
   tools::CatchSignals();
+  for (const std::string& line : tools::DistrustRelativePaths()) spdlog::warn("{}", line);
   CLI::App program(
       "Thick-lens camera calibration from focus sweeps, and light fields from one picture",
       "thicklens");

@@ -1,0 +1,18 @@
+#ifndef THICKLENS_TOOLS_TRUSTED_ENVIRONMENT_H_
+#define THICKLENS_TOOLS_TRUSTED_ENVIRONMENT_H_
+
+#include <string>
+#include <vector>
+
+namespace thicklens::tools {
+
+// Takes out of the environment what would let a library load code or configuration from the current
+// folder, which may be a stranger's data set, or from a folder that every user may write to:
+// variables with a path (of caches, drivers, plugins, temporary files) that is not absolute, and
+// the cache of OpenCL programs that PoCL puts into /tmp where there is no home folder. Returns a
+// line for each that was taken out. To be called before any library reads them.
+std::vector<std::string> DistrustRelativePaths();
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_TRUSTED_ENVIRONMENT_H_
