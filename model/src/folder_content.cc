@@ -26,7 +26,7 @@ Error WouldBeLost(const std::string& shown, const std::string& name) {
                   shown, name));
 }
 
-// The names of what is in a folder. Throws Error where that cannot be told.
+// The entries of a folder. Throws Error where they cannot be read.
 std::vector<fs::path> Entries(const fs::path& folder, const std::string& shown) {
   std::vector<fs::path> entries;
   std::error_code failure;

@@ -7,7 +7,7 @@
 
 namespace thicklens::model {
 
-// What an output folder may hold that is replaced: see OutputFolder.
+// The content that an output folder may have when it is replaced: see OutputFolder.
 struct FolderContent {
   std::string marker_file;
   std::vector<std::string> own_entries;

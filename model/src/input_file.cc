@@ -63,8 +63,8 @@ struct stat StatusOf(const std::string& path) {
 
 class OpenedFile {
  public:
-  // What stat has seen may be another thing by now: opening waits for nobody, and what was opened
-  // is looked at again.
+  // Since stat has seen it, the name may have got another meaning: opening waits for nobody, and
+  // the opened file is looked at again.
   explicit OpenedFile(const std::string& path)
       : fd_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY)) {
     if (fd_ < 0) throw CannotBeRead(path, errno);
@@ -123,7 +123,7 @@ std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes) {
   if (file.bytes() > most_bytes) throw TooLarge(path, file.bytes(), most_bytes);
   std::string content;
   content.reserve(static_cast<std::size_t>(file.bytes()));
-  // What the system makes up has no size, and a file may grow while it is read.
+  // Files of /proc state no size, and a file may grow while it is read.
   char block[1 << 16];
   for (;;) {
     const ssize_t n = ::read(file.fd(), block, sizeof block);
@@ -137,12 +137,12 @@ std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes) {
 
 std::string ReadWholeFile(const std::string& path) {
   TellInput(path);
-  return ReadOwnFile(path, kMostInputBytes);
+  return ReadOwnFile(path, kMaxInputBytes);
 }
 
 std::string ReadTextFile(const std::string& path) {
   TellInput(path);
-  return ReadOwnFile(path, kMostTextBytes);
+  return ReadOwnFile(path, kMaxTextBytes);
 }
 
 void WatchInputs(InputWatch watch) { Watch() = std::move(watch); }

@@ -80,7 +80,7 @@ struct OutputFolder::Impl {
     part->RequireThere(Shown(name));
     const fs::path file = fs::path(part->path()) / name;
     std::error_code failure;
-    // Of one that vanished after all this makes none.
+    // Where the part has vanished after all, this makes no folder.
     if (fs::path(name).has_parent_path()) fs::create_directory(file.parent_path(), failure);
     if (failure)
       throw Error(fmt::format("{}: cannot be written: {}", Shown(name), failure.message()));
@@ -91,8 +91,8 @@ struct OutputFolder::Impl {
     content.RequireReplaceable(target.target, path, target.in_place, without_marker);
   }
 
-  // What a run has left that was killed while its output came into place: nothing of it is whole,
-  // and it has no marker.
+  // Removes the content that a run has left which was killed while its output came into place:
+  // nothing of it is whole, and it has no marker.
   void RemoveLeftOver() const {
     const bool was_killed = HasLeftOverPart(target.target, kInnerPartStem);
     RequireReplaceable(was_killed);
@@ -117,7 +117,7 @@ struct OutputFolder::Impl {
     if (old.get() < 0 || ::flock(old.get(), LOCK_EX | LOCK_NB) != 0) return false;
     if (!ExchangeNames(part->path(), path)) return false;
     try {
-      // What came into it, or into its place, between the last look and now is not lost either.
+      // Somebody may have put something into it, or into its place, since the last look.
       content.RequireReplaceable(part->path(), path, false, false);
     } catch (const Error&) {
       ExchangeNames(part->path(), path);
@@ -125,7 +125,7 @@ struct OutputFolder::Impl {
     }
     std::error_code failure, ignored;
     fs::remove_all(part->path(), failure);
-    // What cannot be removed must not be in the way of the next run.
+    // A rest that cannot be removed must not be in the way of the next run.
     if (failure) fs::rename(part->path(), NameToStepAside(path), ignored);
     part->Release();
     return true;
@@ -137,7 +137,12 @@ struct OutputFolder::Impl {
     std::error_code ignored;
     const fs::path aside = NameToStepAside(path);
     const bool replaces = fs::exists(fs::symlink_status(path, ignored));
-    if (replaces) Rename(path, aside, path);
+    std::error_code failure;
+    if (replaces) fs::rename(path, aside, failure);
+    if (failure) {  // a folder from a lower layer of an overlay, as in a container's image
+      ReplaceContent();
+      return;
+    }
     try {
       if (replaces) content.RequireReplaceable(aside, path, false, false);
       Rename(part->path(), path, path);
@@ -183,7 +188,7 @@ OutputFolder::OutputFolder(const std::string& path, const std::string& marker_fi
   } else {
     impl.part.emplace(impl.target.parent(), target.filename().string(), PartKind::kFolder, path);
   }
-  // Under the lock: another run's Commit would be seen half-way else.
+  // Without the lock, another run's Commit could be seen half done.
   impl.RequireReplaceable();
 }
 

@@ -26,13 +26,12 @@ namespace fs = std::filesystem;
 constexpr char kEnding[] = ".part";
 constexpr std::size_t kRandomDigits = 16;
 // A file's name has at most 255 bytes, those of a part included.
-constexpr std::size_t kMostStem = 200;
+constexpr std::size_t kMaxStem = 200;
 
-// What a part's name begins with. Of a long name the hash keeps apart what has one beginning.
+// The beginning of a part's name. A hash keeps apart long names that begin alike.
 std::string Beginning(const std::string& stem) {
-  if (stem.size() <= kMostStem) return "." + stem + ".";
-  return fmt::format(".{}~{:016x}.", stem.substr(0, kMostStem - 17),
-                     std::hash<std::string>()(stem));
+  if (stem.size() <= kMaxStem) return "." + stem + ".";
+  return fmt::format(".{}~{:016x}.", stem.substr(0, kMaxStem - 17), std::hash<std::string>()(stem));
 }
 
 std::uint64_t Unpredictable() {
@@ -51,8 +50,8 @@ class FolderTurn {
  public:
   explicit FolderTurn(const fs::path& folder)
       : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    constexpr int kMostTries = 1000;
-    for (int i = 0; fd_ >= 0 && i < kMostTries; ++i) {
+    constexpr int kMaxTries = 1000;
+    for (int i = 0; fd_ >= 0 && i < kMaxTries; ++i) {
       if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
@@ -158,8 +157,8 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
                       shown, path, failure.message()));
     }
   }
-  constexpr int kMostTries = 100;
-  for (int i = 0; i < kMostTries; ++i) {
+  constexpr int kMaxTries = 100;
+  for (int i = 0; i < kMaxTries; ++i) {
     path_ =
         (folder / fmt::format("{}{:016x}{}", Beginning(stem), Unpredictable(), kEnding)).string();
     fd_ = Create(path_, kind);

@@ -8,10 +8,11 @@ namespace thicklens::model {
 
 enum class PartKind { kFile, kFolder };
 
-// What an output is written to before it gets its name: a new file or folder ".STEM.RANDOM.part",
-// locked for as long as this lives. It is created, never opened, so that no link and nothing of
-// somebody else's can stand in its place. What killed runs left behind with the same stem carries
-// no lock and is removed; where another run holds one, the constructor throws Error.
+// The place where an output is made before it gets its name: a new file or folder
+// ".STEM.RANDOM.part", locked for as long as this lives. It is created, never opened, so that no
+// link and nothing of somebody else's can stand in its place. What killed runs left behind with the
+// same stem carries no lock and is removed; where another run holds one, the constructor throws
+// Error.
 class OutputPart {
  public:
   // `shown` is the output, for messages.

@@ -109,7 +109,7 @@ void DecideHow(int rights, OutputTarget* result) {
     if (!may_rename) throw CannotBeWritten(result->given, error);
     return;
   }
-  // What its owner has protected is not replaced behind that protection.
+  // A file that its owner has protected is not replaced behind that protection.
   if (!MayWrite(result->target, rights)) throw CannotBeWritten(result->given, errno);
   result->in_place =
       !may_rename || IsStickyOfOthers(parent, *result->older) || IsMountPoint(result->target);
@@ -188,7 +188,7 @@ void KeepOwnerAndMode(int fd, const struct stat& older) {
 
 void RequireStored(int fd, const std::string& shown) {
   if (::fsync(fd) != 0 && errno != EINVAL) throw CannotBeWritten(shown, errno);
-  // Closing, too, may tell of a full disk, and this descriptor is to stay open for its lock.
+  // Closing may fail on a full disk, too, and this descriptor is to stay open for its lock.
   const int copy = ::fcntl(fd, F_DUPFD_CLOEXEC, 0);
   if (copy >= 0 && ::close(copy) != 0) throw CannotBeWritten(shown, errno);
 }

@@ -16,7 +16,7 @@ struct OutputTarget {
   std::string given;             // for messages
   std::filesystem::path target;  // links followed, so that a link stays one, as `cp` has it
   std::optional<struct stat> older;
-  // What is there cannot be replaced by a new name, only written into: it is a mount point, or the
+  // The older one cannot be replaced by a new name, only written into: it is a mount point, or the
   // folder that it lies in may not be written to.
   bool in_place = false;
 
@@ -40,8 +40,8 @@ bool IsNamed(int fd, const std::string& name);
 // the group then gets no more rights than all others have.
 void KeepOwnerAndMode(int fd, const struct stat& older);
 
-// What was written through `fd` has reached the disk. Throws Error; some file systems tell of a
-// full disk or a quota only then.
+// Waits until the content written through `fd` is on the disk. Throws Error; some file systems
+// report a full disk or a quota only then.
 void RequireStored(int fd, const std::string& shown);
 
 // A new name lasts beyond a power failure.

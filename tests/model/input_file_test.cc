@@ -1,4 +1,4 @@
-// Inputs are regular files of limited size, and whoever watches is told of each.
+// Inputs are regular files of limited size, and the watch is called for each.
 #include "thicklens/model/input_file.h"
 
 #include <gmock/gmock.h>
@@ -61,7 +61,7 @@ TEST(InputFile, WhatIsNoRegularFileIsRefusedByItsKind) {
   ::close(listener);
 }
 
-// As bash gives for <(...): /dev/fd/63.
+// bash gives /dev/fd/63 for <(...).
 TEST(InputFile, AProcessSubstitutionIsRefusedWithThatReason) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
@@ -87,14 +87,14 @@ TEST(InputFile, StandardInputIsNotRead) {
 TEST(InputFile, ATextHasALimitedSize) {
   const TemporaryFolder folder;
   const std::string path = folder.Put("a.yaml");
-  fs::resize_file(path, kMostTextBytes);
-  EXPECT_EQ(ReadTextFile(path).size(), kMostTextBytes);
-  fs::resize_file(path, kMostTextBytes + 1);
+  fs::resize_file(path, kMaxTextBytes);
+  EXPECT_EQ(ReadTextFile(path).size(), kMaxTextBytes);
+  fs::resize_file(path, kMaxTextBytes + 1);
   EXPECT_EQ(ErrorOf([&] { ReadTextFile(path); }),
             path + ": has 67108865 bytes; a file of this kind may have at most 64 MiB");
-  EXPECT_EQ(ReadWholeFile(path).size(), kMostTextBytes + 1);
+  EXPECT_EQ(ReadWholeFile(path).size(), kMaxTextBytes + 1);
   EXPECT_THAT(ErrorOf([&] { YamlNode::LoadFile(path); }), HasSubstr("at most 64 MiB"));
-  fs::resize_file(path, kMostInputBytes + 1);  // takes no room
+  fs::resize_file(path, kMaxInputBytes + 1);  // takes no room
   EXPECT_THAT(ErrorOf([&] { ReadWholeFile(path); }), HasSubstr("at most 4 GiB"));
 }
 

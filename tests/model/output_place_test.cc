@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -269,6 +270,32 @@ TEST(OutputPlace, AMountPointIsWrittenInto) {
   });
 }
 
+// A container's own folders cannot be renamed.
+TEST(OutputPlace, AFolderOfALowerLayerIsWrittenInto) {
+  const TemporaryFolder folder;
+  RUN_IN_CHILD([&]() -> std::string {
+    const std::string disk = folder / "disk";
+    fs::create_directory(disk);
+    for (const std::string& skip : {OwnMounts(), MountTmpfs(disk)}) {
+      if (!skip.empty()) return skip;
+    }
+    for (const char* name : {"lower/out/frames", "upper", "work", "merged"})
+      fs::create_directories(disk + "/" + name);
+    std::ofstream(disk + "/lower/out/truth.yaml") << "older";
+    std::ofstream(disk + "/lower/out/frames/old") << "older";
+    const std::string options =
+        "lowerdir=" + disk + "/lower,upperdir=" + disk + "/upper,workdir=" + disk + "/work";
+    const std::string merged = disk + "/merged";
+    if (::mount("overlay", merged.c_str(), "overlay", 0, options.c_str()) != 0)
+      return std::string("skip: no overlay can be mounted: ") + std::strerror(errno);
+    WriteFolder(merged + "/out", "new", {kMarker, "frames"});
+    return Unless(ContentOf(merged + "/out/truth.yaml") == "new", "it is not replaced") +
+           Unless(ContentOf(merged + "/out/frames/a.png") == "new", "its frame is not written") +
+           Unless(!fs::exists(merged + "/out/frames/old"), "the older content stays") +
+           Unless(std::distance(fs::directory_iterator(merged), {}) == 1, "something is left");
+  });
+}
+
 // A run that was killed between the older marker's end and the new one's beginning.
 TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNext) {
   const TemporaryFolder folder;
@@ -331,7 +358,7 @@ TEST(OutputPlace, AFileThatIsAMountPointIsWrittenInto) {
   });
 }
 
-// The folder around it belongs to somebody else, as that of a volume in a container does.
+// The folder around it belongs to another user, as that of a volume in a container may.
 TEST(OutputPlace, AFolderInOneThatMayNotBeWrittenToIsWrittenInto) {
   if (::geteuid() != 0) GTEST_SKIP() << "needs root, to become another user";
   const TemporaryFolder folder;
@@ -359,7 +386,7 @@ TEST(OutputPlace, AFolderInOneThatMayNotBeWrittenToIsWrittenInto) {
   EXPECT_EQ(ContentOf(of_root), "root's");
 }
 
-// What its owner has protected from himself is not replaced either.
+// A file that its owner has protected from himself is not replaced either.
 TEST(OutputPlace, AReadOnlyFileOrFolderIsRefused) {
   if (::geteuid() != 0) GTEST_SKIP() << "needs root, to become another user";
   const TemporaryFolder folder;

@@ -7,7 +7,7 @@
 
 namespace thicklens::testing {
 
-// What the output NAME in that folder is written to before it is in place, ".NAME.RANDOM.part";
+// The place where the output NAME of that folder is made, ".NAME.RANDOM.part";
 // empty: nothing.
 inline std::string PartOf(const std::string& folder, const std::string& name) {
   std::error_code failure;

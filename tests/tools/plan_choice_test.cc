@@ -393,7 +393,7 @@ TEST_F(EstimateWish, IsTakenFromTheProfileAndHeldAgainstWhatItTook) {
   EXPECT_GT(summary["plan"]["expected_seconds"].get<double>(), 0);
 }
 
-// By a law after which nothing but reading takes any time.
+// The law of this profile says that nothing but reading takes any time.
 TEST_F(EstimateWish, CountsReading) {
   EstimateProfile profile = SomeProfile();
   profile.plans = {ProfileOf("ridge", 1e-12, 40)};

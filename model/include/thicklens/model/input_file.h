@@ -12,16 +12,16 @@ namespace thicklens::model {
 // it; so is a process substitution, which is a pipe with a name in /dev/fd.
 
 // Texts: YAML, CSV, JSON, parameters.cfg.
-constexpr std::uint64_t kMostTextBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kMaxTextBytes = std::uint64_t{64} << 20;
 // All others: images and depth maps.
-constexpr std::uint64_t kMostInputBytes = std::uint64_t{4} << 30;
+constexpr std::uint64_t kMaxInputBytes = std::uint64_t{4} << 30;
 
 // The whole content of a text; throws Error naming the path and the reason.
 std::string ReadTextFile(const std::string& path);
 
 // What ReadWholeFile (output_file.h) and ReadTextFile do, for a file that is no input of the run,
 // such as an older output that is about to be replaced: the watch is not told.
-std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes = kMostInputBytes);
+std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes = kMaxInputBytes);
 
 // Throws Error unless the path leads to a regular file. Opens nothing.
 void RequireRegularFile(const std::string& path);

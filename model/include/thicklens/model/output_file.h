@@ -11,7 +11,7 @@ namespace thicklens::model {
 // An output file that appears whole or not at all.
 //
 // The constructor claims the name: it makes a new file ".NAME.RANDOM.part" beside the target and
-// locks it, so that an output that cannot be written, or that a second run is writing, is told
+// locks it, so that an output that cannot be written, or that a second run is writing, is refused
 // before any work is done. Commit writes, syncs and renames. Without Commit the destructor removes
 // the part file and whatever stood at the target stays as it was. A part file that a killed run has
 // left behind is removed. A symbolic link stays one: what it leads to is replaced. The file that is

@@ -49,7 +49,7 @@ class YamlNode {
   const std::string& path() const;    // dotted path of the field
   const std::string& source() const;  // file name
   // `relative` as seen from the folder of this document's file. What a file names is an input of
-  // the run: the InputWatch (input_file.h) is told.
+  // the run: the InputWatch (input_file.h) is called.
   std::string ResolvePath(const std::string& relative) const;
 
  private:
