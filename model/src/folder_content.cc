@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <new>
 #include <system_error>
 
 #include "output_part.h"
@@ -33,6 +34,7 @@ std::vector<fs::path> Entries(const fs::path& folder, const std::string& shown) 
   fs::directory_iterator entry(folder, failure);
   for (; !failure && entry != fs::directory_iterator(); entry.increment(failure))
     entries.push_back(entry->path());
+  if (failure == std::errc::not_enough_memory) throw std::bad_alloc();
   if (failure) {
     throw Error(fmt::format("{}: cannot be written: what it holds cannot be read: {}", shown,
                             failure.message()));

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <new>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -150,6 +151,7 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
     }
     std::error_code failure;
     if (found.what() == Found::kLeftOver) fs::remove_all(path, failure);
+    if (failure == std::errc::not_enough_memory) throw std::bad_alloc();
     if (failure) {
       throw Error(
           fmt::format("{}: cannot be written: {}, which an earlier run left, cannot be "

@@ -50,9 +50,9 @@ bool MayTellRefusal(const std::string& path) {
 }
 
 // Where --json goes: a file that is claimed before anything is done, or standard output.
-class Summary {
+class SummaryOutput {
  public:
-  explicit Summary(const std::string& path) : path_(path) {
+  explicit SummaryOutput(const std::string& path) : path_(path) {
     if (!path_.empty() && path_ != kStandardOutput) file_.emplace(path_);
   }
 
@@ -97,7 +97,7 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
   // More than there are cores would not be faster, and the library below would complain.
   cv::setNumThreads(std::min(model::ResolveThreads(options.threads), model::ResolveThreads(0)));
   EnterRunOutput(options.json_path);
-  Summary summary(options.json_path);
+  SummaryOutput summary(options.json_path);
   CommandResult result;
   try {
     result = command();

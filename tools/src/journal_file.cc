@@ -38,24 +38,32 @@ Error NoRegularFile(const std::string& path, const struct stat& info) {
 
 bool IsTaken(int error) { return error == EEXIST || error == ENOENT || error == ELOOP; }
 
-// An existing file is looked at before it is opened, and links to it are followed; a new one is
-// made where nothing is, not even a link to nothing. -1: it was made or removed between the two.
+// The file that a path leads to, which may have to be made: a journal may be a link to another
+// disk, which stays when its file has served its purpose.
+std::string FollowedPath(const std::string& path) {
+  std::error_code failure;
+  const auto followed = std::filesystem::canonical(path, failure);
+  if (!failure) return followed.string();
+  std::error_code no_link;
+  const auto target = std::filesystem::read_symlink(path, no_link);
+  if (no_link || failure != std::errc::no_such_file_or_directory) return path;
+  return (std::filesystem::path(path).parent_path() / target).string();
+}
+
+// An existing file is looked at before it is opened; a new one is made where nothing is. No link is
+// followed but the given path. -1: it was made or removed between the two.
 int OpenOrMake(const std::string& path) {
   constexpr int kAlways = O_RDWR | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW;
   constexpr char kWhat[] = "cannot be opened; name a file in a folder that can be written to";
+  const std::string followed = FollowedPath(path);
   struct stat info {};
-  const bool is_there = ::lstat(path.c_str(), &info) == 0;
+  const bool is_there = ::lstat(followed.c_str(), &info) == 0;
   if (!is_there && errno != ENOENT) throw Failure(path, kWhat, errno);
   if (!is_there) {
-    const int made = ::open(path.c_str(), kAlways | O_CREAT | O_EXCL, 0666);
+    const int made = ::open(followed.c_str(), kAlways | O_CREAT | O_EXCL, 0666);
     if (made < 0 && errno != EEXIST) throw Failure(path, kWhat, errno);
     return made;
   }
-  const bool is_link = S_ISLNK(info.st_mode);
-  std::error_code failure;
-  const std::string followed = std::filesystem::canonical(path, failure).string();
-  if (failure && is_link) throw Failure(path, "is a link that cannot be followed", failure.value());
-  if (failure || ::lstat(followed.c_str(), &info) != 0) return -1;
   if (!S_ISREG(info.st_mode)) throw NoRegularFile(path, info);
   const int opened = ::open(followed.c_str(), kAlways);
   if (opened < 0 && !IsTaken(errno)) throw Failure(path, kWhat, errno);

@@ -27,7 +27,7 @@ FileIdentity IdentityOf(const std::string& path) {
 }
 
 // The whole path, links followed as far as it exists, without a slash at its end.
-fs::path Resolved(const std::string& path) {
+fs::path ResolvedPath(const std::string& path) {
   std::error_code failure;
   fs::path resolved = fs::weakly_canonical(fs::absolute(path), failure);
   if (failure) resolved = fs::absolute(path).lexically_normal();
@@ -43,7 +43,7 @@ struct RunOutput {
 
 bool IsSame(const RunOutput& output, const std::string& path) {
   if (const FileIdentity there = IdentityOf(path)) return there == output.identity;
-  return Resolved(path) == output.resolved;
+  return ResolvedPath(path) == output.resolved;
 }
 
 // Whether one of the folders that lead to `inner` is that one. By what the folders are, so that two
@@ -75,7 +75,8 @@ class RunFiles {
   void Enter(const std::string& path) {
     if (path.empty() || path == "-") return;
     std::error_code failure;
-    const RunOutput output{path, Resolved(path), IdentityOf(path), fs::is_directory(path, failure)};
+    const RunOutput output{path, ResolvedPath(path), IdentityOf(path),
+                           fs::is_directory(path, failure)};
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const RunOutput& other : outputs_) {
       if (IsSame(other, path))
@@ -109,7 +110,7 @@ class RunFiles {
     const std::string folder = fs::path(input).parent_path().string();
     const bool is_link = fs::is_symlink(input, ignored);
     if (!is_link && in_no_output_.count(folder) > 0) return;
-    const fs::path resolved = Resolved(input);
+    const fs::path resolved = ResolvedPath(input);
     for (const RunOutput& output : outputs_) {
       if (!output.is_folder || !LeadsThrough(resolved, output.identity)) continue;
       Refuse(fmt::format("{}: this folder holds the input {}; choose another name", output.path,
