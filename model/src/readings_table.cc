@@ -3,8 +3,10 @@
 #include <csv.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <map>
 #include <optional>
 
@@ -46,7 +48,9 @@ std::optional<double> ToNumber(const std::string& cell) {
   const char* end = cell.data() + cell.size();
   double value = 0;
   const auto [rest, status] = std::from_chars(begin, end, value);
-  if (status != std::errc() || rest != end || !std::isfinite(value)) return std::nullopt;
+  constexpr double kMostMagnitude = 1e30;  // as of numbers in YAML
+  const bool is_number = status == std::errc() && rest == end && std::abs(value) <= kMostMagnitude;
+  if (!is_number) return std::nullopt;
   return value;
 }
 
@@ -55,6 +59,11 @@ std::optional<double> ToNumber(const std::string& cell) {
 std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
   std::string text = ReadTextFile(path);
   if (text.rfind("\xEF\xBB\xBF", 0) == 0) text.erase(0, 3);  // a spreadsheet's byte order mark
+  if (const std::size_t nul = text.find('\0'); nul != std::string::npos) {
+    const auto end = text.begin() + static_cast<std::ptrdiff_t>(nul);
+    throw Error(fmt::format("{}:{}: a NUL byte; a table is text in UTF-8", path,
+                            1 + std::count(text.begin(), end, '\n')));
+  }
   csv_parser parser;
   if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI | CSV_APPEND_NULL) != 0)
     throw Error(path + ": the CSV parser failed to start");

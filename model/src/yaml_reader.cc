@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <set>
 #include <sstream>
@@ -57,6 +58,18 @@ std::string SuggestionFor(const std::string& key, const std::vector<std::string>
   return fmt::format("allowed here: {}", Join(allowed));
 }
 
+// What was found, as a message shows it: the whole of it only where it is short.
+std::string Shown(const std::string& text) {
+  constexpr std::size_t kLongest = 80, kBegin = 40;
+  if (text.size() <= kLongest) return text;
+  std::size_t end = kBegin;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) --end;  // UTF-8
+  return fmt::format("{}... ({} bytes)", text.substr(0, end), text.size());
+}
+
+// Beyond these no length, angle or count means anything, and products of several overflow.
+constexpr double kMostMagnitude = 1e30, kLeastPositive = 1e-30;
+
 std::string KindOf(const YAML::Node& node) {
   switch (node.Type()) {
     case YAML::NodeType::Map:
@@ -64,7 +77,7 @@ std::string KindOf(const YAML::Node& node) {
     case YAML::NodeType::Sequence:
       return "a list";
     case YAML::NodeType::Scalar:
-      return "'" + node.Scalar() + "'";
+      return "'" + Shown(node.Scalar()) + "'";
     default:
       return "nothing";
   }
@@ -91,6 +104,22 @@ class DocumentStarts : public YAML::EventHandler {
  private:
   std::vector<YAML::Mark> marks_;
 };
+
+// YAML has no NUL, and yaml-cpp takes one for a part of a text. UTF-16 and UTF-32 are full of them;
+// yaml-cpp knows these by their first bytes.
+void RequireNoNul(const std::string& text, const std::string& source_name) {
+  const auto is_wide = [&text] {
+    if (text.size() < 2) return false;
+    const bool has_mark =
+        text.compare(0, 2, "\xFF\xFE") == 0 || text.compare(0, 2, "\xFE\xFF") == 0;
+    return has_mark || text[0] == '\0' || text[1] == '\0';
+  };
+  const std::size_t at = text.find('\0');
+  if (at == std::string::npos || is_wide()) return;
+  const auto end = text.begin() + static_cast<std::ptrdiff_t>(at);
+  throw Error(fmt::format("{}:{}: a NUL byte, which no text has; a YAML file is expected",
+                          source_name, 1 + std::count(text.begin(), end, '\n')));
+}
 
 // yaml-cpp finds empty documents without end where a text begins with, say, a comma: it is asked
 // for no more than two.
@@ -122,6 +151,7 @@ YamlNode YamlNode::LoadFile(const std::string& path) { return Parse(ReadTextFile
 
 YamlNode YamlNode::Parse(const std::string& text, const std::string& source_name) {
   try {
+    RequireNoNul(text, source_name);
     RequireOneDocument(text, source_name);
     auto impl = std::make_shared<Impl>();
     impl->node.reset(YAML::Load(text));
@@ -153,7 +183,7 @@ void YamlNode::RequireSchema(const std::string& schema) const {
   if (!Has("schema")) throw ErrorHere(fmt::format("'schema: {}' is missing", schema));
   const YamlNode found = At("schema");
   if (found.Text() != schema) {
-    throw found.ErrorHere(fmt::format("'{}' is expected, found '{}'", schema, found.Text()));
+    throw found.ErrorHere(fmt::format("'{}' is expected, found '{}'", schema, Shown(found.Text())));
   }
 }
 
@@ -167,10 +197,11 @@ void YamlNode::RequireKeys(const std::vector<std::string>& allowed) const {
     if (!entry.first.IsScalar()) throw key.ErrorHere("a key must be a plain word");
     const std::string name = entry.first.Scalar();
     if (std::find(allowed.begin(), allowed.end(), name) == allowed.end()) {
-      throw key.ErrorHere(fmt::format("unknown key '{}'; {}", name, SuggestionFor(name, allowed)));
+      throw key.ErrorHere(
+          fmt::format("unknown key '{}'; {}", Shown(name), SuggestionFor(name, allowed)));
     }
     if (!seen.insert(name).second)
-      throw key.ErrorHere(fmt::format("key '{}' stands here twice", name));
+      throw key.ErrorHere(fmt::format("key '{}' stands here twice", Shown(name)));
   }
 }
 
@@ -233,17 +264,23 @@ double YamlNode::Number() const {
   if (status != std::errc() || rest != end) {
     const bool has_unit = status == std::errc() && std::isfinite(value);
     throw ErrorHere(fmt::format(
-        "{}, found '{}'{}", expected, text,
+        "{}, found '{}'{}", expected, Shown(text),
         has_unit ? "; the unit is in the key's name, the value is the bare number" : ""));
   }
   if (!std::isfinite(value))
-    throw ErrorHere(fmt::format("a finite number is expected, found '{}'", text));
+    throw ErrorHere(fmt::format("a finite number is expected, found '{}'", Shown(text)));
+  if (!(std::abs(value) <= kMostMagnitude)) {
+    throw ErrorHere(fmt::format("a number between {} and {} is expected, found '{}'",
+                                -kMostMagnitude, kMostMagnitude, Shown(text)));
+  }
   return value;
 }
 
 double YamlNode::PositiveNumber() const {
   const double value = Number();
   if (!(value > 0)) throw ErrorHere(fmt::format("must be > 0, found {}", value));
+  if (!(value >= kLeastPositive))
+    throw ErrorHere(fmt::format("must be at least {}, found {}", kLeastPositive, value));
   return value;
 }
 
@@ -260,7 +297,7 @@ int YamlNode::Integer(int min, int max) const {
   int value = 0;
   const auto [rest, status] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (status != std::errc() || rest != text.data() + text.size() || value < min || value > max) {
-    throw ErrorHere(fmt::format("{}, found '{}'", expected, text));
+    throw ErrorHere(fmt::format("{}, found '{}'", expected, Shown(text)));
   }
   return value;
 }
@@ -277,7 +314,7 @@ std::string YamlNode::Text() const {
 std::string YamlNode::OneOf(const std::vector<std::string>& allowed) const {
   const std::string text = Text();
   if (std::find(allowed.begin(), allowed.end(), text) == allowed.end()) {
-    throw ErrorHere(fmt::format("one of {} is expected, found '{}'", Join(allowed), text));
+    throw ErrorHere(fmt::format("one of {} is expected, found '{}'", Join(allowed), Shown(text)));
   }
   return text;
 }
