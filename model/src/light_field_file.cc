@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <filesystem>
 
 #include "thicklens/error.h"
 #include "thicklens/model/input_file.h"
@@ -98,6 +99,14 @@ void ReadGrid(const YamlNode& root, LightField* light_field) {
 void ReadCameraAndGrid(const YamlNode& root, LightFieldDescription* description) {
   if (const auto camera = root.Find("camera")) {
     description->camera_file = camera->Text();
+    // What a light field from elsewhere names must come with it: no other file is opened.
+    const std::filesystem::path file = description->camera_file;
+    const bool leads_out =
+        file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end();
+    if (leads_out) {
+      throw camera->ErrorHere(fmt::format(
+          "a file in the folder of the light field is expected, found '{}'", file.string()));
+    }
     ReadGrid(root, &description->light_field);
     return;
   }
