@@ -288,9 +288,16 @@ class ViewReader {
   // The same, of the size and channels of the frame.
   model::LinearPicture ReadLike(const model::LightField& frame, int k, int l) const {
     model::LinearPicture picture = Read(k, l);
+    RequireLike(frame, k, l, picture);
+    return picture;
+  }
+
+  // Throws Error unless the view has the size and channels of the frame.
+  void RequireLike(const model::LightField& frame, int k, int l,
+                   const model::LinearPicture& picture) const {
     if (picture.width_px == frame.s_count && picture.height_px == frame.t_count &&
         picture.channels == frame.channels) {
-      return picture;
+      return;
     }
     throw Error(fmt::format(
         "{}: view ({}, {}) has {}x{} px in {} channel(s), the light field {}x{} in {}: they must "
@@ -394,9 +401,9 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   }
   const ViewReader reader(source, (source.frame.u_count - frame.u_count) / 2,
                           (source.frame.v_count - frame.v_count) / 2);
+  const std::pair<int, int> first_place = FirstPresent(frame);
+  model::LinearPicture first = reader.Read(first_place.first, first_place.second);
   if (frame.s_count == 0) {  // only the views themselves tell
-    const auto [k, l] = FirstPresent(frame);
-    const model::LinearPicture first = reader.Read(k, l);
     frame.s_count = first.width_px;
     frame.t_count = first.height_px;
     frame.channels = first.channels;
@@ -404,6 +411,8 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   model::LightField light_field =
       reading.crop ? NamingTheFolder(folder, [&] { return CropViews(frame, *reading.crop); })
                    : frame;
+  // Not before a view is as large as is said: memory for what is not there may be all there is.
+  reader.RequireLike(frame, first_place.first, first_place.second, first);
   light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
   // Bits of one vector cannot be set by several threads.
   const std::vector<bool> present = std::exchange(light_field.present, {});
@@ -411,7 +420,8 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
     const int k = i % frame.u_count;
     const int l = i / frame.u_count;
     if (!frame.IsPresent(k, l)) return;
-    model::LinearPicture view = reader.ReadLike(frame, k, l);
+    const bool is_first = std::pair(k, l) == first_place;
+    model::LinearPicture view = is_first ? std::move(first) : reader.ReadLike(frame, k, l);
     if (reading.crop) view = model::CropPicture(view, *reading.crop);
     model::SetView(&light_field, k, l, view);
   });
