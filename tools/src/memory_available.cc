@@ -1,6 +1,7 @@
 #include "memory_available.h"
 
 #include <malloc.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <fstream>
@@ -66,7 +67,23 @@ std::optional<double> LeftOfControlGroupMib(const std::string& root) {
   return least;
 }
 
+std::optional<double> LeftOfAddressSpaceMib(const std::string& root) {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return std::nullopt;
+  const double limit_mib = static_cast<double>(limit.rlim_cur) / (1 << 20);
+  const double used_mib = Mebibytes(root + "/proc/self/status", "VmSize").value_or(0);
+  return std::max(0.0, limit_mib - used_mib);
+}
+
 }  // namespace
+
+std::optional<double> MemoryLeftMib(const std::string& root) {
+  std::optional<double> least = Mebibytes(root + "/proc/meminfo", "MemAvailable");
+  for (const auto& left : {LeftOfControlGroupMib(root), LeftOfAddressSpaceMib(root)}) {
+    if (left) least = std::min(least.value_or(*left), *left);
+  }
+  return least;
+}
 
 std::optional<double> UsualMemoryLimitMib(const std::string& root) {
   constexpr double kShare = 0.8;

@@ -14,6 +14,7 @@
 #include <cstring>
 #include <memory>
 
+#include "memory_available.h"
 #include "opencv_codecs.h"
 #include "png_check.h"
 #include "png_pixels.h"
@@ -276,6 +277,20 @@ std::optional<StatedSize> SizeOf(const std::string& bytes, PictureKind kind) {
   return SizeOfPnm(bytes);
 }
 
+// A small file may unpack to more than there is memory for: told before, and by its name. Decoded
+// it has a byte or more for a value, and then it is copied to wider numbers.
+void RequireMemory(const StatedSize& size, const std::string& name) {
+  constexpr double kCopies = 3, kLittleMib = 64;
+  const double needed_mib =
+      kCopies * size.width_px * size.height_px * std::max(1.0, size.bytes_per_px) / (1 << 20);
+  if (needed_mib <= kLittleMib) return;
+  const std::optional<double> left_mib = MemoryLeftMib();
+  if (!left_mib || needed_mib <= *left_mib) return;
+  throw Error(
+      fmt::format("{}: {:.0f}x{:.0f} px need {:.0f} MiB of memory at least, {:.0f} MiB are left",
+                  name, size.width_px, size.height_px, needed_mib, *left_mib));
+}
+
 }  // namespace
 
 std::optional<PictureKind> KindOfPicture(const std::string& bytes) {
@@ -300,7 +315,10 @@ void RequirePossibleSize(const std::string& bytes, PictureKind kind, const std::
   // Small pictures in a container of their own may be larger than they need to be.
   constexpr double kLittle = 1 << 20;
   const double needed = size->width_px * size->height_px * size->bytes_per_px;
-  if (needed <= kLittle + size->most_of_a_byte * static_cast<double>(bytes.size())) return;
+  if (needed <= kLittle + size->most_of_a_byte * static_cast<double>(bytes.size())) {
+    RequireMemory(*size, name);
+    return;
+  }
   throw Error(fmt::format("{}: a broken picture: {:.0f}x{:.0f} px cannot be in {} bytes", name,
                           size->width_px, size->height_px, bytes.size()));
 }
