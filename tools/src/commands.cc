@@ -14,6 +14,8 @@
 #include <system_error>
 
 #include "interrupt.h"
+#include "message_line.h"
+#include "option_values.h"
 #include "printable_text.h"
 #include "run_files.h"
 #include "svg_plot.h"
@@ -106,7 +108,7 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
     throw;
   } catch (const Error& error) {
     RethrowIfInputWouldBeLost();
-    summary.WriteRefusal(error.what());
+    summary.WriteRefusal(MessageLine(error.what()));
     throw;
   }
   summary.Write(result.summary);

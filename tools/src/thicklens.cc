@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -19,6 +18,7 @@
 #include "build_info.h"
 #include "commands.h"
 #include "interrupt.h"
+#include "message_line.h"
 #include "option_values.h"
 #include "printable_text.h"
 #include "program_memory.h"
@@ -40,13 +40,12 @@ void SetUpMessages() {
   FLAGS_logtostderr = true;                // and not into files of /tmp or the current folder
   google::InitGoogleLogging("thicklens");
   spdlog::set_default_logger(spdlog::stderr_logger_mt("thicklens"));
-  spdlog::set_pattern("thicklens: %l: %v");
+  spdlog::set_formatter(tools::MakeMessageFormatter());
 }
 
 int Fail(std::string message, ExitCode code) {
   while (!message.empty() && message.back() == '\n') message.pop_back();
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  spdlog::error("{}", tools::PrintableUtf8(message));  // names of files may hold any byte
+  spdlog::error("{}", message);
   return code;
 }
 
