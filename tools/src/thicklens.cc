@@ -49,6 +49,19 @@ int Fail(std::string message, ExitCode code) {
   return code;
 }
 
+// What a variable of the shell gives that was never set is no name of a file and no other value.
+void RequireNoEmptyValue(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& value : option->results()) {
+      if (value.empty()) {
+        throw tools::UsageError(fmt::format("{}: a value is expected, found ''",
+                                            option->get_name(option->get_positional())));
+      }
+    }
+  }
+  for (const CLI::App* inner : command.get_subcommands()) RequireNoEmptyValue(*inner);
+}
+
 int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc, char** argv) {
   try {
     program->parse(argc, argv);
@@ -57,6 +70,7 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
   } catch (const CLI::ParseError& error) {
     return Fail(fmt::format("{} (see --help)", error.what()), kUsage);
   }
+  RequireNoEmptyValue(*program);
   (*action)();
   // Results that did not reach their file are a failure; a reader who went away is none.
   errno = 0;
