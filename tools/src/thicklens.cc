@@ -20,7 +20,7 @@
 #include "interrupt.h"
 #include "message_line.h"
 #include "option_values.h"
-#include "printable_text.h"
+#include "process_start.h"
 #include "program_memory.h"
 #include "sanitized.h"
 #include "thicklens/error.h"
@@ -87,6 +87,7 @@ int Main(int argc, char** argv) {
   SetUpMessages();
   tools::CatchSignals();
   for (const std::string& line : tools::DistrustRelativePaths()) spdlog::warn("{}", line);
+  tools::RequireStack();
   CLI::App program(
       "Thick-lens camera calibration from focus sweeps, and light fields from one picture",
       "thicklens");

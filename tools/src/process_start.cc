@@ -1,0 +1,76 @@
+// What has to be in order before the program begins. Its first part runs before any library is
+// initialised, so that this file is part of the program itself and not of its library.
+#include "process_start.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include "sanitized.h"
+#include "thicklens/error.h"
+
+namespace thicklens::tools {
+namespace {
+
+#if defined(__ELF__) && defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
+
+// Nothing of a library may be called here.
+bool BeginsWith(const char* text, const char* start) {
+  while (*start != '\0' && *text == *start) {
+    ++text;
+    ++start;
+  }
+  return *start == '\0';
+}
+
+bool IsOneOf(const char* text, const char* const* words) {
+  for (; *words != nullptr; ++words) {
+    const char* word = *words;
+    const char* at = text;
+    while (*word != '\0' && *at == *word) {
+      ++at;
+      ++word;
+    }
+    if (*word == '\0' && *at == '\0') return true;
+  }
+  return false;
+}
+
+// OpenCV ends a program, before its main() runs, whose environment has a value that it cannot read
+// (OPENCV_DUMP_ERRORS=abc), writes files into the current folder (OPENCV_TRACE=1) and refuses
+// images (OPENCV_IO_MAX_IMAGE_PIXELS=1). None of its variables is a setting of thicklens, but the
+// one without which some versions read no EXR.
+bool IsSettingToForget(const char* variable) {
+  static const char* const kTruths[] = {"0", "1", "true", "false", "True", "False", "TRUE", "FALSE",
+                                        nullptr};
+  static const char kExr[] = "OPENCV_IO_ENABLE_OPENEXR=";
+  if (!BeginsWith(variable, "OPENCV_")) return false;
+  return !BeginsWith(variable, kExr) || !IsOneOf(variable + sizeof kExr - 1, kTruths);
+}
+
+void ForgetSettings(int /*argc*/, char** /*argv*/, char** environment) {
+  char** kept = environment;
+  for (char** variable = environment; *variable != nullptr; ++variable) {
+    if (!IsSettingToForget(*variable)) *kept++ = *variable;
+  }
+  *kept = nullptr;
+}
+
+__attribute__((section(".preinit_array"), used)) void (*const forget_settings)(int, char**, char**) =
+    ForgetSettings;
+
+#endif
+
+}  // namespace
+
+void RequireStack() {
+  constexpr rlim_t kNeededKib = 512;  // a calibration fails with 128 and works with 256
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY ||
+      limit.rlim_cur >= kNeededKib * 1024) {
+    return;
+  }
+  throw Error(fmt::format("ulimit -s: the stack is limited to {} KiB; {} KiB at least are needed",
+                          limit.rlim_cur / 1024, kNeededKib));
+}
+
+}  // namespace thicklens::tools
