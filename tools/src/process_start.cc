@@ -35,14 +35,27 @@ bool IsOneOf(const char* text, const char* const* words) {
   return false;
 }
 
+// Compiled kernels are code: those of the current folder may be anybody's, and the standard for
+// these folders has relative ones ignored.
+bool IsRelativeCache(const char* variable) {
+  static const char* const kFolders[] = {"XDG_CACHE_HOME=", "POCL_CACHE_DIR="};
+  for (const char* const name : kFolders) {
+    if (!BeginsWith(variable, name)) continue;
+    while (*variable != '=') ++variable;
+    return variable[1] != '\0' && variable[1] != '/';
+  }
+  return false;
+}
+
 // OpenCV ends a program, before its main() runs, whose environment has a value that it cannot read
 // (OPENCV_DUMP_ERRORS=abc), writes files into the current folder (OPENCV_TRACE=1) and refuses
 // images (OPENCV_IO_MAX_IMAGE_PIXELS=1). None of its variables is a setting of thicklens, but the
 // one without which some versions read no EXR.
 bool IsSettingToForget(const char* variable) {
-  static const char* const kTruths[] = {"0", "1", "true", "false", "True", "False", "TRUE", "FALSE",
-                                        nullptr};
+  static const char* const kTruths[] = {"0",     "1",    "true",  "false", "True",
+                                        "False", "TRUE", "FALSE", nullptr};
   static const char kExr[] = "OPENCV_IO_ENABLE_OPENEXR=";
+  if (IsRelativeCache(variable)) return true;
   if (!BeginsWith(variable, "OPENCV_")) return false;
   return !BeginsWith(variable, kExr) || !IsOneOf(variable + sizeof kExr - 1, kTruths);
 }
@@ -55,8 +68,8 @@ void ForgetSettings(int /*argc*/, char** /*argv*/, char** environment) {
   *kept = nullptr;
 }
 
-__attribute__((section(".preinit_array"), used)) void (*const forget_settings)(int, char**, char**) =
-    ForgetSettings;
+__attribute__((section(".preinit_array"),
+               used)) void (*const forget_settings)(int, char**, char**) = ForgetSettings;
 
 #endif
 
