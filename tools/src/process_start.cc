@@ -8,6 +8,13 @@
 #include "sanitized.h"
 #include "thicklens/error.h"
 
+// OpenBLAS starts a thread for each processor when it is loaded, before main() and although the
+// program lets it use one. Where memory is short such a thread asks for some for ever, and a fork
+// waits for its end; where there is none to be had, OpenBLAS ends the program. This is OpenBLAS's
+// own function for what OPENBLAS_NUM_THREADS says; the one of the program is found first.
+extern "C" __attribute__((visibility("default"))) int openblas_num_threads_env();
+extern "C" int openblas_num_threads_env() { return 1; }
+
 namespace thicklens::tools {
 namespace {
 
