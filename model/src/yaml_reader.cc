@@ -58,7 +58,7 @@ std::string SuggestionFor(const std::string& key, const std::vector<std::string>
   return fmt::format("allowed here: {}", Join(allowed));
 }
 
-// What was found, as a message shows it: the whole of it only where it is short.
+// A message shows what was found in full only where it is short.
 std::string Shown(const std::string& text) {
   constexpr std::size_t kLongest = 80, kBegin = 40;
   if (text.size() <= kLongest) return text;

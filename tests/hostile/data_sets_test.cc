@@ -73,12 +73,12 @@ THICKLENS_SITUATION(HostileDataSets, ALightFieldOfHugeViews,
   for (const std::string size : {"[100000, 100000]", "[9000, 9000]"}) {
     SCOPED_TRACE(size);
     ChangeDescription("size", size);
-    ExpectRefused(Shell(limit + Render("new.png"), 10), 1,
+    ExpectRefused(Shell(limit + Render("new.png"), 60), 1,
                   {"lf", "24x16", size.substr(1, size.find(',') - 1)});
   }
   ChangeDescription("size", "[24, 16]");
   ChangeDescription("views", "[1000, 1000]");
-  ExpectRefused(Shell(limit + Render("new.png"), 10), 1, {"lightfield.yaml:", "weights"});
+  ExpectRefused(Shell(limit + Render("new.png"), 60), 1, {"lightfield.yaml:", "weights"});
 }
 
 THICKLENS_SITUATION(HostileDataSets, AnOlderOutputWithLinksInIt,

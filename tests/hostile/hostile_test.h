@@ -69,7 +69,7 @@ class HostileTest : public ::testing::Test {
   static std::string Render(const std::string& output);     // lf to an image
   static std::string Calibrate(const std::string& output);  // sweep to a camera
 
-  static constexpr double kLimitSeconds = 30;
+  static constexpr double kLimitSeconds = 120;
 
  private:
   testing::TemporaryFolder root_;

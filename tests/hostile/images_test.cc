@@ -17,9 +17,9 @@ class HostileImages : public HostileTest {
     const std::string limit = testing::kIsSanitized ? "" : "ulimit -v 1200000; ";
     const std::string depth_words = " --depth-kind z --depth-unit mm --camera camera.yaml -o new";
     SCOPED_TRACE(name);
-    ExpectRefused(Shell(limit + "\"$T\" estimate " + name + " depth.pfm" + depth_words, 10), 1,
+    ExpectRefused(Shell(limit + "\"$T\" estimate " + name + " depth.pfm" + depth_words, 60), 1,
                   all);
-    ExpectRefused(Shell(limit + "\"$T\" estimate picture.png " + name + depth_words, 10), 1, all);
+    ExpectRefused(Shell(limit + "\"$T\" estimate picture.png " + name + depth_words, 60), 1, all);
   }
 };
 
@@ -93,12 +93,12 @@ THICKLENS_SITUATION(HostileImages, DirectoriesThatFormALoop,
   TiffParts parts{24, 16, 8, 1, std::string(24 * 16, '\x50')};
   parts.next_is_itself = true;
   Put("loop.tiff", TiffOf(parts));
-  const Outcome looped = Shell("\"$T\" compare loop.tiff loop.tiff", 10);
+  const Outcome looped = Shell("\"$T\" compare loop.tiff loop.tiff", 60);
   EXPECT_LE(looped.exit_code, 1) << looped.err;
   parts = {24, 16, 8, 1, std::string(24 * 16, '\x50')};
   parts.strip_at = 4000000000U;
   Put("beyond.tiff", TiffOf(parts));
-  ExpectRefused(Shell("\"$T\" compare beyond.tiff beyond.tiff", 10), 1, {"beyond.tiff"});
+  ExpectRefused(Shell("\"$T\" compare beyond.tiff beyond.tiff", 60), 1, {"beyond.tiff"});
 }
 
 }  // namespace

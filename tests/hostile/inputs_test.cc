@@ -92,7 +92,7 @@ class HostileInputs : public HostileTest {
       std::string arguments = slot;
       if (arguments.find('@') != std::string::npos) arguments.replace(arguments.find('@'), 1, name);
       SCOPED_TRACE(arguments);
-      constexpr int kSoon = 10;
+      constexpr int kSoon = 60;
       const std::string limit = testing::kIsSanitized ? "" : "ulimit -v 4000000; ";
       const Outcome outcome = Shell(limit + start + " \"$T\" " + arguments, kSoon);
       const int code = outcome.exit_code == 2 ? 2 : 1;

@@ -26,7 +26,7 @@ class HostileProcess : public HostileTest {
         "exec 3>&2; " + script + " & p=$!; sleep " + std::to_string(seconds) + "; kill -" + signal +
             " $p; begin=$(date +%s%N); wait $p; code=$?; echo $((($(date +%s%N) - begin) / "
             "1000000)); exit $code",
-        20);
+        kLimitSeconds);
     ExpectNothingBut(outcome, {"new"});
     // Before it listens, the signal ends it as it ends any program.
     EXPECT_THAT(outcome.exit_code, AnyOf(0, 1, 128 + 15, 128 + 1)) << outcome.err;
@@ -36,8 +36,8 @@ class HostileProcess : public HostileTest {
     if (outcome.exit_code == 1) {
       EXPECT_THAT(ErrorsIn(outcome.err), ::testing::ElementsAre(HasSubstr("interrupted")));
     }
-    // What is promised is 1 s; a machine that runs other tests beside may be slower.
-    constexpr int kMostMs = 3000;
+    // It is promised within 1 s; a machine that runs much else may take longer.
+    constexpr int kMostMs = 10000;
     EXPECT_LE(std::atoi(outcome.out.c_str()), kMostMs);
     fs::remove_all(Work("new"));
   }

@@ -23,7 +23,7 @@ class HostileText : public HostileTest {
   Outcome ExplainCamera(const std::string& content) {
     Put("hostile.yaml", content);
     const std::string limit = testing::kIsSanitized ? "" : "ulimit -v 2000000; ";
-    return Shell(limit + "\"$T\" explain hostile.yaml --depth-range 290:310", 10);
+    return Shell(limit + "\"$T\" explain hostile.yaml --depth-range 290:310", 60);
   }
   void ExpectCameraRefused(const std::string& content, const std::vector<std::string>& told = {}) {
     std::vector<std::string> all = {"hostile.yaml"};
@@ -38,7 +38,7 @@ class HostileText : public HostileTest {
     }
     Put("table.csv", content);
     return Shell(
-        "\"$T\" calibrate frames --readings table.csv --camera camera.yaml --dry-run -o new", 10);
+        "\"$T\" calibrate frames --readings table.csv --camera camera.yaml --dry-run -o new", 60);
   }
 };
 

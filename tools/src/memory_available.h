@@ -11,8 +11,8 @@ namespace thicklens::tools {
 // system does not say it. `root`: where /proc and /sys are, for tests.
 std::optional<double> UsualMemoryLimitMib(const std::string& root = "");
 
-// What can be had yet: of the system, of the control group, and of the address space where that is
-// limited (ulimit -v).
+// This is what a program can still have: of the system, of the control group, and of the address
+// space where that is limited (ulimit -v).
 std::optional<double> MemoryLeftMib(const std::string& root = "");
 
 // From now on what is freed goes back to the system, though that takes longer: what the program

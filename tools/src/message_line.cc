@@ -27,7 +27,7 @@ class MessageFormatter : public spdlog::formatter {
 }  // namespace
 
 std::string MessageLine(const std::string& text) {
-  // What went wrong is told at the end, the place at the beginning.
+  // A message has the place at its beginning and what would be right at its end.
   constexpr std::size_t kBegin = 1500, kEnd = 500;
   std::string line = text;
   if (line.size() > 2 * (kBegin + kEnd)) {

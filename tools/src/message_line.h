@@ -14,7 +14,7 @@ namespace thicklens::tools {
 // is left out.
 std::string MessageLine(const std::string& text);
 
-// Every message of the program is told like this: "thicklens: warning: ..." with the text as a
+// Every message of the program has this form: "thicklens: warning: ..." with the text as a
 // MessageLine.
 std::unique_ptr<spdlog::formatter> MakeMessageFormatter();
 

@@ -1,5 +1,5 @@
-// What has to be in order before the program begins. Its first part runs before any library is
-// initialised, so that this file is part of the program itself and not of its library.
+// This file sees to what must be in order before the program begins. Its first part runs before any
+// library is initialised, so that this file is part of the program itself and not of its library.
 #include "process_start.h"
 
 #include <fmt/format.h>

@@ -49,7 +49,7 @@ int Fail(std::string message, ExitCode code) {
   return code;
 }
 
-// What a variable of the shell gives that was never set is no name of a file and no other value.
+// A variable of the shell that was never set gives an empty text, which is never a value.
 void RequireNoEmptyValue(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& value : option->results()) {
