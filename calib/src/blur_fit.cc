@@ -301,11 +301,18 @@ BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start) {
   const double offset_sigma_mm = setup.offset_mm.sigma;
   if (!result.done || !(offset_sigma_mm > 0)) return result;
   // How the answer moves with the bench zero, by central differences over its own uncertainty.
-  BlurFitSetup moved = setup;
-  moved.offset_mm.value = setup.offset_mm.value + offset_sigma_mm;
-  const BlurFitResult above = Fit(moved, information).Run(&result, false);
-  moved.offset_mm.value = setup.offset_mm.value - offset_sigma_mm;
-  const BlurFitResult below = Fit(moved, information).Run(&result, false);
+  // The depths move with the zero, and the focus with them: started where it was, a fit of a sweep
+  // that is short against that error would begin outside the sweep.
+  const auto moved_by = [&](double move_mm) {
+    BlurFitSetup moved = setup;
+    moved.offset_mm.value += move_mm;
+    BlurFitResult start_there = result;
+    start_there.values[kFocusDepth] =
+        std::max(result.values[kFocusDepth] + move_mm, 1.001 * setup.lens.front_focal_length_mm);
+    return Fit(moved, information).Run(&start_there, false);
+  };
+  const BlurFitResult above = moved_by(offset_sigma_mm);
+  const BlurFitResult below = moved_by(-offset_sigma_mm);
   if (!above.done || !below.done) {
     result.done = false;
     result.message =
