@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kGreyLevels = 255;
+constexpr double kEightBitLevels = 255;
 
 std::string TransferFrom(const EstimateOptions& options) {
   if (!options.transfer.empty()) return "option";
@@ -179,7 +179,7 @@ std::string SolverText(const json& summary, const EstimateOutcome& outcome) {
   const estimator::SceneSummary& scene = *outcome.scene;
   return fmt::format("solver       scene: {}\n", scene.message) +
          fmt::format("picture      noise {:.2f} grey levels, explained to {:.2f} (rms)\n",
-                     kGreyLevels * scene.noise_sigma, kGreyLevels * scene.residual_rms);
+                     kEightBitLevels * scene.noise_sigma, kEightBitLevels * scene.residual_rms);
 }
 
 std::string AccuracyText(const EstimateOutcome& outcome) {
@@ -294,14 +294,14 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
         "{} patch(es) of the photograph are not explained, the worst at x {} .. {}, y {} .. {} px "
         "with a residual of {:.1f} grey levels (noise: {:.1f}): the depth is probably wrong there",
         outcome.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
-        worst.y + worst.height_px - 1, kGreyLevels * worst.rms,
-        kGreyLevels * outcome.scene->noise_sigma));
+        worst.y + worst.height_px - 1, kEightBitLevels * worst.rms,
+        kEightBitLevels * outcome.scene->noise_sigma));
   }
   if (outcome.unexplained_share && *outcome.unexplained_share > estimator::kMostUnexplained) {
     warnings.push_back(fmt::format(
         "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
         "likely it is sharper than this depth and aperture say; {}",
-        100 * *outcome.unexplained_share, kGreyLevels * outcome.scene->noise_sigma,
+        100 * *outcome.unexplained_share, kEightBitLevels * outcome.scene->noise_sigma,
         options.camera_path.empty() || options.depth.kind == "disparity"
             ? "are --disparity-scale and --disparity-offset right?"
             : "are the depth's unit, and the camera's aperture and focus, right?"));
@@ -313,7 +313,7 @@ std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
         "the photograph is explained to {:.1f} grey levels (noise: {:.1f}), and hardly any of it "
         "is seen by the whole aperture: it is wide for a picture of {} x {} px, or the depth is "
         "rough; whether that is right cannot be told",
-        kGreyLevels * outcome.scene->residual_rms, kGreyLevels * outcome.scene->noise_sigma,
+        kEightBitLevels * outcome.scene->residual_rms, kEightBitLevels * outcome.scene->noise_sigma,
         prepared.input.disparity.width_px, prepared.input.disparity.height_px));
   }
   const std::string blur = outcome.blur ? outcome.blur->Warning() : "";
