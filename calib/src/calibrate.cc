@@ -15,8 +15,12 @@
 #include "focus_solution.h"
 #include "frame_selection.h"
 #include "frame_store.h"
+#include "frame_structure.h"
+#include "radial_causes.h"
 #include "reading_gates.h"
+#include "scale_causes.h"
 #include "scale_tracking.h"
+#include "sharpest_reading.h"
 #include "sharpness_peak.h"
 #include "source_recipe.h"
 #include "systematic_advice.h"
@@ -31,6 +35,7 @@ namespace {
 
 constexpr double kZeroReach = 2;    // standard deviations of a zero that contradicts another
 constexpr double kZeroMoves = 0.1;  // of the zero's standard deviation, and what moves it matters
+constexpr double kFewRegistered = 0.8;  // of the used frames: below, the light may be the reason
 
 class Calibrator {
  public:
@@ -87,7 +92,21 @@ class Calibrator {
         EndBeforeFit();
       }
     }
+    FindSharpest();
     NamePlainCause();
+  }
+
+  // Even of a sweep that is refused, from the frames that the gates of light let pass.
+  void FindSharpest() {
+    const SharpestReading found = FindSharpestReading(result_.frames, used());
+    if (found.done || !result_.sharpest.done) result_.sharpest = found;
+  }
+
+  void LookForStructure(const std::vector<ScaleSample>& samples) {
+    if (result_.structure.measured) return;
+    result_.structure =
+        MeasureStructure({sweep_, [this](std::size_t frame) { return Grey(frame); }, used(),
+                          samples, RegionCentre(sweep_), [this] { Tick(); }});
   }
 
   void EndBeforeFit() {
@@ -97,7 +116,8 @@ class Calibrator {
 
   // What the frames that are left fail for is often only the consequence of something plainer.
   void NamePlainCause() {
-    const std::string exposure = ExposureAdvice(result_.frames);
+    const std::string exposure =
+        ExposureAdvice(result_.frames, [this] { return store_.Stored(0).depth() == CV_16U; });
     if (result_.outcome != Outcome::kRefused) {
       if (!exposure.empty())
         result_.warnings.insert(result_.warnings.begin(),
@@ -105,8 +125,9 @@ class Calibrator {
       return;
     }
     for (const std::string& cause :
-         {exposure, RegionAdvice(sweep_), UnitAdvice(sweep_, result_.frames, result_.scale),
-          RegistrationAdvice(sweep_, result_.frames, used(), result_.scale)}) {
+         {exposure, RegionAdvice(sweep_),
+          UnitAdvice(sweep_, result_.frames, result_.scale, causes_),
+          RegistrationAdvice(sweep_, result_.frames, used(), result_.scale, result_.structure)}) {
       if (cause.empty()) continue;
       // What is missing because of the light is not to be advised on.
       result_.reason = cause == exposure ? cause : cause + "; as it is, " + result_.reason;
@@ -166,7 +187,9 @@ class Calibrator {
         frame.source_blur_sigma_px = blur->sigma_px;
     });
     reference_ = SharpestUsed();
-    return Passed(selection_.KeepThoseWithEdges());
+    if (!Passed(selection_.KeepThoseWithEdges())) return false;
+    FindSharpest();
+    return true;
   }
 
   std::size_t SharpestUsed() const {
@@ -192,9 +215,12 @@ class Calibrator {
       result_.frames[sample.frame].image_scale = sample.scale;
       result_.frames[sample.frame].image_scale_sigma = sample.registration.scale_sigma;
     }
+    if (!is_lone_edge && !ScalesAllowAResult(samples)) return false;
     if (const auto reason = ReasonAgainstScales(sweep_, result_.frames, used(), result_.scale))
       return Refuse(*reason);
-    RejectUnregistered(samples, used(), reference_, result_.scale, &result_.frames);
+    RejectUnregistered(samples, used(), reference_, result_.scale, result_.structure,
+                       &result_.frames);
+    WarnOfBands(samples.size());
     RejectWrongReadings(sweep_, samples, result_.scale, &result_.frames);
     if (!Passed(selection_.KeepUnrejected())) return false;
     for (const ScaleSample& sample : samples) {
@@ -206,7 +232,7 @@ class Calibrator {
     if (sweep_.offset_mm) {
       TakeGivenOffset();
       if (!is_lone_edge) {
-        const OffsetCheck check = CheckGivenOffset(sweep_, &result_);
+        const OffsetCheck check = CheckGivenOffset(sweep_, UnitThatFits(sweep_, causes_), &result_);
         if (check.refusal) return Refuse(*check.refusal);
         conflicting_offset_mm_ = check.conflicting_mm;
       }
@@ -215,11 +241,36 @@ class Calibrator {
     } else {
       return Refuse(ReasonOfUnknownOffset(result_.scale));
     }
+    if (ShowsDistortion(result_) || FindBend(scales_, result_.scale, sweep_))
+      LookForStructure(scales_);
     if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
     slip_ = FindSlip(scales_, result_.scale);
     if (slip_) WarnOfSlip(*slip_, &result_);
     bend_ = CheckBend(sweep_, scales_, &result_);
     return PlacedWithinReach();
+  }
+
+  // Compares what may be behind the scales as they are.
+  bool ScalesAllowAResult(const std::vector<ScaleSample>& samples) {
+    const ScaleKind kind = result_.scale.kind;
+    if (static_cast<double>(samples.size()) < kFewRegistered * static_cast<double>(used().size()))
+      LookForStructure(samples);
+    if (kind == ScaleKind::kConstant) {
+      const std::string warning = ConstantScaleWarning(sweep_, samples);
+      if (!warning.empty()) result_.scale.message = warning;
+    }
+    if (kind != ScaleKind::kInverseDepth && kind != ScaleKind::kReversed) return true;
+    causes_ = CompareScaleCauses(samples, sweep_);
+    result_.diagnoses.push_back(causes_.diagnosis);
+    const auto reason = ReasonOfScaleCauses(sweep_, result_.scale, causes_);
+    return !reason || Refuse(*reason);
+  }
+
+  void WarnOfBands(std::size_t registered) {
+    if (!result_.structure.HasBands() || !result_.scale.done) return;
+    result_.warnings.push_back(fmt::format("only {} of {} frames could be registered: {}",
+                                           registered, used().size(),
+                                           StructureInWords(result_.structure)));
   }
 
   // The given bench zero and the readings as they are.
@@ -356,8 +407,7 @@ class Calibrator {
     if (bend_ && !sweep_.offset_mm) {
       const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);
       const double zero_mm = setup.offset_mm.value;
-      WidenByTrials("bend of the image scale",
-                    "measure offset_mm, check the rail's scale, undistort the pictures",
+      WidenByTrials("bend of the image scale", BendRemedy(result_.structure),
                     WithOffsets(setup, {zero_mm - half_mm, zero_mm + half_mm}), fit, &result_);
     }
   }
@@ -414,6 +464,7 @@ class Calibrator {
   FrameSelection selection_{&result_.frames};  // frames that passed the gates
   std::size_t reference_ = 0;                  // the sharpest of them, normalised
   std::vector<ScaleSample> scales_;            // registered frames
+  ScaleCauses causes_;                         // what may be behind the scales
   std::optional<Slip> slip_;
   std::optional<Bend> bend_;
   bool zero_is_settled_ = false;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "frame_selection.h"
+#include "radial_causes.h"
 #include "scale_tracking.h"
 #include "target_period.h"
 
@@ -14,8 +15,6 @@ namespace {
 
 // A given bench zero that lies farther off than this part of the depth is no error of measurement.
 constexpr double kGrossOffset = 0.1;
-// Relative change of the image height at the corner.
-constexpr double kGrossDistortion = 0.05;
 
 // m = f1 D/(f2 z) on the sensor over the target, so D = m z f2/f1.
 MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstimate& period,
@@ -35,7 +34,8 @@ MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstim
 
 }  // namespace
 
-OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) {
+OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_that_fits,
+                             Calibration* calibration) {
   OffsetCheck check;
   const ScaleLaw& law = calibration->scale;
   if (!law.done) {
@@ -56,6 +56,7 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) 
   if (std::abs(apart_mm) > kGrossOffset * law.reference_depth_mm &&
       std::abs(apart_mm) > 5 * sigma_mm) {
     check.refusal = found + ": check offset_mm, and that it and the readings are in mm";
+    if (!unit_that_fits.empty()) *check.refusal += " (" + unit_that_fits + ")";
     return check;
   }
   calibration->warnings.push_back(found);
@@ -63,30 +64,11 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration) 
   return check;
 }
 
-std::optional<std::string> CheckDistortion(Calibration* calibration) {
-  const auto& distortion = calibration->scale.distortion_at_corner;
-  if (!distortion || !(std::abs(distortion->value) > std::max(0.005, 4 * distortion->sigma)))
-    return std::nullopt;
-  const std::string found = fmt::format(
-      "the pictures are distorted: {:+.1f} +- {:.1f} % at the corner ({}); undistort them first",
-      100 * distortion->value, 100 * distortion->sigma,
-      distortion->value > 0 ? "pincushion" : "barrel");
-  if (std::abs(distortion->value) > kGrossDistortion) return found;
-  calibration->warnings.push_back(found + ", depth and blur are those of an undistorted camera");
-  return std::nullopt;
-}
-
 std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSample>& scales,
                               Calibration* calibration) {
   const std::optional<Bend> bend = FindBend(scales, calibration->scale, sweep);
   if (!bend) return std::nullopt;
-  calibration->warnings.push_back(fmt::format(
-      "the readings bend against the image scale: in the middle of the sweep they lie {:+.2f} +- "
-      "{:.2f} mm off the straight line through its ends. The rail's scale is not linear, the "
-      "pictures are distorted, or the lens breathes. A bench zero from the image scale is then "
-      "less certain than its error says: the farther half of the sweep alone puts it {:+.1f} mm "
-      "from where the nearer half does",
-      bend->bow_mm.value, bend->bow_mm.sigma, bend->zero_spread_mm));
+  calibration->warnings.push_back(BendInWords(*bend, *calibration));
   return bend;
 }
 

@@ -22,10 +22,9 @@ struct OffsetCheck {
   std::optional<std::string> refusal;
   std::optional<model::Estimate> conflicting_mm;
 };
-OffsetCheck CheckGivenOffset(const FocusSweep& sweep, Calibration* calibration);
-
-// A refusal where the pictures are distorted beyond what can be allowed for.
-std::optional<std::string> CheckDistortion(Calibration* calibration);
+// `unit_that_fits`: what UnitThatFits says.
+OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_that_fits,
+                             Calibration* calibration);
 
 // Readings that go along a curve against the image scale.
 std::optional<Bend> CheckBend(const FocusSweep& sweep, const std::vector<ScaleSample>& scales,

@@ -5,11 +5,13 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <opencv2/core.hpp>
 
 #include "edge_pixels.h"
 #include "evenly_spread.h"
+#include "misfit_causes.h"
 #include "systematic_advice.h"
 #include "thicklens/model/parallel.h"
 
@@ -46,8 +48,11 @@ class Field {
       return;
     }
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
-    MapTiles();
+    // First: it may be what lets parts of the field come into focus at different depths.
     MeasureAstigmatism();
+    const std::string astigmatism = AstigmatismInWords(result_);
+    if (!astigmatism.empty()) result_.warnings.push_back(astigmatism);
+    MapTiles();
     MeasureChannels();
   }
 
@@ -270,10 +275,17 @@ class Field {
       depths += fmt::format("{}{:.2f} mm ({} parts)", depths.empty() ? "" : ", ",
                             cluster.focus_depth_mm.value, cluster.tiles);
     }
+    const double spread_mm =
+        map.clusters.back().focus_depth_mm.value - map.clusters.front().focus_depth_mm.value;
     result_.warnings.push_back(
-        fmt::format("the target is not at one depth; parts of the field come into focus at {}: "
-                    "restrict roi_px to one of them",
-                    depths));
+        AstigmatismExplains(spread_mm, result_)
+            ? fmt::format("parts of the field come into focus at {}: the astigmatism is as large, "
+                          "and does that where the texture runs another way; or the target is not "
+                          "at one depth. A target of even texture in all directions tells",
+                          depths)
+            : fmt::format("the target is not at one depth; parts of the field come into focus at "
+                          "{}: restrict roi_px to one of them",
+                          depths));
   }
 
   void WarnOfTilt() {
@@ -283,9 +295,18 @@ class Field {
       return std::abs(tilt.value) > std::max(1.0, 4 * tilt.sigma);
     };
     if (!significant(*map.tilt_right_deg) && !significant(*map.tilt_down_deg)) return;
+    double nearest_mm = std::numeric_limits<double>::infinity(), farthest_mm = -nearest_mm;
+    for (const FieldTile& tile : map.tiles) {
+      if (!tile.done) continue;
+      nearest_mm = std::min(nearest_mm, tile.focus_depth_mm.value);
+      farthest_mm = std::max(farthest_mm, tile.focus_depth_mm.value);
+    }
     result_.warnings.push_back(fmt::format(
-        "the target is tilted against the sensor: {:+.1f} +- {:.1f} degrees toward the right, "
+        "{}the target is tilted against the sensor: {:+.1f} +- {:.1f} degrees toward the right, "
         "{:+.1f} +- {:.1f} toward the bottom (positive: nearer there)",
+        AstigmatismExplains(farthest_mm - nearest_mm, result_)
+            ? "the astigmatism makes parts of the field come into focus at different depths, or "
+            : "",
         map.tilt_right_deg->value, map.tilt_right_deg->sigma, map.tilt_down_deg->value,
         map.tilt_down_deg->sigma));
   }

@@ -12,6 +12,7 @@
 #include "edge_pixels.h"
 #include "floor_choice.h"
 #include "frame_outliers.h"
+#include "misfit_causes.h"
 #include "systematic_parts.h"
 
 namespace thicklens::calib {
@@ -39,7 +40,7 @@ class Solution {
     evidence_.setup.floor_variance_px2 = choice.variance_px2;
     fit_ = FitBlur(evidence_.setup);
     result_.blur.message = fit_.message;
-    if (!fit_.done) return Refuse(fit_.message);
+    if (!fit_.done) return Refuse(fit_.message + StatedFloor());
     FillBlur();
     FillFrames();
     FillValues();
@@ -62,6 +63,13 @@ class Solution {
     result_.focus_depth_mm.reset();
     result_.blur_ratio.reset();
     result_.blur_floor_px.reset();
+  }
+
+  // A floor that is stated too large leaves nothing of the blur, whatever else may be wrong.
+  std::string StatedFloor() const {
+    if (!sweep_.floor.given_px) return "";
+    return fmt::format(" (blur_floor_px is stated as {:.3g}, which may be too large)",
+                       sweep_.floor.given_px->value);
   }
 
   FrameMeasurement& Frame(std::size_t fit_frame) {
@@ -110,11 +118,10 @@ class Solution {
 
   void WarnOfMisfit() {
     if (!(fit_.chi2_per_dof > kLargeMisfit) || !(fit_.error_factor > 1)) return;
-    result_.warnings.push_back(fmt::format(
-        "the frames lie farther off the blur law than their errors say (chi2/dof {:.3g}), which "
-        "were widened for it: readings worse than stated, an aberrated lens, sharpened or "
-        "compressed pictures, a wrong sensor.transfer or another shape of the blur do that",
-        fit_.chi2_per_dof));
+    result_.warnings.push_back(
+        fmt::format("the frames lie farther off the blur law than their errors say (chi2/dof "
+                    "{:.3g}), which were widened for it: {}",
+                    fit_.chi2_per_dof, CausesOfMisfit(sweep_, evidence_, result_)));
   }
 
   void FillFrames() {
@@ -176,6 +183,17 @@ class Solution {
         Result{zf, std::sqrt(fit_.covariance(kFocusDepth, kFocusDepth)), std::nullopt};
     result_.blur_ratio = Result{fit_.values[kBlurRatio],
                                 std::sqrt(fit_.covariance(kBlurRatio, kBlurRatio)), std::nullopt};
+    const model::Estimate& zero_mm = evidence_.setup.offset_mm;
+    at_held_zero_ = fit_;
+    if (zero_mm.sigma > 0) {
+      BlurFitSetup held = evidence_.setup;
+      held.offset_mm.sigma = 0;
+      const BlurFitResult alone = FitBlur(held, &fit_);
+      if (alone.done) at_held_zero_ = alone;
+    }
+    result_.focus_reading_mm =
+        model::Estimate{model::DirectionSign(sweep_.direction) * (zf - zero_mm.value),
+                        std::sqrt(at_held_zero_.covariance(kFocusDepth, kFocusDepth))};
     result_.image_distance_mm =
         Result{model::ImageDistanceMm(lens, zf),
                std::abs(model::ImageDistanceSlope(lens, zf)) * result_.focus_depth_mm->sigma,
@@ -190,32 +208,43 @@ class Solution {
     const auto [nearest, farthest] = DepthRange();
     const double outside_mm = std::max({0.0, nearest - zf, zf - farthest});
     const char* side = zf < nearest ? "nearer" : "farther";
-    if (!(kappa > 3 * kappa_sigma)) {
+    // What the blur itself leaves open, the bench zero apart.
+    const double own_kappa_sigma = std::sqrt(at_held_zero_.covariance(kBlurRatio, kBlurRatio));
+    const double own_zf_sigma = result_.focus_reading_mm->sigma;
+    if (!(kappa > 3 * own_kappa_sigma)) {
+      result_.focus_reading_mm.reset();
       Refuse(fmt::format(
-          "the blur does not change over the sweep by more than its errors (blur ratio {:.3f} +- "
-          "{:.3f}): move the target farther from focus on both sides",
-          kappa, kappa_sigma));
+          "the blur does not change over the sweep by more than its errors, whatever the bench "
+          "zero "
+          "(kappa would be {:.2g} +- {:.2g}): move the target farther from focus on both sides",
+          kappa, own_kappa_sigma));
       return false;
     }
-    if (!(zf_sigma < 0.5 * (farthest - nearest))) {
+    if (!(own_zf_sigma < 0.5 * (farthest - nearest))) {
+      result_.focus_reading_mm.reset();
       Refuse(
           fmt::format("the depth of focus is not fixed by the blur: {:.1f} +- {:.1f} mm in a "
-                      "sweep from {:.1f} to {:.1f} mm",
-                      zf, zf_sigma, nearest, farthest));
+                      "sweep from {:.1f} to {:.1f} mm, with the bench zero held",
+                      zf, own_zf_sigma, nearest, farthest));
       return false;
     }
-    if (outside_mm > 0 && !(zf_sigma < StepMm())) {
+    if (!(zf_sigma < 0.5 * (farthest - nearest)) || !(kappa > 3 * kappa_sigma)) {
+      Refuse(ReasonOfZero(nearest, farthest));
+      return false;
+    }
+    if (outside_mm > 0 && !(own_zf_sigma < StepMm())) {
       Refuse(
           fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to "
                       "{:.1f} mm), about {:.0f} +- {:.0f} mm; extend the sweep that way",
-                      side, nearest, farthest, zf, zf_sigma));
+                      side, nearest, farthest, zf, own_zf_sigma));
       return false;
     }
     if (!(kappa >= kSmallestRatio && kappa <= kLargestRatio)) {
-      Refuse(
-          fmt::format("the blur ratio comes out as {:.3f}, which no lens has ({} to {}): check "
-                      "focal lengths, aperture radius, pixel pitch and the unit of the readings",
-                      kappa, kSmallestRatio, kLargestRatio));
+      Refuse(fmt::format(
+          "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): check "
+          "focal lengths, aperture radius, pixel pitch and the unit of the readings, and "
+          "that the target moved and not the lens",
+          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio));
       return false;
     }
     if (!(kappa >= kLowRatio && kappa <= kHighRatio)) {
@@ -232,6 +261,27 @@ class Solution {
                       zf, outside_mm, side));
     }
     return true;
+  }
+
+  // The blur fixes where focus lies in the sweep, and the bench zero does not fix where the sweep
+  // lies.
+  std::string ReasonOfZero(double nearest_mm, double farthest_mm) const {
+    const model::Estimate& zero_mm = evidence_.setup.offset_mm;
+    const std::string from =
+        sweep_.offset_mm
+            ? fmt::format("offset_mm is stated as {:.4g} +- {:.2g} mm", zero_mm.value,
+                          zero_mm.sigma)
+            : fmt::format(
+                  "the sweep is {:.3g} mm long at a depth of {:.4g} mm, too short for its "
+                  "image scale to fix the bench zero ({:.4g} +- {:.2g} mm)",
+                  farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma);
+    return fmt::format(
+        "the bench zero is not known well enough: {}, so that the depth of focus is {:.1f} +- "
+        "{:.1f} mm. Where focus lies in the sweep is known: at the reading {:.6g} +- {:.2g} mm. "
+        "State offset_mm{}",
+        from, fit_.values[kFocusDepth], result_.focus_depth_mm->sigma,
+        result_.focus_reading_mm->value, result_.focus_reading_mm->sigma,
+        sweep_.offset_mm ? " more exactly" : "");
   }
 
   void FillFloor(const FloorChoice& choice) {
@@ -300,6 +350,7 @@ class Solution {
   const FocusSweep& sweep_;
   BlurEvidence& evidence_;
   BlurFitResult& fit_;
+  BlurFitResult at_held_zero_;  // the same fit, whose errors do not hold the bench zero's
   Calibration& result_;
 };
 

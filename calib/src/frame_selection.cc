@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <numeric>
@@ -133,12 +134,19 @@ std::string FrameSelection::TooFewUsable(std::size_t distinct_readings) const {
                      example.rejection);
 }
 
-std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames) {
-  std::size_t over = 0, under = 0;
+std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
+                           const std::function<bool()>& have_16_bits) {
+  constexpr double kClearGradient = 30;  // of the noise's own
+  std::size_t over = 0, under = 0, clear = 0;
+  std::vector<double> means;
   for (const FrameMeasurement& frame : frames) {
     const std::string kind = RejectionKind(frame.rejection);
     if (kind == kKindSaturated) ++over;
-    if (kind == kKindDark || kind == kKindBlack) ++under;
+    if (kind != kKindDark && kind != kKindBlack) continue;
+    ++under;
+    means.push_back(frame.statistics.mean_stored);
+    const double noise_gradient = frame.statistics.noise_sigma / std::sqrt(8 * CV_PI);
+    if (frame.statistics.top_gradient > kClearGradient * noise_gradient) ++clear;
   }
   const auto advice = [&](std::size_t count, const char* what, const char* remedy) {
     return fmt::format("{} of {} frames are {}: {} and take the sweep again", count, frames.size(),
@@ -146,6 +154,17 @@ std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames) {
   };
   if (2 * over > frames.size())
     return advice(over, "over-exposed", "lower the exposure (shorter time, less light or gain)");
+  constexpr double kSixteenBits = 65535;
+  // A hundred steps of the mean alone: no eight bits show so dark a picture so finely.
+  if (2 * under > frames.size() && 2 * clear > under && Median(means) * kSixteenBits > 100 &&
+      have_16_bits()) {
+    return fmt::format(
+        "{} of {} frames are dark in their files (on the average {:.0f} of 65535), but their "
+        "texture "
+        "stands clear of the noise: values of 10 or 12 bits that were stored in 16 without being "
+        "scaled, or under-exposed; scale the values up, or raise the exposure",
+        under, frames.size(), kSixteenBits * Median(means));
+  }
   if (2 * under > frames.size())
     return advice(under, "under-exposed", "raise the exposure (longer time, more light)");
   return "";

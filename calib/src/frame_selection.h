@@ -2,6 +2,7 @@
 #define THICKLENS_CALIB_SRC_FRAME_SELECTION_H_
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,8 +52,11 @@ class FrameSelection {
 
 // What to do about the light where most of the frames were rejected for it: "39 of 41 frames are
 // over-exposed: lower the exposure ...". Whatever else went wrong is then a consequence. Empty
-// where the light was not at fault.
-std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames);
+// where the light was not at fault. Dark pictures whose texture is clear are not simply
+// under-exposed where their files have 16 bits (asked only then): values of 10 or 12 bits look like
+// that, too.
+std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
+                           const std::function<bool()>& have_16_bits);
 
 // In a region whose shorter side is less, nothing at all can be measured.
 inline constexpr int kSmallestRegionPx = 24;

@@ -11,6 +11,7 @@ namespace {
 constexpr std::size_t kFewestSamples = 5;
 constexpr int kBlocks = 8;  // of the jackknife
 constexpr int kRounds = 20;
+constexpr double kDefined = 16;     // squares of the responses over those of their errors
 constexpr double kCauchyWidth = 2;  // in standard deviations
 
 struct Term {
@@ -93,6 +94,13 @@ std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample
       terms.push_back({response, s.registration.cubic, s.registration.cubic_sigma});
   }
   if (terms.size() < kFewestSamples) return std::nullopt;
+  // Where the scales differ by no more than their own errors, the response is made of these.
+  double squares = 0, errors = 0;
+  for (const ScaleSample& s : samples) {
+    squares += std::pow(CubicPerDistortion(s.scale), 2);
+    errors += std::pow(2 * s.registration.scale_sigma / std::pow(s.scale, 3), 2);
+  }
+  if (!(squares > kDefined * errors)) return std::nullopt;
   auto result = Solve(terms);
   if (result) result->sigma = std::max(result->sigma, JackknifeSigma(terms));
   return result;

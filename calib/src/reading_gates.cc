@@ -9,6 +9,7 @@
 #include <set>
 
 #include "frame_selection.h"
+#include "frame_structure.h"
 
 namespace thicklens::calib {
 namespace {
@@ -89,18 +90,23 @@ bool IsLoneEdge(const FocusSweep& sweep, std::size_t used, std::size_t registere
 }
 
 std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
-                               const std::vector<std::size_t>& used, const ScaleLaw& law) {
+                               const std::vector<std::size_t>& used, const ScaleLaw& law,
+                               const FrameStructureFinding& structure) {
   const auto registered = static_cast<std::size_t>(std::count_if(
       used.begin(), used.end(), [&](std::size_t i) { return frames[i].image_scale.has_value(); }));
   const bool was_tried = law.reference_frame >= 0;
   if (!was_tried || law.done || law.shows_no_scale || IsStatedEdge(sweep) ||
       2 * registered >= used.size())
     return "";
+  const std::string seen = StructureInWords(structure);
   return fmt::format(
-      "only {} of {} frames could be registered to one another: every frame must show the same "
-      "part of the target, or, if it is a lone edge, which shows no image scale, state target: "
-      "knife-edge or printed-edge",
-      registered, used.size());
+      "only {} of {} frames could be registered to one another{}", registered, used.size(),
+      seen.empty()
+          ? std::string(": every frame must show the same part of the target, sharp enough to be "
+                        "recognised. If it is a lone edge, which shows no image scale, state "
+                        "target: knife-edge or printed-edge; if the images look torn or scrambled, "
+                        "their files were decoded wrongly")
+          : ": " + seen);
 }
 
 void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, ScaleLaw* law) {
@@ -111,23 +117,6 @@ void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, Sc
   law->contradicts_readings = false;
   law->message = "a lone edge shows no image scale";
   if (sweep.offset_mm) law->message += ": offset_mm is taken as given";
-}
-
-std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
-                       const ScaleLaw& law) {
-  if (!law.done) return "";
-  std::vector<double> depths_mm;
-  for (const FrameMeasurement& frame : frames) {
-    if (frame.image_scale) depths_mm.push_back(law.reference_depth_mm / *frame.image_scale);
-  }
-  if (depths_mm.empty()) return "";
-  const auto [nearest, farthest] = std::minmax_element(depths_mm.begin(), depths_mm.end());
-  const double least_mm = 2 * sweep.camera.lens.front_focal_length_mm;
-  if (!(*farthest < least_mm)) return "";
-  return fmt::format(
-      "the image scale puts the target at {:.3g} to {:.3g} mm, less than two focal lengths ({:.3g} "
-      "mm): are the readings in mm?",
-      *nearest, *farthest, least_mm);
 }
 
 std::string ReasonOfUnknownOffset(const ScaleLaw& law) {
@@ -171,15 +160,19 @@ void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>
 
 void RejectUnregistered(const std::vector<ScaleSample>& samples,
                         const std::vector<std::size_t>& used, std::size_t reference,
-                        const ScaleLaw& law, std::vector<FrameMeasurement>* frames) {
+                        const ScaleLaw& law, const FrameStructureFinding& structure,
+                        std::vector<FrameMeasurement>* frames) {
   if (!law.done) return;
+  const std::string why =
+      structure.HasBands()
+          ? "its rows or columns brighten in bands of their own"
+          : "it shows another part of the target, or too little of it to be recognised";
   std::set<std::size_t> registered;
   for (const ScaleSample& sample : samples) registered.insert(sample.frame);
   for (const std::size_t i : used) {
     if (registered.count(i) > 0) continue;
-    (*frames)[i].rejection =
-        fmt::format("does not show the target: it cannot be registered to {}, the sharpest frame",
-                    FileName((*frames)[reference].image));
+    (*frames)[i].rejection = fmt::format("cannot be registered: to {}, the sharpest frame; {}",
+                                         FileName((*frames)[reference].image), why);
   }
 }
 

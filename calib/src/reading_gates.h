@@ -18,14 +18,11 @@ bool IsLoneEdge(const FocusSweep& sweep, std::size_t used, std::size_t registere
 void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, ScaleLaw* law);
 
 // What to do where most of the used frames could not be registered and no law was found, though the
-// target has a scale to measure; else empty.
+// target has a scale to measure; else empty. What `structure` shows is named before what was not
+// looked for.
 std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
-                               const std::vector<std::size_t>& used, const ScaleLaw& law);
-
-// A question about the unit of the readings where the law puts every frame nearer than two focal
-// lengths, where the image is larger than the target; else empty.
-std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasurement>& frames,
-                       const ScaleLaw& law);
+                               const std::vector<std::size_t>& used, const ScaleLaw& law,
+                               const FrameStructureFinding& structure);
 
 // Of a sweep without an offset: why the law gave none either, and what to do.
 std::string ReasonOfUnknownOffset(const ScaleLaw& law);
@@ -42,11 +39,12 @@ std::optional<std::string> ReasonAgainstScales(const FocusSweep& sweep,
 void RejectWrongReadings(const FocusSweep& sweep, const std::vector<ScaleSample>& samples,
                          const ScaleLaw& law, std::vector<FrameMeasurement>* frames);
 
-// Where the others follow a law, a frame that does not register to the reference shows something
-// else: sets its `rejection`.
+// Where the others follow a law, a frame that does not register to the reference is of no use: sets
+// its `rejection`, which names bands of the light where there are any.
 void RejectUnregistered(const std::vector<ScaleSample>& samples,
                         const std::vector<std::size_t>& used, std::size_t reference,
-                        const ScaleLaw& law, std::vector<FrameMeasurement>* frames);
+                        const ScaleLaw& law, const FrameStructureFinding& structure,
+                        std::vector<FrameMeasurement>* frames);
 
 // From one frame on all readings are off by as much: a clamp that slipped, a table moved by a row.
 struct Slip {

@@ -122,6 +122,7 @@ std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const c
   Registration& free = result.free;
   if (!(std::abs(free.scale_x / free.scale_y - 1) < kMaxAnisotropy)) return std::nullopt;
   free.scale_sigma = free.scale * std::hypot(std::sqrt(field.stretch_variance), kScaleBias);
+  free.added_variance_px2 = pass->added_variance_px2;
   free.cubic = map.cubic + field.cubic;
   free.cubic_sigma = std::sqrt(field.cubic_variance);
   result.scale_per_cubic = -free.scale * field.stretch_cubic_covariance / field.cubic_variance;

@@ -19,6 +19,8 @@ constexpr double kLeastFollowing = 0.75;
 // To follow: within this part of the readings' range, or that many standard deviations.
 constexpr double kFollowsWithin = 0.03;
 constexpr double kFollowsSigmas = 5;
+constexpr double kSortedWithin = 0.01, kSortedFollowing = 0.9;
+constexpr double kStatedScatter = 1.5;  // of the stated error, that the readings may scatter by
 // Scale that changes by less than this over the sweep is constant, if no target within the longest
 // bench would have let it.
 constexpr double kConstantChange = 1e-3;
@@ -223,6 +225,7 @@ class LawFinder {
     line_ = FitLine(points_, reading_sigma_mm_);
     const double change = std::abs(line_.slope) * range_mm_;
     const double change_sigma = line_.slope_sigma * range_mm_;
+    result->change_over_sweep = model::Estimate{line_.slope * range_mm_, change_sigma};
     // 1/slope is the distance of a target in the reference frame.
     const bool is_large = change > kConstantChange || std::abs(line_.slope) * kLongestBenchMm > 1;
     if (std::abs(line_.slope) > kSignificant * line_.slope_sigma && is_large) {
@@ -278,9 +281,23 @@ class LawFinder {
     const Law law{own_sign * line_.intercept / line_.slope, 1 / std::abs(line_.slope)};
     const double sigma_mm = ScatterOfReadings(points_, law, own_sign, reading_sigma_mm_);
     const std::size_t following = CountFollowing(law, own_sign, reading_sigma_mm_);
-    const bool is_close = sigma_mm < kFollowsWithin * range_mm_;
-    if (!AreEnough(following) || !is_close) {
+    // What the readings scatter by themselves counts, not what was stated of them: a coarse scale
+    // of the bench is no reason to doubt a law that its readings follow.
+    const double own_mm = ScatterOfReadings(points_, law, own_sign, 0);
+    const bool is_close =
+        own_mm < std::max(kFollowsWithin * range_mm_, kStatedScatter * reading_sigma_mm_);
+    if (!AreEnough(following)) {
       DoesNotFollow(following, result);
+    } else if (!is_close) {
+      result->message = fmt::format(
+          "readings and image scales scatter by {:.2g} mm about their law, {:.0f} % of the "
+          "readings' "
+          "range: too much to find the bench zero from it (readings worse than stated, or scales "
+          "of a "
+          "small or faint texture)",
+          sigma_mm, 100 * sigma_mm / range_mm_);
+    }
+    if (!AreEnough(following) || !is_close) {
       if (is_close && AreEnough(CountFollowing(law, own_sign, sigma_mm))) {
         result->message += fmt::format(
             "; if the readings are only good to about {:.2g} mm, state reading_sigma_mm", sigma_mm);
@@ -326,12 +343,13 @@ class LawFinder {
                most < kConstantChange && range_mm_ > most * kLongestBenchMm) {
       result->kind = ScaleKind::kConstant;
       result->message =
-          "the image scale does not change with the reading (telecentric lens, moving sensor, or "
-          "one picture repeated): the bench zero cannot be found from it";
+          "the image scale does not change with the reading (a telecentric lens, a moving sensor, "
+          "frames that were aligned, or one picture repeated): the bench zero cannot be found from "
+          "it";
     } else {
       result->message = fmt::format(
           "the readings span {:.3g} mm, too little to tell how the image scale goes with them (it "
-          "changes by {:.2g} +- {:.2g} %): extend the sweep",
+          "changes by {:.2g} +- {:.2g} %): state offset_mm, or extend the sweep",
           range_mm_, 100 * change, 100 * change_sigma);
     }
   }
@@ -341,9 +359,41 @@ class LawFinder {
     result->contradicts_readings =
         points_.size() >= kEnoughToContradict && 2 * following < points_.size();
     result->message = fmt::format(
-        "the image scale does not follow the readings: {} of {} frames agree with one law (1/z, "
-        "reversed or constant). Check that every frame has its own reading",
-        following, points_.size());
+        "the image scale does not follow the readings: only {} of {} frames agree with one law "
+        "(1/z, reversed or constant){}. Check that every frame has its own reading",
+        following, points_.size(),
+        FollowsInAnotherOrder() ? "; in another order all of them would: the readings belong to "
+                                  "other frames of the sweep (a table sorted otherwise)"
+                                : "");
+  }
+
+  // The smallest reading to the largest picture and so on (or the other way round): if the law then
+  // holds far better than chance lets sorted values follow it, the readings are those of the sweep
+  // and stand beside other frames.
+  bool FollowsInAnotherOrder() const {
+    std::vector<double> readings, inverses;
+    for (const Point& p : points_) {
+      readings.push_back(p.reading_mm);
+      inverses.push_back(p.inverse_scale);
+    }
+    std::sort(readings.begin(), readings.end());
+    std::sort(inverses.begin(), inverses.end());
+    Points sorted = points_;
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+      sorted[i].reading_mm = readings[i];
+      sorted[i].inverse_scale = inverses[i];
+    }
+    const Line line = FitLine(sorted, reading_sigma_mm_);
+    if (!(line.slope > kSignificant * line.slope_sigma)) return false;
+    const Law law{line.intercept / line.slope, 1 / line.slope};
+    std::size_t following = 0;
+    for (const Point& p : sorted) {
+      // Sorted noise bends at both ends by more than a hundredth of its range.
+      const double within_mm = std::max(kSortedWithin * range_mm_,
+                                        kFollowsSigmas * ReadingSigma(p, law, reading_sigma_mm_));
+      following += std::abs(ReadingError(p, law, 1)) < within_mm ? 1U : 0U;
+    }
+    return static_cast<double>(following) >= kSortedFollowing * static_cast<double>(sorted.size());
   }
 
   Points points_;
@@ -389,8 +439,10 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
   LawFinder finder(samples, reading_sigma_mm, direction);
   finder.Classify(&result);
   const auto distortion = DistortionAtCorner(samples, corner_radius_px);
-  // Frames that do not follow the law may not show one target.
-  if (result.kind != ScaleKind::kUnknown && distortion &&
+  // Frames that do not follow the law may not show one target, and where the scale stays the same a
+  // distortion does not show at all.
+  if ((result.kind == ScaleKind::kInverseDepth || result.kind == ScaleKind::kReversed) &&
+      distortion &&
       (distortion->sigma < kKnownDistortion ||
        std::abs(distortion->value) > kSignificant * distortion->sigma))
     result.distortion_at_corner = distortion;

@@ -102,15 +102,15 @@ class Parts {
     const double sigma_mm = std::hypot(nearer.focus_depth_mm.sigma, farther.focus_depth_mm.sigma);
     if (!(std::abs(apart_mm) > kSidesDisagree * sigma_mm)) return;
     result_.warnings.push_back(fmt::format(
-        "the two sides of focus disagree: the nearer frames alone give {:.2f} +- {:.2f} mm, "
-        "the farther ones {:.2f} +- {:.2f} mm",
+        "the two sides of focus disagree: the nearer frames alone give {:.2f} +- {:.2g} mm, "
+        "the farther ones {:.2f} +- {:.2g} mm",
         nearer.focus_depth_mm.value, nearer.focus_depth_mm.sigma, farther.focus_depth_mm.value,
         farther.focus_depth_mm.sigma));
     SystematicPart part;
     part.name = "side of focus";
     part.remedy =
-        "use frames closer to focus, or a lens with less spherical aberration: one blur "
-        "law does not describe both sides";
+        "use frames closer to focus: one blur law does not describe both sides (spherical "
+        "aberration, a wrong sensor.transfer or light that changes along the bench do that)";
     for (const SideFit* side : {&nearer, &farther}) {
       BlurFitResult as_fit;
       as_fit.done = true;

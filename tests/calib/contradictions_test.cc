@@ -116,20 +116,6 @@ TEST(Contradiction, NoneWhereAllIsWell) {
   }
 }
 
-TEST(CheckDistortion, RefusesWhatCannotBeAllowedFor) {
-  Calibration c;
-  EXPECT_FALSE(CheckDistortion(&c));
-  c.scale.distortion_at_corner = model::Estimate{0.02, 0.001};
-  EXPECT_FALSE(CheckDistortion(&c));
-  ASSERT_EQ(c.warnings.size(), 1U);
-  EXPECT_THAT(c.warnings[0], HasSubstr("+2.0 +- 0.1 % at the corner (pincushion); undistort"));
-  c.scale.distortion_at_corner = model::Estimate{-0.14, 0.03};
-  EXPECT_THAT(CheckDistortion(&c).value(), HasSubstr("-14.0 +- 3.0 % at the corner (barrel)"));
-  c.scale.distortion_at_corner = model::Estimate{-0.14, 0.05};  // not significant
-  EXPECT_FALSE(CheckDistortion(&c));
-  EXPECT_EQ(c.warnings.size(), 1U);
-}
-
 // Points of the first frame, mapped to the new reference and on to another frame.
 TEST(ReferTo, ComposesTheRegistrations) {
   const auto make = [](double scale, double angle, double x, double y) {

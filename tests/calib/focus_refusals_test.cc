@@ -11,6 +11,7 @@ namespace thicklens::calib {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
@@ -111,7 +112,8 @@ TEST(SolveFocus, ABlurWithinItsErrorsIsRefused) {
   EXPECT_EQ(passes.calibration.outcome, Outcome::kOk) << passes.calibration.reason;
 }
 
-TEST(SolveFocus, AFocusThatIsNotFixedIsRefused) {
+// The blur fixes where focus lies in the sweep; what is missing is where the sweep lies.
+TEST(SolveFocus, ABenchZeroThatIsNotKnownIsNotBlamedOnTheBlur) {
   BlurBench bench = ExactBench();
   bench.first_mm = 380;  // so short that the blur ratio is known better than zf
   bench.last_mm = 425;
@@ -121,10 +123,26 @@ TEST(SolveFocus, AFocusThatIsNotFixedIsRefused) {
   const double per_zero = trial.calibration.focus_depth_mm->sigma / 10;
   EXPECT_NEAR(per_zero, 1, 0.1);
   const FocusCase c = Solved(bench, 0.001, 1.1 * half_mm / per_zero);
-  ExpectRefused(c.calibration, "the depth of focus is not fixed by the blur");
-  EXPECT_THAT(c.calibration.reason, HasSubstr("from 380.0 to 425.0 mm"));
+  ExpectRefused(c.calibration, "the bench zero is not known well enough: the sweep is 45 mm long");
+  EXPECT_THAT(c.calibration.reason, HasSubstr("State offset_mm"));
+  ASSERT_TRUE(c.calibration.focus_reading_mm) << "the reading of focus is determined";
+  EXPECT_NEAR(c.calibration.focus_reading_mm->value, 400 - bench.offset_mm, 0.2);
+  EXPECT_LT(c.calibration.focus_reading_mm->sigma, 1);
   const FocusCase passes = Solved(bench, 0.001, 0.9 * half_mm / per_zero);
   EXPECT_EQ(passes.calibration.outcome, Outcome::kOk) << passes.calibration.reason;
+}
+
+TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {
+  BlurBench bench = ExactBench();
+  bench.first_mm = 380;
+  bench.last_mm = 425;
+  const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
+  const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.1 * half_mm));
+  // Where the blur ratio is known worse still, that is the reason.
+  EXPECT_EQ(c.calibration.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.calibration.reason, AnyOf(HasSubstr("the depth of focus is not fixed by the blur"),
+                                          HasSubstr("the blur does not change over the sweep")));
+  EXPECT_FALSE(c.calibration.focus_reading_mm) << "it is not determined";
 }
 
 // Sweeps that end short of the focus at 400 mm, in steps of 3 mm.

@@ -161,17 +161,30 @@ TEST(ExposureAdvice, SpeaksWhenMostFramesAreBadlyExposed) {
   const auto reject = [&](int from, int to, const char* reason) {
     for (int i = from; i < to; ++i) frames[static_cast<std::size_t>(i)].rejection = reason;
   };
-  EXPECT_EQ(ExposureAdvice(frames), "");
+  bool is_16_bit = false;
+  const auto advice = [&] { return ExposureAdvice(frames, [&] { return is_16_bit; }); };
+  EXPECT_EQ(advice(), "");
   reject(0, 5, "saturated: 80 % of the pixels pile up at 255");
-  EXPECT_EQ(ExposureAdvice(frames), "") << "half of them may have another cause";
+  EXPECT_EQ(advice(), "") << "half of them may have another cause";
   reject(5, 6, "saturated: 80 % of the pixels pile up at 255");
-  EXPECT_THAT(ExposureAdvice(frames),
+  EXPECT_THAT(advice(),
               AllOf(StartsWith("6 of 10 frames are over-exposed: lower"), Not(HasSubstr("under"))));
   reject(0, 3, "dark: mean 0.003 of full scale");
   reject(3, 6, "black: 60 % of the pixels pile up at 0");
-  EXPECT_THAT(ExposureAdvice(frames), StartsWith("6 of 10 frames are under-exposed: raise"));
+  EXPECT_THAT(advice(), StartsWith("6 of 10 frames are under-exposed: raise"));
+  // Dark to the file and clear to the eye: the light need not be at fault where 16 bits are stored.
+  for (FrameMeasurement& frame : frames) {
+    frame.statistics.mean_stored = 400.0 / 65535;
+    frame.statistics.noise_sigma = 4.0 / 65535;
+    frame.statistics.top_gradient = 100.0 / 65535;
+  }
+  EXPECT_THAT(advice(), StartsWith("6 of 10 frames are under-exposed: raise"));
+  is_16_bit = true;
+  EXPECT_THAT(advice(), AllOf(StartsWith("6 of 10 frames are dark in their files (on the average "
+                                         "400 of 65535)"),
+                              HasSubstr("10 or 12 bits"), HasSubstr("or under-exposed")));
   reject(0, 6, "blank: contrast 0.01");
-  EXPECT_EQ(ExposureAdvice(frames), "");
+  EXPECT_EQ(advice(), "");
 }
 
 TEST(RegionAdvice, NamesTheSizeAndWhatIsNeeded) {

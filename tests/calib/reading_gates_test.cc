@@ -23,6 +23,7 @@ struct Bench {
   std::vector<FrameMeasurement> frames;
   std::vector<ScaleSample> samples;
   ScaleLaw law;
+  FrameStructureFinding structure;
 
   explicit Bench(BenchDirection direction = BenchDirection::kAway) {
     std::mt19937 random(6);
@@ -246,34 +247,25 @@ TEST(ReasonOfUnknownOffset, TellsWhatToDo) {
                     HasSubstr("state offset_mm, or use a texture")));
 }
 
-TEST(UnitAdvice, AsksWhereAllFramesLieNearerThanTwoFocalLengths) {
-  Bench bench;
-  bench.sweep.camera.lens.front_focal_length_mm = 226;  // the frames lie at 350 to 450 mm
-  const auto advice = [&] { return UnitAdvice(bench.sweep, bench.frames, bench.law); };
-  EXPECT_EQ(advice(), "") << "no frame was registered";
-  for (const ScaleSample& sample : bench.samples)
-    bench.frames[sample.frame].image_scale = sample.scale;
-  EXPECT_EQ(advice(),
-            "the image scale puts the target at 350 to 450 mm, less than two focal lengths (452 "
-            "mm): are the readings in mm?");
-  bench.sweep.camera.lens.front_focal_length_mm = 224;
-  EXPECT_EQ(advice(), "") << "some lie farther";
-  bench.sweep.camera.lens.front_focal_length_mm = 226;
-  bench.law.done = false;
-  EXPECT_EQ(advice(), "");
-}
-
 TEST(RegistrationAdvice, SpeaksWhereFewRegisterAndNoLawIsFound) {
   Bench bench;
   const auto advice = [&] {
-    return RegistrationAdvice(bench.sweep, bench.frames, bench.Used(), bench.law);
+    return RegistrationAdvice(bench.sweep, bench.frames, bench.Used(), bench.law, bench.structure);
   };
   bench.law = {};
   for (std::size_t i = 0; i < 10; ++i) bench.frames[i].image_scale = 1;
   EXPECT_EQ(advice(), "") << "registration was not tried";
   bench.law.reference_frame = 3;
   EXPECT_THAT(advice(), AllOf(HasSubstr("only 10 of 21 frames could be registered"),
-                              HasSubstr("state target: knife-edge")));
+                              HasSubstr("state target: knife-edge"), HasSubstr("decoded wrongly")));
+  bench.structure.measured = true;
+  bench.structure.bands = model::Estimate{0.1, 0.01};
+  EXPECT_THAT(advice(),
+              AllOf(HasSubstr("only 10 of 21 frames could be registered to one another: whole rows "
+                              "brighten together by 10 %"),
+                    HasSubstr("rolling shutter"), Not(HasSubstr("knife-edge"))))
+      << "what is seen comes before what is not";
+  bench.structure = {};
   bench.sweep.target = model::SweepTarget::kKnifeEdge;
   EXPECT_EQ(advice(), "") << "it is stated already";
   bench.sweep.target = model::SweepTarget::kAuto;
@@ -293,12 +285,20 @@ TEST(RejectUnregistered, NamesFramesThatShowSomethingElseWhereTheOthersFollowALa
   Bench bench;
   bench.samples.erase(bench.samples.begin() + 6);
   bench.law.done = false;
-  RejectUnregistered(bench.samples, bench.Used(), 12, bench.law, &bench.frames);
+  const auto reject = [&] {
+    RejectUnregistered(bench.samples, bench.Used(), 12, bench.law, bench.structure, &bench.frames);
+  };
+  reject();
   EXPECT_EQ(bench.frames[6].rejection, "");
   bench.law.done = true;
-  RejectUnregistered(bench.samples, bench.Used(), 12, bench.law, &bench.frames);
+  bench.structure.bands = model::Estimate{0.1, 0.01};
+  reject();
+  EXPECT_THAT(bench.frames[6].rejection, HasSubstr("bands"));
+  bench.structure = {};
+  reject();
   EXPECT_THAT(bench.frames[6].rejection,
-              AllOf(HasSubstr("does not show the target: "), HasSubstr("frame-12.png")));
+              AllOf(HasSubstr("cannot be registered: to frame-12.png"),
+                    HasSubstr("another part of the target, or too little of it")));
   for (std::size_t i = 0; i < bench.frames.size(); ++i) {
     EXPECT_EQ(bench.frames[i].rejection.empty(), i != 6) << i;
   }

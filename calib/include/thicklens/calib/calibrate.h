@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/calib/diagnosis.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/calib/frame_gates.h"
 
@@ -109,6 +110,9 @@ struct ScaleLaw {
   std::string message = "not run";
   ScaleKind kind = ScaleKind::kUnknown;
   bool contradicts_readings = false;  // frames were registered, and most agree with no law at all
+  // By how much 1/scale grows over the range of the readings, relative: positive where the target
+  // looks smaller at larger readings ("away"). There whenever enough frames were registered.
+  std::optional<model::Estimate> change_over_sweep;
   bool shows_no_scale = false;  // the target looks the same at every scale (spokes): not looked for
   int reference_frame = -1;
   Result offset_mm;  // the bench zero: where the aperture is
@@ -226,6 +230,15 @@ struct Calibration {
   // Of the parameters named, in their units; sigma^2 on the diagonal.
   std::vector<std::string> covariance_order;
   Eigen::MatrixXd covariance;
+
+  // What was determined even where the rest is refused; needs neither camera nor bench zero.
+  SharpestReading sharpest;
+  // The reading of the plane of focus by the blur fit, whose error does not hold the bench zero's:
+  // where focus lies in the sweep.
+  std::optional<model::Estimate> focus_reading_mm;
+  // The symptoms whose causes were compared, with what was named.
+  std::vector<Diagnosis> diagnoses;
+  FrameStructureFinding structure;
 
   SourceRecipe source;
   SharpnessPeak sharpness;

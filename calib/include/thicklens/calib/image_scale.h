@@ -22,6 +22,9 @@ struct Registration {
   // Third-order part of what an affine map leaves over: displacement beyond the map at distance R
   // from `centre` in the frame is cubic R^3, px^-2; with its standard deviation.
   double cubic = 0, cubic_sigma = 0;
+  // By how much the variance of the frame's blur exceeds that of the reference brought to the
+  // frame's scale, px^2 of the frame: roughly, as the tiles' spectra show it.
+  std::optional<double> added_variance_px2;
 };
 
 // Both CV_32F, of one size; illumination may differ by gain, offset and slope, blur by much.
