@@ -11,6 +11,7 @@
 #include "blur_law.h"
 #include "calibration_summary.h"
 #include "calibration_words.h"
+#include "determined.h"
 #include "printable_text.h"
 
 namespace thicklens::tools {
@@ -170,6 +171,7 @@ json ScaleLawJson(const calib::Calibration& calibration) {
           {"reference_depth_mm", done ? Number(scale.reference_depth_mm) : json(nullptr)},
           {"reading_rms_mm", done ? Number(scale.reading_rms_mm) : json(nullptr)},
           {"frames_used", Count(done, scale.frames_used)},
+          {"change_over_sweep", EstimateJson(scale.change_over_sweep)},
           {"distortion_at_corner", EstimateJson(scale.distortion_at_corner)}};
 }
 
@@ -354,6 +356,9 @@ json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& c
   out["assumed_fields"] = TextsJson(model::AssumedFields(sweep.camera));
   out["warnings"] = TextsJson(calibration.warnings);
   out["scale_law"] = ScaleLawJson(calibration);
+  out["sharpest_reading"] = SharpestJson(calibration);
+  out["diagnoses"] = DiagnosesJson(calibration);
+  out["frame_structure"] = StructureJson(calibration.structure);
   out["magnification"] = MagnificationJson(calibration.magnification);
   if (truth != nullptr) out["truth"] = TruthJson(rows);
   return out;

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "calibration_words.h"
+#include "determined.h"
 #include "printable_text.h"
 #include "rejection_groups.h"
 
@@ -126,7 +127,10 @@ std::string SecondaryLines(const calib::Calibration& calibration,
                           SignedRoundedTo(row.peak->value - *row.truth, row.peak->sigma));
     text += '\n';
   }
+  AddLine("sharpest", SharpestLine(calibration), &text);
+  AddLine("focus", FocusReadingLine(calibration), &text);
   const calib::ScaleLaw& scale = calibration.scale;
+  if (!scale.done) AddLine("image scale", ScaleChangeLine(scale), &text);
   text += scale.done
               ? fmt::format(
                     "image scale: bench offset {} +- {} mm, readings {:.2g} mm rms about the law, "
@@ -165,6 +169,8 @@ std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration
                         PartRange(parts[i].blur_ratio)),
             &text);
   AddLine("advice", calibration.advice, &text);
+  if (calibration.outcome == calib::Outcome::kRefused)
+    for (const std::string& line : DiagnosisLines(calibration)) AddLine("compared", line, &text);
   return text;
 }
 

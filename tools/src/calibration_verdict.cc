@@ -5,6 +5,7 @@
 
 #include "calibration_sections.h"
 #include "calibration_words.h"
+#include "determined.h"
 #include "printable_text.h"
 #include "rounding.h"
 
@@ -70,6 +71,23 @@ std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration
   return text + numbers + (calibration.advice.empty() ? help : "");
 }
 
+// What does not hang on the bench zero or the camera: the first that most people want to know, and
+// all that there is where the rest is refused.
+std::string DeterminedInWords(const Calibration& calibration) {
+  std::string html;
+  const auto add = [&html](const std::string& about, const std::string& line) {
+    if (!line.empty()) html += Paragraph(Typeset(AsSentence(about + line)));
+  };
+  if (calibration.sharpest.done) add("The sweep is sharpest at the ", SharpestLine(calibration));
+  add("Focus lies at the ", FocusReadingLine(calibration));
+  if (calibration.outcome != calib::Outcome::kRefused) return html;
+  add("", ScaleChangeLine(calibration.scale));
+  add("", fmt::format("{} of {} frames can be used", calibration.frames_used,
+                      calibration.frames.size()));
+  for (const std::string& line : DiagnosisLines(calibration)) add("Compared: ", line);
+  return html;
+}
+
 std::string Outcome(const Calibration& calibration, std::string* css_class) {
   if (calibration.outcome == calib::Outcome::kOk) {
     *css_class = "ok";
@@ -98,6 +116,7 @@ std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibrati
     html += fmt::format("<p><b>What to do next:</b> {}</p>\n",
                         EscapeXml(Typeset(AsSentence(calibration.advice))));
   html += Paragraph(FoundInWords(calibration));
+  html += DeterminedInWords(calibration);
   html += Paragraph(LimitInWords(sweep, calibration));
   const calib::BlurFit& blur = calibration.blur;
   html += Paragraph(AsSentence(OutsideLine(blur)));

@@ -62,9 +62,12 @@ std::string ScaleKindWords(calib::ScaleKind kind) {
     case calib::ScaleKind::kInverseDepth:
       return "as 1/z: a camera whose pupil stands still";
     case calib::ScaleKind::kConstant:
-      return "constant: the lens is telecentric, the sensor moves, or one picture was repeated";
+      return "constant: the lens is telecentric, the sensor moves, the frames were aligned, or one "
+             "picture was repeated";
     case calib::ScaleKind::kReversed:
-      return "as 1/z with the readings the other way: check the direction of the scale";
+      return "as 1/z with the readings the other way: check the direction of the scale, and "
+             "whether "
+             "the target moved and not the lens";
     case calib::ScaleKind::kUnknown:
       break;
   }
