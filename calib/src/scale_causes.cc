@@ -123,6 +123,14 @@ double ChiSquareOfZero(const FocusSweep& sweep, double offset_mm, double sigma_m
   return RobustSquare(off);
 }
 
+// Whether the best of the causes explains what is seen, or is only less bad than the others.
+bool IsExplained(const ScaleCauses& causes) {
+  const Diagnosis& diagnosis = causes.diagnosis;
+  return diagnosis.named > 0 &&
+         diagnosis.causes.front().chi2 - std::min(causes.chi2_target, causes.chi2_lens) <
+             Diagnosis::kDecisive;
+}
+
 class Comparison {
  public:
   Comparison(const std::vector<ScaleSample>& samples, const FocusSweep& sweep)
@@ -212,7 +220,7 @@ class Comparison {
   void ChooseUnit() {
     const Diagnosis& diagnosis = result_.diagnosis;
     if (diagnosis.Names(kTargetMoves) || diagnosis.Names(kReversedReadings) ||
-        diagnosis.Names(kZeroIsWrong))
+        diagnosis.Names(kZeroIsWrong) || !IsExplained(result_))
       return;
     for (std::size_t i = 0; i < diagnosis.named; ++i) {
       for (const ReadingUnit& unit : kUnits) {
@@ -234,14 +242,6 @@ class Comparison {
   ScaleCauses result_;
 };
 
-// Whether the best of the causes explains what is seen, or is only less bad than the others.
-bool IsExplained(const ScaleCauses& causes) {
-  const Diagnosis& diagnosis = causes.diagnosis;
-  return diagnosis.named > 0 &&
-         diagnosis.causes.front().chi2 - std::min(causes.chi2_target, causes.chi2_lens) <
-             Diagnosis::kDecisive;
-}
-
 std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) {
   std::string evidence;
   if (causes.chi2_target - causes.chi2_lens >= Diagnosis::kDecisive) {
@@ -255,6 +255,13 @@ std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) 
         "that moves would need a blur ratio of {:.2g}",
         evidence.empty() ? "" : ", and ", causes.blur_slope->RatioOfMovingLens(sweep.camera),
         causes.blur_slope->RatioOfMovingTarget(sweep.camera, causes.reference_depth_mm));
+  }
+  if (evidence.empty()) {
+    evidence = fmt::format(
+        "as that of a target that moves, it would put the target at {:.3g} mm, nearer than the "
+        "focal "
+        "length",
+        causes.reference_depth_mm);
   }
   std::string meaning;
   const double of_dioptres = 1000 / sweep.camera.lens.rear_focal_length_mm;
@@ -340,8 +347,8 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
     if (frame.image_scale) depths_mm.push_back(law.reference_depth_mm / *frame.image_scale);
   }
   if (depths_mm.empty()) return "";
-  // A lens that moves is named by ReasonOfScaleCauses; millimetres are not in question then.
-  if (causes.diagnosis.NamesOnly(kLensMoves)) return "";
+  // A lens that moves is named by ReasonOfScaleCauses, beside the unit where both are possible.
+  if (causes.diagnosis.Names(kLensMoves) && !causes.ReadingsMayBeRight()) return "";
   const auto [nearest, farthest] = std::minmax_element(depths_mm.begin(), depths_mm.end());
   const double f1_mm = sweep.camera.lens.front_focal_length_mm;
   const std::string placed =
