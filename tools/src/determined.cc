@@ -34,6 +34,7 @@ std::string SharpestImage(const calib::Calibration& calibration) {
 
 std::string SharpestLine(const calib::Calibration& calibration) {
   const calib::SharpestReading& sharpest = calibration.sharpest;
+  if (!sharpest.done && sharpest.message == calib::SharpestReading().message) return "";
   const std::string image = SharpestImage(calibration);
   const std::string frame =
       image.empty() ? "" : fmt::format("; {} is the sharpest", FrameName(image));
