@@ -11,10 +11,11 @@ namespace thicklens::tools {
 
 // The machine-readable summary, with every number that stands in the report. `status`, `reason`,
 // `method` and the results are always there, and so are `sharpest_reading`, `diagnoses` (the causes
-// that were compared) and `frame_structure` (null where it was not looked for); a result that does not exist, a number that was not
-// measured, and every number that is not finite, is null. `scale_law`, `covariance`, `blur_fit`,
-// `sides`, `field` and the entries of `other_methods` are there with `done: false` or null numbers
-// if they were not reached; `truth` is left out where none is known.
+// that were compared) and `frame_structure` (null where it was not looked for); a result that does
+// not exist, a number that was not measured, and every number that is not finite, is null.
+// `scale_law`, `covariance`, `blur_fit`, `sides`, `field` and the entries of `other_methods` are
+// there with `done: false` or null numbers if they were not reached; `truth` is left out where none
+// is known.
 //
 // With `use_source_recipe` the results are the source's, their sigma null, status and reason its
 // own; what the fit found is then in `other_methods.fit` alone, under the keys that it has else.
