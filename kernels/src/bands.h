@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::kernels {
 
 // So many that none has fewer than `least` (as far as there are so many at all): a short one is
@@ -12,13 +14,26 @@ inline int BandCount(int count, int threads, int least) {
   return std::max(1, std::min(threads, count / std::max(1, least)));
 }
 
-// Calls work(band, first, last) for each band of [0, count), side by side, one thread each. `work`
-// must not throw.
+// Calls work(band, first, last) for all of each band of [0, count), one piece after the other, the
+// bands side by side, one thread each. `work` must not throw. Throws Interrupted if that is asked
+// for, when the pieces that have begun are done; one that takes long may look at IsCancelled().
 template <typename Work>
 void ForBands(int count, int bands, const Work& work) {
+  constexpr int kPieces = 32;
+  ThrowIfCancelled();
+  const CancelToken* const token = CurrentCancelToken();
   const auto edge = [&](int i) { return static_cast<int>(std::int64_t{count} * i / bands); };
 #pragma omp parallel for num_threads(bands) schedule(static, 1)
-  for (int band = 0; band < bands; ++band) work(band, edge(band), edge(band + 1));
+  for (int band = 0; band < bands; ++band) {
+    const CancelScope scope(token);
+    const int end = edge(band + 1);
+    const int size = std::max(1, (end - edge(band)) / kPieces);
+    for (int first = edge(band); first < end; first += size) {
+      if (IsCancelled()) break;
+      work(band, first, std::min(first + size, end));
+    }
+  }
+  ThrowIfCancelled();
 }
 
 }  // namespace thicklens::kernels

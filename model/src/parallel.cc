@@ -7,6 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::model {
 
 int ResolveThreads(int threads) {
@@ -19,7 +21,9 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& work) {
   int next = 0;
   int failed_index = count;
   std::exception_ptr failure;
+  const CancelToken* const token = CurrentCancelToken();
   const auto run = [&] {
+    const CancelScope scope(token);
     for (;;) {
       int index = 0;
       {
@@ -29,6 +33,7 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& work) {
         index = next++;
       }
       try {
+        ThrowIfCancelled();
         work(index);
       } catch (...) {
         const std::lock_guard<std::mutex> lock(mutex);

@@ -121,13 +121,13 @@ TEST_P(IncludeScannerRefuses, WithFileLineAndWhatIsAllowed) {
 INSTANTIATE_TEST_SUITE_P(
     Planted, IncludeScannerRefuses,
     ::testing::Values(
-        Planted{"ModelUsesCalib", "model/src/a.cc", "\"thicklens/calib/b.h\"", "error.h, nothing"},
+        Planted{"ModelUsesCalib", "model/src/a.cc", "\"thicklens/calib/b.h\"", "cancel.h, nothing"},
         Planted{"CalibUsesEstimator", "calib/src/a.cc", "\"thicklens/estimator/b.h\"",
-                "error.h, model"},
+                "cancel.h, model"},
         Planted{"EstimatorUsesCalib", "estimator/src/a.cc", "<thicklens/calib/b.h>",
-                "error.h, model, kernels"},
+                "cancel.h, model, kernels"},
         Planted{"KernelsUseModel", "kernels/src/a.cc", "\"thicklens/model/b.h\"",
-                "error.h, nothing"},
+                "cancel.h, nothing"},
         Planted{"AModuleNobodyKnows", "tools/src/a.cc", "\"thicklens/util/b.h\"", "calib"},
         Planted{"KernelsUseEigen", "kernels/src/a.cc", "<Eigen/Core>", "fmt/, CL/"},
         Planted{"CalibReadsPictures", "calib/src/a.cc", "<opencv2/imgcodecs.hpp>", "ceres/"},
