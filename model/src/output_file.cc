@@ -13,6 +13,7 @@
 #include "output_part.h"
 #include "output_target.h"
 #include "thicklens/error.h"
+#include "thicklens/model/temporaries.h"
 #include "write_all.h"
 
 namespace thicklens::model {
@@ -84,7 +85,10 @@ void OutputFile::Commit(const std::string& content) {
   const OutputTarget& target = impl_->target;
   const std::string& shown = target.given;
   if (impl_->older) {
-    impl_->older->Write(content, shown);
+    PutInPlace(shown, [&] {
+      impl_->older->Write(content, shown);
+      return std::string();
+    });
     impl_->older.reset();
     return;
   }
@@ -98,8 +102,11 @@ void OutputFile::Commit(const std::string& content) {
   WriteAll(part.fd(), content, shown);
   RequireStored(part.fd(), shown);
   part.RequireThere(shown);
-  if (::rename(part.path().c_str(), target.target.c_str()) != 0)
-    throw CannotBeWritten(shown, errno);
+  PutInPlace(shown, [&] {
+    if (::rename(part.path().c_str(), target.target.c_str()) != 0)
+      throw CannotBeWritten(shown, errno);
+    return std::string();
+  });
   part.Release();
   SyncFolder(target.parent());
 }

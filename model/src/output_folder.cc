@@ -15,6 +15,7 @@
 #include "output_target.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
+#include "thicklens/model/temporaries.h"
 #include "write_all.h"
 
 namespace thicklens::model {
@@ -115,14 +116,19 @@ struct OutputFolder::Impl {
     // The old folder gets the part's name, under which other runs look for one that nobody holds.
     const Descriptor old(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
     if (old.get() < 0 || ::flock(old.get(), LOCK_EX | LOCK_NB) != 0) return false;
-    if (!ExchangeNames(part->path(), path)) return false;
-    try {
-      // Somebody may have put something into it, or into its place, since the last look.
-      content.RequireReplaceable(part->path(), path, false, false);
-    } catch (const Error&) {
-      ExchangeNames(part->path(), path);
-      throw;
-    }
+    const std::optional<Temporary> replaced =
+        PutInPlace(path, [&]() -> std::optional<std::string> {
+          if (!ExchangeNames(part->path(), path)) return std::nullopt;
+          try {
+            // Somebody may have put something into it, or into its place, since the last look.
+            content.RequireReplaceable(part->path(), path, false, false);
+          } catch (const Error&) {
+            ExchangeNames(part->path(), path);
+            throw;
+          }
+          return part->path();
+        });
+    if (!replaced) return false;
     std::error_code failure, ignored;
     fs::remove_all(part->path(), failure);
     // A rest that cannot be removed must not be in the way of the next run.
@@ -135,27 +141,41 @@ struct OutputFolder::Impl {
   // new one cannot take its place.
   void ReplaceByTwoNames() {
     std::error_code ignored;
-    const fs::path aside = NameToStepAside(path);
-    const bool replaces = fs::exists(fs::symlink_status(path, ignored));
-    std::error_code failure;
-    if (replaces) fs::rename(path, aside, failure);
-    if (failure) {  // a folder from a lower layer of an overlay, as in a container's image
+    const std::optional<Temporary> replaced =
+        PutInPlace(path, [&]() -> std::optional<std::string> {
+          const fs::path aside = NameToStepAside(path);
+          const bool replaces = fs::exists(fs::symlink_status(path, ignored));
+          std::error_code failure;
+          if (replaces) fs::rename(path, aside, failure);
+          if (failure) return std::nullopt;
+          try {
+            if (replaces) content.RequireReplaceable(aside, path, false, false);
+            Rename(part->path(), path, path);
+          } catch (const Error&) {
+            if (replaces) fs::rename(aside, path, ignored);
+            throw;
+          }
+          return replaces ? aside.string() : std::string();
+        });
+    if (!replaced) {  // a folder from a lower layer of an overlay, as in a container's image
       ReplaceContent();
       return;
     }
-    try {
-      if (replaces) content.RequireReplaceable(aside, path, false, false);
-      Rename(part->path(), path, path);
-    } catch (const Error&) {
-      if (replaces) fs::rename(aside, path, ignored);
-      throw;
-    }
     part->Release();
-    if (replaces) fs::remove_all(aside, ignored);
+    if (!replaced->path().empty()) fs::remove_all(replaced->path(), ignored);
   }
 
   // The marker goes first and comes last: while it is there, the folder is whole.
   void ReplaceContent() {
+    PutInPlace(path, [&] {
+      MoveContent();
+      return std::string();
+    });
+    part.reset();
+    SyncFolder(target.target);
+  }
+
+  void MoveContent() const {
     const fs::path& folder = target.target;
     std::error_code failure;
     fs::remove(folder / content.marker_file, failure);
@@ -169,8 +189,6 @@ struct OutputFolder::Impl {
     const fs::path marker = fs::path(part->path()) / content.marker_file;
     if (fs::exists(marker, failure))
       Rename(marker, folder / content.marker_file, Shown(content.marker_file));
-    part.reset();
-    SyncFolder(folder);
   }
 };
 

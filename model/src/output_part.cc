@@ -108,6 +108,8 @@ class FoundPart {
   Found what_ = Found::kNothing;
 };
 
+struct NameIsTaken {};
+
 int Create(const std::string& path, PartKind kind) {
   constexpr int kAlways = O_CLOEXEC | O_NOFOLLOW;
   if (kind == PartKind::kFile)
@@ -161,17 +163,25 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
   }
   constexpr int kMaxTries = 100;
   for (int i = 0; i < kMaxTries; ++i) {
-    path_ =
-        (folder / fmt::format("{}{:016x}{}", Beginning(stem), Unpredictable(), kEnding)).string();
-    fd_ = Create(path_, kind);
-    if (fd_ < 0 && errno != EEXIST) throw CannotBeWritten(shown, errno);
-    if (fd_ < 0) continue;
+    try {
+      temporary_ = Temporary([&] {
+        path_ = (folder / fmt::format("{}{:016x}{}", Beginning(stem), Unpredictable(), kEnding))
+                    .string();
+        fd_ = Create(path_, kind);
+        if (fd_ < 0 && errno == EEXIST) throw NameIsTaken();
+        if (fd_ < 0) throw CannotBeWritten(shown, errno);
+        return path_;
+      });
+    } catch (const NameIsTaken&) {
+      continue;
+    }
     // A run that does not take turns may have taken it for one that was left behind.
     if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 && IsNamed(fd_, path_)) return;
     const int error = errno;
     const bool is_there = IsNamed(fd_, path_);
     ::close(fd_);
     fd_ = -1;
+    temporary_ = Temporary();
     if (is_there && error != EWOULDBLOCK) {
       std::error_code ignored;
       fs::remove(path_, ignored);
@@ -199,6 +209,7 @@ void OutputPart::RequireThere(const std::string& shown) const {
 void OutputPart::Release() {
   ::close(fd_);
   fd_ = -1;
+  temporary_ = Temporary();
 }
 
 }  // namespace thicklens::model

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <string>
 
+#include "thicklens/model/temporaries.h"
+
 namespace thicklens::model {
 
 enum class PartKind { kFile, kFolder };
@@ -32,6 +34,7 @@ class OutputPart {
  private:
   std::string path_;
   int fd_ = -1;
+  Temporary temporary_;
 };
 
 // Whether a run that this user started, and that no longer lives, has left such a part there.

@@ -87,6 +87,7 @@ JournalFile::JournalFile(std::string path, const std::string& kind,
   try {
     Open();
     ReadRecords(stop);
+    if (records_.empty()) without_record_ = model::Temporary([this] { return followed_; });
   } catch (...) {
     if (file_ >= 0) ::close(file_);
     throw;
@@ -231,6 +232,7 @@ void JournalFile::Append(const std::string& record) {
     throw Failure(path_, "cannot be written", errno);
   }
   WriteAt(end_, line + record + "\n");
+  without_record_ = {};
   records_.push_back({end_ + line.size(), record.size()});
   end_ += line.size() + record.size() + 1;
 }
@@ -238,6 +240,7 @@ void JournalFile::Append(const std::string& record) {
 void JournalFile::Clear() {
   const std::lock_guard<std::mutex> lock(mutex_);
   records_.clear();
+  without_record_ = model::Temporary([this] { return followed_; });
 }
 
 bool JournalFile::Remove() { return IsNamed(file_, followed_) && ::unlink(followed_.c_str()) == 0; }

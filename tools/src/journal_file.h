@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/model/temporaries.h"
+
 namespace thicklens::tools {
 
 // A file that grows record by record while a long run is on its way, and that another run reads
@@ -59,7 +61,8 @@ class JournalFile {
   int file_ = -1;
   mutable std::mutex mutex_;  // of the two that grow
   std::vector<Place> records_;
-  std::uint64_t end_ = 0;  // of the last record
+  model::Temporary without_record_;  // the file, as long as there is none
+  std::uint64_t end_ = 0;            // of the last record
   std::uint64_t bytes_left_out_ = 0;
 };
 

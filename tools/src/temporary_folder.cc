@@ -11,7 +11,10 @@ namespace thicklens::tools {
 
 namespace fs = std::filesystem;
 
-TemporaryFolder::TemporaryFolder(const std::string& purpose) {
+TemporaryFolder::TemporaryFolder(const std::string& purpose)
+    : temporary_([&] { return NewFolder(purpose); }), path_(temporary_.path()) {}
+
+std::string TemporaryFolder::NewFolder(const std::string& purpose) {
   std::error_code failure;
   fs::path parent = fs::temp_directory_path(failure);
   // An absolute path leads to the same folder later, whatever the current one is then.
@@ -25,7 +28,7 @@ TemporaryFolder::TemporaryFolder(const std::string& purpose) {
         : value == nullptr ? ""
                            : value));
   }
-  path_ = name;
+  return name;
 }
 
 TemporaryFolder::~TemporaryFolder() {

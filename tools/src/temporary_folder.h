@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <string>
 
+#include "thicklens/model/temporaries.h"
+
 namespace thicklens::tools {
 
 // A new folder below TMPDIR, gone with all that is in it.
@@ -17,6 +19,9 @@ class TemporaryFolder {
   const std::filesystem::path& path() const { return path_; }
 
  private:
+  static std::string NewFolder(const std::string& purpose);
+
+  model::Temporary temporary_;
   std::filesystem::path path_;
 };
 
