@@ -10,6 +10,7 @@
 #include "blur_costs.h"
 #include "blur_covariance.h"
 #include "blur_prediction.h"
+#include "cancel_callback.h"
 #include "edge_pixels.h"
 
 namespace thicklens::calib {
@@ -158,7 +159,7 @@ class Fit {
     options.function_tolerance = 1e-10;
     options.parameter_tolerance = 1e-10;
     ceres::Solver::Summary summary;
-    ceres::Solve(options, &problem, &summary);
+    SolveOrStop(options, &problem, &summary);
     if (!summary.IsSolutionUsable() || !parameters_.global.allFinite() ||
         !SolveErrors(residuals, &parameters_))
       return Fail("the fit of the blur did not converge: " + summary.message);

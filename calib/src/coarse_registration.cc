@@ -8,6 +8,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "edge_pixels.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -47,6 +48,7 @@ PhasePeak PeakByPhase(const cv::Mat& reference, const cv::Mat& frame) {
   }
   double amplitudes = 0;
   for (int y = 0; y < spectra[0].rows; ++y) {
+    ThrowIfCancelled();
     auto* r = spectra[0].ptr<cv::Vec2f>(y);
     const auto* f = spectra[1].ptr<cv::Vec2f>(y);
     for (int x = 0; x < spectra[0].cols; ++x) {
@@ -63,6 +65,7 @@ PhasePeak PeakByPhase(const cv::Mat& reference, const cv::Mat& frame) {
   PhasePeak best;
   double highest = -1e300;
   for (int y = 0; y < correlation.rows; ++y) {
+    ThrowIfCancelled();
     const int dy = y <= correlation.rows / 2 ? y : y - correlation.rows;
     for (int x = 0; x < correlation.cols; ++x) {
       const int dx = x <= correlation.cols / 2 ? x : x - correlation.cols;
@@ -85,6 +88,7 @@ PictureInformation InformationOfShrunk(const cv::Mat& picture) {
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
   double most = 0;
   for (int y = 1; y + 1 < picture.rows; ++y) {
+    ThrowIfCancelled();
     const double py = y - 0.5 * (picture.rows - 1);
     const auto* row_x = gradient.x.ptr<float>(y);
     const auto* row_y = gradient.y.ptr<float>(y);
@@ -197,6 +201,7 @@ cv::Mat InFrameGeometry(const cv::Mat& reference, const FrameMap& map, int frame
   cv::Mat out(region.size(), CV_32F);
   const int last_column = source.cols - 1, last_row = source.rows - 1;
   for (int y = 0; y < out.rows; ++y) {
+    ThrowIfCancelled();
     const Eigen::Vector2d start = place(region.x, region.y + y);
     const double qy = frame_factor * (region.y + y + 0.5) - 0.5 - map.centre.y();
     auto* row = out.ptr<float>(y);

@@ -6,6 +6,8 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::calib {
 namespace {
 
@@ -42,6 +44,7 @@ class RegionGrower {
     cv::minMaxLoc(gradient_.magnitude, nullptr, &largest);
     std::vector<std::vector<cv::Point>> bins(kBins + 1);
     for (int y = 0; y < taken_.rows; ++y) {
+      ThrowIfCancelled();
       for (int x = 0; x < taken_.cols; ++x) {
         if (taken_.at<uchar>(y, x) != 0) continue;
         const double share = gradient_.magnitude.at<float>(y, x) / largest;

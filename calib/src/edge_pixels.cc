@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::calib {
 
 Gradient CentralGradient(const cv::Mat& grey) {
@@ -31,6 +33,7 @@ std::vector<cv::Point> EdgePixels(const Gradient& gradient, double threshold, in
   const int margin = std::max(margin_px, 2);
   // On a texture every branch here is a coin toss, so the neighbours are chosen without any.
   for (int y = margin; y < m.rows - margin; ++y) {
+    ThrowIfCancelled();
     const auto* above = m.ptr<float>(y - 1);
     const auto* here = m.ptr<float>(y);
     const auto* below = m.ptr<float>(y + 1);
@@ -78,6 +81,7 @@ double Quantile(const cv::Mat& values, double fraction) {
     const double guess = nth(&sorted, static_cast<std::ptrdiff_t>((2 * fraction - 1) * last));
     sorted.clear();
     for (int y = 0; y < values.rows; ++y) {
+      ThrowIfCancelled();
       const auto* row = values.ptr<float>(y);
       for (int x = 0; x < values.cols; ++x) {
         if (row[x] > guess) sorted.push_back(row[x]);

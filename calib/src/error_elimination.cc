@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::calib {
 namespace {
 
@@ -35,6 +37,7 @@ bool SolveErrors(const BlurResiduals& residuals, BlurParameters* parameters) {
   if (residuals.readings_are_exact()) return true;
   Eigen::VectorXd values = residuals.Values(*terms);
   for (int step = 0; step < kMostSteps; ++step) {
+    ThrowIfCancelled();
     const Eigen::VectorXd gradient = residuals.TransposeTimesErrors(*terms, values);
     const Eigen::LLT<Eigen::MatrixXd> newton(NewtonMatrix(residuals, *terms, values));
     if (newton.info() != Eigen::Success) return false;

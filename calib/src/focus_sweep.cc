@@ -9,6 +9,7 @@
 #include <mutex>
 #include <set>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::calib {
@@ -51,6 +52,7 @@ template <typename Value>
 void DecodeGrey(const cv::Mat& stored, const DecodeTable& decode, cv::Mat* grey) {
   const int channels = stored.channels();
   for (int y = 0; y < stored.rows; ++y) {
+    ThrowIfCancelled();
     const auto* in = stored.ptr<Value>(y);
     auto* out = grey->ptr<float>(y);
     for (int x = 0; x < stored.cols; ++x, in += channels) {
@@ -65,6 +67,7 @@ template <typename Value>
 void DecodeChannel(const cv::Mat& stored, int channel, const DecodeTable& decode, cv::Mat* light) {
   const int channels = stored.channels();
   for (int y = 0; y < stored.rows; ++y) {
+    ThrowIfCancelled();
     const auto* in = stored.ptr<Value>(y) + channel;
     auto* out = light->ptr<float>(y);
     for (int x = 0; x < stored.cols; ++x, in += channels) out[x] = decode[*in];

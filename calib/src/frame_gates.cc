@@ -14,6 +14,7 @@
 
 #include "edge_pixels.h"
 #include "pile_up.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -114,6 +115,7 @@ std::uint64_t ContentHash(const cv::Mat& stored) {
   mix(static_cast<std::uint64_t>(stored.type()));
   const std::size_t row_bytes = static_cast<std::size_t>(stored.cols) * stored.elemSize();
   for (int y = 0; y < stored.rows; ++y) {
+    ThrowIfCancelled();
     const auto* row = stored.ptr<std::uint8_t>(y);
     for (std::size_t i = 0; i < row_bytes; i += sizeof(std::uint64_t)) {
       std::uint64_t word = 0;

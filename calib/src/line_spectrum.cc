@@ -6,6 +6,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::calib {
 namespace {
 
@@ -92,6 +94,7 @@ std::optional<Frequency> LineSpectrum::StrongestLine(
   };
   std::vector<Peak> peaks;
   for (int ky = 0; ky <= power_.rows / 2; ++ky) {
+    ThrowIfCancelled();
     for (int kx = -power_.cols / 2 + 1; kx <= power_.cols / 2; ++kx) {
       if (ky == 0 && kx <= 0) continue;
       const double here = At(kx, ky);

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <vector>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::calib {
 namespace {
 
@@ -21,6 +23,7 @@ Histogram CountValues(const cv::Mat& stored, int channel, std::size_t levels) {
   std::vector<std::uint32_t> counts(kTurns * levels, 0);
   const int step = stored.channels();
   for (int y = 0; y < stored.rows; ++y) {
+    ThrowIfCancelled();
     const auto* value = stored.ptr<Value>(y) + channel;
     for (int x = 0; x < stored.cols; ++x, value += step)
       ++counts[static_cast<std::size_t>(x % kTurns) * levels + *value];
@@ -97,6 +100,7 @@ cv::Mat DarkMask(const cv::Mat& stored, double limit) {
   cv::Mat mask = cv::Mat::zeros((stored.rows + 1) / 2, (stored.cols + 1) / 2, CV_8U);
   const int channels = ColourChannels(stored);
   for (int y = 0; y < mask.rows; ++y) {
+    ThrowIfCancelled();
     const auto* pixel = stored.ptr<Value>(2 * y);
     auto* out = mask.ptr<std::uint8_t>(y);
     for (int x = 0; x < mask.cols; ++x, pixel += 2 * stored.channels())
@@ -135,6 +139,7 @@ bool DarkIsOneSide(const cv::Mat& stored, double level) {
       bytes ? DarkMask<std::uint8_t>(stored, limit) : DarkMask<std::uint16_t>(stored, limit);
   std::array<Centroid, 2> centroids;
   for (int y = 0; y < mask.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < mask.cols; ++x) {
       Centroid& c = centroids[mask.at<std::uint8_t>(y, x)];
       c.x += x;
@@ -153,6 +158,7 @@ bool DarkIsOneSide(const cv::Mat& stored, double level) {
   const int reach = mask.rows + mask.cols;
   std::vector<double> all(static_cast<std::size_t>(2 * reach), 0), black = all;
   for (int y = 0; y < mask.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < mask.cols; ++x) {
       const auto bin = static_cast<std::size_t>((x * dx + y * dy) / length + reach);
       all[bin] += 1;

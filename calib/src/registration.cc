@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "coarse_registration.h"
+#include "thicklens/cancel.h"
 #include "tile_map.h"
 #include "tile_pass.h"
 
@@ -97,6 +98,7 @@ std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const c
   const double most_px2 = std::pow(kLargestBlurPart * field_px, 2);
   double variance_px2 = 0;
   for (int round = 0; round < kCoarserRounds; ++round) {
+    ThrowIfCancelled();
     const auto pass = MeasureTiles(reference, frame, map, coarser, variance_px2);
     if (!pass) return std::nullopt;
     const auto field = FitDisplacement(pass->shifts, pass->weight_variance_px2);

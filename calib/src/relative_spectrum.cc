@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "spectral_transfer.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -167,11 +168,13 @@ class Fit {
     Evaluation now = Evaluate(state_);
     double damping = 1e-6;
     for (int step = 0; step < kMostSteps; ++step) {
+      ThrowIfCancelled();
       Eigen::VectorXd gradient;
       const Eigen::MatrixXd normal = AmplitudeNormal(now, &gradient);
       const Eigen::Matrix2Xd shifts = ShiftSteps(now);
       bool better = false;
       for (int attempt = 0; attempt < 8 && !better; ++attempt) {
+        ThrowIfCancelled();
         const State next = Moved(Solved(normal, gradient, damping), shifts / (1 + damping));
         Evaluation there = Evaluate(next);
         if (std::isfinite(there.cost) && there.cost <= now.cost) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "cancel_callback.h"
 #include "edge_pixels.h"
 #include "radial_distortion.h"
 #include "thicklens/calib/image_scale.h"
@@ -94,7 +95,7 @@ std::optional<Law> SolveLaw(const Points& points, double sign, double reading_si
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
   ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
+  SolveOrStop(options, &problem, &summary);
   if (!summary.IsSolutionUsable()) return std::nullopt;
   if (covariance != nullptr) {
     ceres::Covariance::Options covariance_options;

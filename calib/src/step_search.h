@@ -13,6 +13,7 @@
 #include "feature_pixels.h"
 #include "step_fit.h"
 #include "thicklens/calib/edge_spread.h"
+#include "thicklens/cancel.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::calib {
@@ -101,6 +102,7 @@ class StepSearch {
     Parameters best = levels;
     double best_cost = std::numeric_limits<double>::infinity();
     for (const double sigma_px : {2.0, 0.7, 7.0}) {
+      ThrowIfCancelled();
       if (sigma_px > 1 && sigma_px > width_px / 2) continue;
       parameters_ = levels;
       set_variance(sigma_px * sigma_px);

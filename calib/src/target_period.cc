@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "line_spectrum.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -82,6 +83,7 @@ Tiles TileAmplitudes(const cv::Mat& grey, const Frequency& f) {
     const auto along_x = wave(grey.cols, f.x(), i);
     std::vector<Complex> rows(static_cast<std::size_t>(grey.rows));
     for (int y = 0; y < grey.rows; ++y) {
+      ThrowIfCancelled();
       const auto* row = grey.ptr<float>(y);
       double re = 0, im = 0;
       for (std::size_t x = 0; x < along_x.size(); ++x) {
@@ -115,6 +117,7 @@ std::optional<RefinedLattice> Refine(const cv::Mat& grey, const LineSpectrum& sp
   constexpr double kWorstPhase = 0.35;  // rad rms; lines of no pattern have 1 and more
   RefinedLattice result;
   for (int round = 0; round < kRounds; ++round) {
+    ThrowIfCancelled();
     const int highest = round == 0 ? 1 : 3;  // harmonics wait until their phases are unambiguous
     const int parameters = lattice.second ? 4 : 2;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(parameters, parameters);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "thicklens/cancel.h"
 #include "thicklens/model/blur_transfer.h"
 #include "thicklens/model/parallel.h"
 
@@ -54,6 +55,7 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
       ++count;
     cv::Mat blurred = transform.clone();
     for (int v = 0; v < blurred.rows; ++v) {
+      ThrowIfCancelled();
       const double fy =
           static_cast<double>(v <= blurred.rows / 2 ? v : v - blurred.rows) / blurred.rows;
       auto* row = blurred.ptr<cv::Vec2f>(v);

@@ -14,6 +14,7 @@
 #include "linear_solver.h"
 #include "residual_guard.h"
 #include "run_cost.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/block_store.h"
@@ -374,6 +375,7 @@ void KeepPriorBesideThePicture(const BlockGeometry& whole, const model::LightFie
       for (int channel = 0; channel < prior.channels; ++channel) {
         std::size_t ray = prior.ViewStart(channel, k, l);
         for (int t = 0; t < height; ++t) {
+          ThrowIfCancelled();
           for (int s = 0; s < width; ++s, ++ray) {
             const int x = s + shift_s;
             const int y = t + shift_t;

@@ -8,6 +8,7 @@
 #include "ray_irradiance.h"
 #include "ray_landing.h"
 #include "same_point.h"
+#include "thicklens/cancel.h"
 #include "thicklens/model/parallel.h"
 #include "warped_views.h"
 
@@ -60,6 +61,7 @@ std::vector<double> PixelsOf(const model::LinearPicture& picture, const BlockGeo
   std::vector<double> pixels;
   pixels.reserve(Index(block.pixels()));
   for (int y = 0; y < block.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < block.width_px; ++x) {
       pixels.push_back(picture.at(block.first_x + x, block.first_y + y, channel));
     }

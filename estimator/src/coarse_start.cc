@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::estimator {
 namespace {
 
@@ -19,6 +21,7 @@ model::LinearPicture HalfSize(const model::LinearPicture& picture) {
   model::LinearPicture half{Half(picture.width_px), Half(picture.height_px), channels, {}};
   half.values.reserve(Index(half.width_px) * Index(half.height_px) * Index(channels));
   for (int y = 0; y < half.height_px; ++y) {
+    ThrowIfCancelled();
     const int y1 = std::min(2 * y + 1, picture.height_px - 1);
     for (int x = 0; x < half.width_px; ++x) {
       const int x1 = std::min(2 * x + 1, picture.width_px - 1);
@@ -36,6 +39,7 @@ DisparityMap HalfSize(const DisparityMap& map) {
   DisparityMap half{Half(map.width_px), Half(map.height_px), {}, map.step / 2};
   half.disparity.reserve(Index(half.width_px) * Index(half.height_px));
   for (int y = 0; y < map.height_px; y += 2) {
+    ThrowIfCancelled();
     const float* const row = map.disparity.data() + Index(y) * Index(map.width_px);
     for (int x = 0; x < map.width_px; x += 2) half.disparity.push_back(row[x]);
   }
@@ -58,6 +62,7 @@ model::LinearPicture WithDetail(const model::LinearPicture& picture,
                cv::INTER_CUBIC);
     float* to = result.values.data() + c;
     for (int y = 0; y < picture.height_px; ++y) {
+      ThrowIfCancelled();
       const float* const row = at_full_size.ptr<float>(y);
       for (int x = 0; x < picture.width_px; ++x, to += channels) *to += row[x];
     }

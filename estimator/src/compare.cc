@@ -203,6 +203,8 @@ LightFieldScores CompareLightFields(const model::LightField& reference,
     const auto [k, l] = common[index];
     try {
       result.views[index] = CompareView(reference, other, k, l, border_px, dibr_views);
+    } catch (const Interrupted&) {
+      throw;
     } catch (const Error& error) {
       throw Error(fmt::format("view ({}, {}): {}", k, l, error.what()));
     }

@@ -14,6 +14,7 @@
 #include "disparity_buffer.h"
 #include "hole_filler.h"
 #include "mixed_samples.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/view_geometry.h"
 
@@ -83,6 +84,7 @@ void PaintSurfaces(const DisparityMap& map, const std::vector<char>& is_surface,
   const auto shift_y = static_cast<float>(std::clamp(shift.y(), -kLargestShift, kLargestShift));
   PlacePixels(map.disparity.data(), shift_x, shift_y, kFarAwayPx, &upper);
   for (int y = 0; y + 1 < map.height_px; ++y) {
+    ThrowIfCancelled();
     PlacePixels(map.disparity.data() + Index(y + 1) * Index(width), shift_x, shift_y, kFarAwayPx,
                 &lower);
     SampleCells(upper, lower, {y, width, map.height_px}, &cells);
@@ -113,6 +115,7 @@ void PaintAlone(const DisparityMap& map, const std::vector<int>& alone,
                 const Eigen::Vector2d& shift, DisparityBuffer* buffer) {
   const std::size_t width = Index(map.width_px);
   for (const int index : alone) {
+    ThrowIfCancelled();
     const std::size_t i = Index(index);
     const double disparity = map.disparity[i];
     buffer->DrawSquare({static_cast<double>(i % width) - shift.x() * disparity,
@@ -131,6 +134,7 @@ void FindSources(const DisparityMap& map, const SupportedPixels& supported, Disp
     }
   } else {
     for (const HoleFiller::Sample& hole : holes) {
+      ThrowIfCancelled();
       const HoleFiller::Source from = filler.Background(hole.x, hole.y);
       view->hidden.push_back({static_cast<std::int32_t>(buffer.Index(hole.x, hole.y)),
                               static_cast<float>(from.way_x), static_cast<float>(from.way_y),
@@ -153,6 +157,7 @@ DisparityRenderer::DisparityRenderer(const DisparityMap& map) : map_(map) {
   is_surface_.assign(map.disparity.size(), 0);
   std::vector<char> is_alone(map.disparity.size(), width == 1 || height == 1);
   for (int y = 0; y + 1 < height; ++y) {
+    ThrowIfCancelled();
     const std::size_t row = Index(y) * Index(width);
     for (std::size_t i = row; i + 1 < row + Index(width); ++i) {
       const std::size_t below = i + Index(width);

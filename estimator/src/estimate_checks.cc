@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::estimator {
@@ -74,6 +75,7 @@ std::vector<ResidualPatch> MeasurePatches(const std::vector<float>& residual,
   }
   std::vector<ResidualPatch> patches;
   for (int y = 0; y < height_px; y += kPatchPx) {
+    ThrowIfCancelled();
     for (int x = 0; x < width_px; x += kPatchPx) {
       const Patch patch = MeasurePatch(
           residual, hidden_share, width_px,
@@ -113,6 +115,7 @@ std::optional<double> DepthNoisePx(const DisparityMap& map) {
   };
   const auto value = [&](int x, int y) { return map.disparity[Index(map.width_px, x, y)]; };
   for (int y = 0; y < map.height_px; y += stride) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.width_px; x += stride) {
       if (x > 0 && x + 1 < map.width_px) add(value(x - 1, y), value(x, y), value(x + 1, y));
       if (y > 0 && y + 1 < map.height_px) add(value(x, y - 1), value(x, y), value(x, y + 1));

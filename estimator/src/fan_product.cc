@@ -8,6 +8,7 @@
 #include "catmull_rom.h"
 #include "product_row.h"
 #include "surface_taps.h"
+#include "thicklens/cancel.h"
 #include "thicklens/model/parallel.h"
 #include "view_fan.h"
 
@@ -209,7 +210,10 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
   model::ParallelFor((height_px + kBandRows - 1) / kBandRows, threads, [&](int band) {
     FilterMaker maker(axis, direction, disparity, weights, between);
     const int last = std::min((band + 1) * kBandRows, height_px);
-    for (int y = band * kBandRows; y < last; ++y) maker.Make(y, &rows[Index(y)]);
+    for (int y = band * kBandRows; y < last; ++y) {
+      ThrowIfCancelled();
+      maker.Make(y, &rows[Index(y)]);
+    }
   });
   filter.start.assign(1, 0);
   for (const FilterRow<Real>& row : rows) {
@@ -221,6 +225,7 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
   // Row by row, each freed at once: never held twice.
   filter.coefficients.reserve(filter.start.back());
   for (FilterRow<Real>& row : rows) {
+    ThrowIfCancelled();
     filter.coefficients.insert(filter.coefficients.end(), row.coefficients.begin(),
                                row.coefficients.end());
     row = {};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "surface_taps.h"
+#include "thicklens/cancel.h"
 #include "thicklens/model/parallel.h"
 #include "view_fan.h"
 
@@ -192,6 +193,7 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
     for (int x = 0; x < fan.width_px; ++x) {
       const std::size_t i = Index(y) * Index(fan.width_px) + Index(x);
       if (is_product[i] != 0) continue;
+      ThrowIfCancelled();
       for (std::size_t n = 0; n < fan.views.size(); ++n) {
         const FanView& of_fan = fan.views[n];
         const CompactView& view = of_fan.sees;
@@ -276,6 +278,7 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
   });
   std::vector<std::size_t> first(1, 0);  // run of each part; and the end
   for (const Band<Real>& part : parts) {
+    ThrowIfCancelled();
     first.push_back(first.back() + part.index.size());
     runs.pixel.insert(runs.pixel.end(), part.pixel.begin(), part.pixel.end());
   }

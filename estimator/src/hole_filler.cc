@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "surface_taps.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -46,6 +47,7 @@ SupportedPixels FindSupported(const DisparityMap& map, const std::vector<char>& 
   const int needed = std::min(width_px, height_px) == 1 ? 1 : 2;
   std::size_t i = 0;
   for (int y = 0; y < height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width_px; ++x, ++i) {
       const float disparity = map.disparity[i];
       if (is_supported[i] == 0) {
@@ -74,6 +76,7 @@ HoleFiller::HoleFiller(const DisparityMap& map, const SupportedPixels& supported
       direction_(shift / px_per_unit_),
       same_surface_(static_cast<float>(SurfaceTolerance(map))) {
   for (int y = 0; y < buffer.height_px(); ++y) {
+    ThrowIfCancelled();
     const float* const row = buffer.row(y);
     int count = 0;
     for (int x = 0; x < buffer.width_px(); ++x) count += row[x] == DisparityBuffer::kUncovered;
@@ -167,6 +170,7 @@ void HoleFiller::SpreadCovered() {
   };
   std::vector<Sample> queue;
   for (const Sample& hole : holes_) {
+    ThrowIfCancelled();
     for (const Sample& beside : Neighbours(hole)) {
       if (!buffer_.IsInside(beside.x, beside.y) || !buffer_.IsCovered(beside.x, beside.y) ||
           closest_of(beside) >= 0) {
@@ -179,6 +183,7 @@ void HoleFiller::SpreadCovered() {
   std::sort(queue.begin(), queue.end(),
             [](const Sample& a, const Sample& b) { return a.y != b.y ? a.y < b.y : a.x < b.x; });
   for (std::size_t i = 0; i < queue.size(); ++i) {
+    ThrowIfCancelled();
     const Sample from = queue[i];
     for (const Sample& to : Neighbours(from)) {
       if (!buffer_.IsInside(to.x, to.y) || buffer_.IsCovered(to.x, to.y) || closest_of(to) >= 0) {

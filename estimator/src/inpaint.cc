@@ -13,6 +13,7 @@
 
 #include "run_cost.h"
 #include "shown_views.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
 
@@ -38,6 +39,7 @@ ViewHoles HolesOf(const DisparityMap& map, const DisparityRenderer& renderer, in
   ViewDisparity rendered = renderer.Render(a, b);
   ViewHoles holes{view, a, b, std::vector<char>(rendered.seen.size(), 0), 0, {}};
   for (int y = 0; y < map.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.width_px; ++x) {
       const std::size_t i = Index(y) * Index(map.width_px) + Index(x);
       if (rendered.seen[i] != Seen::kHidden) continue;
@@ -60,6 +62,7 @@ ViewHoles HolesOf(const DisparityMap& map, const DisparityRenderer& renderer, in
 // looks at pixels that it has not filled yet.
 void PutNeighbours(const std::vector<char>& is_hole, cv::Mat* values) {
   for (int y = 0; y < values->rows; ++y) {
+    ThrowIfCancelled();
     const char* hole = is_hole.data() + Index(y) * Index(values->cols);
     auto* row = values->ptr<float>(y);
     std::vector<int> nearest(Index(values->cols), -1);
@@ -104,6 +107,7 @@ void FillView(const ViewHoles& holes, const InpaintOptions& options,
     PutNeighbours(holes.is_hole, &scaled);
     cv::inpaint(Padded(scaled), padded_mask, filled, options.radius_px, cv::INPAINT_TELEA);
     for (int y = 0; y < height; ++y) {
+      ThrowIfCancelled();
       for (int x = 0; x < width; ++x) {
         const std::size_t i = Index(y) * Index(width) + Index(x);
         if (holes.is_hole[i] == 0) continue;
@@ -119,6 +123,7 @@ std::size_t Carry(const DisparityMap& map, const ViewHoles& from, ViewHoles* to,
   const double px_per_unit = map.step.cwiseAbs().maxCoeff();
   std::size_t carried = 0;
   for (int y = 0; y < map.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.width_px; ++x) {
       const std::size_t i = Index(y) * Index(map.width_px) + Index(x);
       if (from.is_hole[i] == 0) continue;

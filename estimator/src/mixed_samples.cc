@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "surface_taps.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -184,6 +185,7 @@ std::vector<kernels::MixedSample> FindMixedSamples(const DisparityMap& map,
   const std::size_t width = Index(map.width_px);
   FirstCandidates candidates(view.disparity.size());
   for (const int index : at_jump) {
+    ThrowIfCancelled();
     const std::size_t i = Index(index);
     const float disparity = map.disparity[i];
     const double x = static_cast<double>(i % width) - view.shift.x() * disparity;

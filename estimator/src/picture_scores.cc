@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
 
@@ -75,6 +76,7 @@ Eigen::Vector3d ColourAt(const StoredValues& picture, int x, int y) {
 cv::Mat1d GreyOf(const StoredValues& picture) {
   cv::Mat1d grey(picture.height_px, picture.width_px);
   for (int y = 0; y < picture.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < picture.width_px; ++x) {
       const float* value = PixelAt(picture, x, y);
       grey(y, x) = picture.channels == 1
@@ -89,6 +91,7 @@ cv::Mat1d GreyOf(const StoredValues& picture) {
 double PsnrDb(const StoredValues& reference, const StoredValues& other, const cv::Rect& inside) {
   double sum = 0;
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
+    ThrowIfCancelled();
     const float* a = PixelAt(reference, inside.x, y);
     const float* b = PixelAt(other, inside.x, y);
     for (int i = 0; i < inside.width * reference.channels; ++i) {
@@ -118,6 +121,7 @@ double MeanSsim(const cv::Mat1d& a, const cv::Mat1d& b, int border_px) {
   const cv::Mat1d product = WindowMean(a.mul(b));
   double sum = 0;
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
+    ThrowIfCancelled();
     for (int x = inside.x; x < inside.x + inside.width; ++x) {
       const double means = mu_a(y, x) * mu_b(y, x);
       const double squares = mu_a(y, x) * mu_a(y, x) + mu_b(y, x) * mu_b(y, x);
@@ -134,6 +138,7 @@ double MeanDeltaE94(const StoredValues& reference, const StoredValues& other,
                     const cv::Rect& inside) {
   double sum = 0;
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
+    ThrowIfCancelled();
     for (int x = inside.x; x < inside.x + inside.width; ++x)
       sum += DeltaE94(LabOf(ColourAt(reference, x, y)), LabOf(ColourAt(other, x, y)));
   }
@@ -155,6 +160,7 @@ double EdgeThreshold(const Gradient& reference, const cv::Rect& inside) {
   std::vector<double> magnitudes;
   magnitudes.reserve(static_cast<std::size_t>(inside.area()));
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
+    ThrowIfCancelled();
     for (int x = inside.x; x < inside.x + inside.width; ++x)
       magnitudes.push_back(reference.Magnitude(y, x));
   }
@@ -176,6 +182,7 @@ std::optional<double> MacadeStandin(const cv::Mat1d& reference, const cv::Mat1d&
   double sum = 0;
   long edges = 0;
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
+    ThrowIfCancelled();
     for (int x = inside.x; x < inside.x + inside.width; ++x) {
       const double magnitude_a = a.Magnitude(y, x);
       if (!(magnitude_a >= threshold)) continue;

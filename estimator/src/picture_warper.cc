@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/view_geometry.h"
 
@@ -155,6 +156,7 @@ void PictureWarper::CopyPixels(const model::LinearPicture& picture) {
     const int first = plane * of_pixel;
     const int count = std::min(of_pixel, channels_ - first);
     for (int y = -kBefore; y < height + kAfter; ++y) {
+      ThrowIfCancelled();
       const float* const row =
           picture.values.data() +
           Index(std::clamp(y, 0, height - 1)) * Index(width) * Index(channels_) + first;
@@ -175,6 +177,7 @@ void PictureWarper::FindRanges() {
     return map_.disparity.data() + Index(std::clamp(y, 0, height - 1)) * Index(width);
   };
   for (int y = 0; y < height; ++y) {
+    ThrowIfCancelled();
     const float* const rows[] = {row_of(y - 1), row_of(y), row_of(y + 1), row_of(y + 2)};
     for (std::size_t x = 0; x < Index(width); ++x) {
       columns[x] = {std::min({rows[0][x], rows[1][x], rows[2][x], rows[3][x]}),
@@ -303,6 +306,7 @@ model::LinearPicture PictureWarper::Warp(const ViewDisparity& view) const {
   warped.values.resize(map_.disparity.size() * Index(channels_));
   TapRow row(map_.width_px);
   for (int y = 0; y < map_.height_px; ++y) {
+    ThrowIfCancelled();
     const std::size_t first = Index(y) * width;
     row.disparity = view.disparity.data() + first;
     row.Split(view.source_x.data() + first, view.source_y.data() + first, y, map_.height_px);
@@ -340,6 +344,7 @@ void PictureWarper::Warp(const CompactView& view, model::LinearPicture* warped) 
   row.disparity = disparity.data();
   auto hidden = view.hidden.begin();
   for (int y = 0; y < map_.height_px; ++y) {
+    ThrowIfCancelled();
     const std::size_t first = Index(y) * width;
     for (std::size_t x = 0; x < width; ++x) {
       disparity[x] = view.disparity[first + x];

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "surface_taps.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -12,13 +13,31 @@ namespace {
 // A ray reads pixels so far beside its source.
 constexpr int kTapsPx = 2;
 
+// filter(from, to, size) over rectangles of that reach around each pixel, where that is the same as
+// along the rows and then along the columns: in strips, as one call for a whole picture may take
+// long.
+template <typename Filter>
+cv::Mat InStrips(const cv::Mat& values, const cv::Size& reach_px, const Filter& filter) {
+  constexpr int kStripPx = 64;
+  cv::Mat along_rows(values.size(), values.type()), both(values.size(), values.type());
+  for (int y = 0; y < values.rows; y += kStripPx) {
+    ThrowIfCancelled();
+    const cv::Range strip(y, std::min(y + kStripPx, values.rows));
+    filter(values.rowRange(strip), along_rows.rowRange(strip), cv::Size(2 * reach_px.width + 1, 1));
+  }
+  for (int x = 0; x < values.cols; x += kStripPx) {
+    ThrowIfCancelled();
+    const cv::Range strip(x, std::min(x + kStripPx, values.cols));
+    filter(along_rows.colRange(strip), both.colRange(strip), cv::Size(1, 2 * reach_px.height + 1));
+  }
+  return both;
+}
+
 // The most that is within a reach of each pixel.
 cv::Mat MostAround(const cv::Mat& values, const cv::Size& reach_px) {
-  cv::Mat most;
-  cv::dilate(
-      values, most,
-      cv::getStructuringElement(cv::MORPH_RECT, {2 * reach_px.width + 1, 2 * reach_px.height + 1}));
-  return most;
+  return InStrips(values, reach_px, [](const cv::Mat& from, cv::Mat to, const cv::Size& size) {
+    cv::dilate(from, to, cv::getStructuringElement(cv::MORPH_RECT, size));
+  });
 }
 
 // Differences to the next pixel; 0 for the last.
@@ -57,6 +76,7 @@ PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_co
   const cv::Mat step_y = MostAround(StepsTo(map, 0, 1), reach_px);
   const double same_surface = SurfaceTolerance(disparity);
   for (int y = reach_px.height; y < height_px - reach_px.height; ++y) {
+    ThrowIfCancelled();
     for (int x = reach_px.width; x < width_px - reach_px.width; ++x) {
       const double g = step_x.at<float>(y, x), h = step_y.at<float>(y, x);
       const double d = most.at<float>(y, x);
@@ -68,10 +88,10 @@ PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_co
                                            3 * (g + h) <= same_surface;
     }
   }
-  cv::Mat is_seen;
-  cv::erode(
-      is_product, is_seen,
-      cv::getStructuringElement(cv::MORPH_RECT, {2 * reach_px.width + 1, 2 * reach_px.height + 1}));
+  const cv::Mat is_seen =
+      InStrips(is_product, reach_px, [](const cv::Mat& from, cv::Mat to, const cv::Size& box) {
+        cv::erode(from, to, cv::getStructuringElement(cv::MORPH_RECT, box));
+      });
   return {Flags(is_product), Flags(is_seen)};
 }
 

@@ -11,6 +11,7 @@
 #include "scene_data.h"
 #include "scene_projection.h"
 #include "seen_share.h"
+#include "thicklens/cancel.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/model/parallel.h"
 #include "view_fan.h"
@@ -85,6 +86,7 @@ std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
   const auto shift_x = static_cast<float>(view.shift.x());
   const auto shift_y = static_cast<float>(view.shift.y());
   for (int y = 0; y < view.height_px; ++y) {
+    ThrowIfCancelled();
     const std::size_t row = static_cast<std::size_t>(y) * width;
     for (int x = 0; x < view.width_px; ++x) {
       const std::size_t i = row + static_cast<std::size_t>(x);

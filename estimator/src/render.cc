@@ -12,6 +12,7 @@
 
 #include "catmull_rom.h"
 #include "shown_views.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
 
@@ -186,6 +187,7 @@ model::LinearPicture EpipolarRow(const model::LightField& light_field, int t, in
   model::LinearPicture picture =
       BlackPicture(light_field.s_count, light_field.u_count * repeat_px, light_field.channels);
   for (int y = 0; y < picture.height_px; ++y) {
+    ThrowIfCancelled();
     for (int s = 0; s < light_field.s_count; ++s) {
       CopySample(light_field, y / repeat_px, l, s, t, s, y, &picture);
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "surface_taps.h"
+#include "thicklens/cancel.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
@@ -47,6 +48,7 @@ ViewRays<Real>::ViewRays(const DisparityMap& map, const std::vector<float>& lowe
   const auto room = static_cast<float>(tolerance);
   std::size_t i = 0;
   for (int y = 0; y < map.height_px; ++y) {
+    ThrowIfCancelled();
     run_start_.push_back(runs_.size());
     odd_start_.push_back(odd_.size());
     for (int x = 0; x < map.width_px; ++x, ++i) {
@@ -226,6 +228,7 @@ void SceneRays<Real>::ApplyTransposed(const Real* photograph, Real* planes) {
     if (!(weight > 0)) return;
     Real* values = rows_.data() + k * (width + ViewRays<Real>::kMargin);
     for (int y = 0; y < height_px_; ++y) {
+      ThrowIfCancelled();
       const Real* row = photograph + Index(y) * width;
       for (std::size_t x = 0; x < width; ++x) values[x] = weight * row[x];
       views_[k].Spread(y, values, plane);
@@ -238,6 +241,7 @@ void SceneRays<Real>::Show(std::size_t k, const Real* plane, float* shown) const
   const std::size_t width = Index(width_px_);
   std::vector<Real> warped(width + ViewRays<Real>::kMargin);
   for (int y = 0; y < height_px_; ++y) {
+    ThrowIfCancelled();
     views_[k].Warp(y, plane, warped.data());
     for (std::size_t x = 0; x < width; ++x) {
       shown[Index(y) * width + x] = static_cast<float>(warped[x]);

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <opencv2/imgproc.hpp>
 
+#include "thicklens/cancel.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
@@ -141,6 +142,7 @@ std::vector<PerNormal> Coefficients(const WindowMeans& means, const PerNormal& e
     return static_cast<double>(plane.at<Real>(y, x));
   };
   for (int y = 0; y < first.rows; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < first.cols; ++x) {
       Eigen::Matrix3d normal;  // of which the Cholesky factor reads the lower half
       for (std::size_t k = 0; k < kNormals; ++k) {
@@ -178,6 +180,7 @@ double ReliefSlope(const DisparityMap& disparity) {
   const Slopes slopes(disparity);
   double sum_x = 0, sum_y = 0, squares = 0, count = 0;
   for (int y = 0; y < disparity.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < disparity.width_px; ++x) {
       const Slope slope = slopes.At(x, y);
       if (slope.is_jump) continue;
@@ -204,6 +207,7 @@ Relief<Real> ReliefOf(const DisparityMap& disparity, double slope) {
   cv::Mat along_x(height, width, CV_32F), along_y(height, width, CV_32F);
   const Slopes slopes(disparity);
   for (int y = 0; y < height; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width; ++x) {
       const Slope here = slopes.At(x, y);
       along_x.at<float>(y, x) = here.x;

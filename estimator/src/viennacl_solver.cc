@@ -35,6 +35,8 @@ auto OnDevice(const char* step, const Action& action) {
   const std::lock_guard<std::mutex> lock(OneAtATime());
   try {
     return action();
+  } catch (const Interrupted&) {
+    throw;
   } catch (const std::exception& e) {
     throw Error(std::string("ViennaCL: the ") + step + " failed: " + e.what());
   }

@@ -85,6 +85,8 @@ std::shared_ptr<Backend> OpenBestDevice(const DeviceRequest& request, const Stop
     }
     try {
       return std::make_shared<OpenClBackend>(OpenOpenClDevice(device.platform, device.device));
+    } catch (const Interrupted&) {
+      throw;
     } catch (const Error& error) {
       problems->emplace_back(error.what());
     }

@@ -70,6 +70,8 @@ std::string TryDevice(int platform, int device, const std::vector<EmbeddedFile>&
   } catch (const cl::Error& failure) {
     return fmt::format("device opencl:{}:{}: a small kernel does not run: {}: {}", platform, device,
                        failure.what(), OpenClErrorText(failure.err()));
+  } catch (const Interrupted&) {
+    throw;
   } catch (const Error& failure) {
     return failure.what();
   }

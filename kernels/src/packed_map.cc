@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "bands.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::kernels {
 namespace {
@@ -76,6 +77,7 @@ std::vector<std::int32_t> PackedPlaces(const PackedPlane& plane) {
   std::vector<std::int32_t> places;
   places.reserve(Index(plane.width_px) * Index(plane.height_px));
   for (int y = 0; y < plane.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < plane.width_px; ++x) places.push_back(y * plane.stride_px + x);
   }
   return places;

@@ -7,6 +7,7 @@
 
 #include "bands.h"
 #include "filter_loops.h"
+#include "thicklens/cancel.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::kernels {
@@ -18,6 +19,9 @@ constexpr std::int64_t kLeastRuns = 1 << 14;
 constexpr int kLeastRowsOfAThread = 512;
 constexpr int kLeastCopiedPx = 16384;  // by a thread
 constexpr int kPartPx = 64;            // parts of a row are made of so many
+// Between pieces and between so many rows it may be stopped: far fewer than take 0.2 s.
+constexpr int kPiecesOfAPart = 16;
+constexpr std::size_t kRowsAtOnce = 1024;
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
@@ -133,6 +137,7 @@ void SetBands(PixelRuns<Real>* runs) {
   // The first pixel that a row, or one that comes after it, reads.
   std::vector<std::int32_t> first(rows + 1, std::numeric_limits<std::int32_t>::max());
   for (std::size_t r = rows; r-- > 0;) {
+    ThrowIfCancelled();
     first[r] = first[r + 1];
     for (std::size_t n = Index(runs->run[r]); n < Index(runs->run[r + 1]); ++n) {
       first[r] = std::min(first[r], runs->index[n]);
@@ -141,6 +146,7 @@ void SetBands(PixelRuns<Real>* runs) {
   runs->band.assign(1, 0);
   std::int32_t read = -1, read_before = -1;  // the last pixel: by now, and before the band
   for (std::size_t r = 0; r < rows; ++r) {
+    ThrowIfCancelled();
     if (runs->run[r] - runs->run[runs->band.back()] >= kLeastRuns && first[r] > read_before) {
       runs->band.push_back(r);
       read_before = read;
@@ -161,6 +167,7 @@ PixelRuns<Real> RunsOf(const PixelRows<Real>& rows, int width_px) {
   runs.pixel = rows.pixel;
   runs.run.push_back(0);
   for (std::size_t r = 0; r < rows.pixel.size(); ++r) {
+    ThrowIfCancelled();
     for (std::size_t e = Index(rows.start[r]); e < Index(rows.start[r + 1]); ++e) {
       const std::int32_t place =
           rows.index[e] / width_px * runs.stride_px() + rows.index[e] % width_px;
@@ -185,6 +192,7 @@ PixelRows<Real> RowsOf(const PixelRuns<Real>& runs) {
   rows.pixel = runs.pixel;
   rows.start.push_back(0);
   for (std::size_t r = 0; r < runs.pixel.size(); ++r) {
+    ThrowIfCancelled();
     for (std::size_t n = Index(runs.run[r]); n < Index(runs.run[r + 1]); ++n) {
       const std::int32_t first =
           runs.index[n] / runs.stride_px() * runs.width_px + runs.index[n] % runs.stride_px();
@@ -210,8 +218,10 @@ void ApplyRuns(const PixelRuns<Real>& runs, const PictureIn<Real>& x, const Pict
   for (int first = 0; first < x.channels; first += kMostChannels) {
     const int channels = std::min(kMostChannels, x.channels - first);
     copy.Copy(x.values + first * x.plane_stride, x.plane_stride, channels);
-    ForBands(parts, parts, [&](int part, int, int) {
-      loops.sum_runs(RangeOf(runs, FirstRow(runs, part, parts), FirstRow(runs, part + 1, parts)),
+    // Each of them in pieces, between which it may be stopped.
+    const int pieces = kPiecesOfAPart * parts;
+    ForBands(pieces, parts, [&](int, int begin, int end) {
+      loops.sum_runs(RangeOf(runs, FirstRow(runs, begin, pieces), FirstRow(runs, end, pieces)),
                      copy.values(), copy.stride(), channels, y.values + first * y.plane_stride,
                      y.plane_stride);
     });
@@ -234,9 +244,12 @@ void AddTransposed(const PixelRuns<Real>& runs, const PictureIn<Real>& y, const 
       ForBands(bands, std::max(1, std::min(bands, threads)), [&](int, int begin, int end) {
         for (int i = begin; i < end; ++i) {
           const std::size_t band = 2 * Index(i) + odd;
-          loops.spread_runs(RangeOf(runs, runs.band[band], runs.band[band + 1]),
-                            y.values + first * y.plane_stride, y.plane_stride, channels,
-                            sums.values(), sums.stride());
+          for (std::size_t row = runs.band[band]; row < runs.band[band + 1] && !IsCancelled();
+               row += kRowsAtOnce) {
+            loops.spread_runs(RangeOf(runs, row, std::min(row + kRowsAtOnce, runs.band[band + 1])),
+                              y.values + first * y.plane_stride, y.plane_stride, channels,
+                              sums.values(), sums.stride());
+          }
         }
       });
     }

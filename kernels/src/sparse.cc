@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::kernels {
@@ -79,6 +80,7 @@ CsrPattern TransposePattern(int rows, int columns, const std::vector<std::int64_
   transposed.column.resize(column.size());
   std::vector<std::int64_t> next(transposed.row_start.begin(), transposed.row_start.end() - 1);
   for (int row = 0; row < rows; ++row) {
+    ThrowIfCancelled();
     for (std::int64_t e = row_start[Index(row)]; e < row_start[Index(row) + 1]; ++e) {
       const std::int64_t to = next[Index(column[Index(e)])]++;
       transposed.column[Index(to)] = row;
@@ -121,6 +123,7 @@ CsrMatrix<Real> Compress(const EllMatrix<Real>& ell) {
   std::int64_t begin = 0;
   std::int64_t to = 0;
   for (int row = 0; row < ell.rows; ++row) {
+    ThrowIfCancelled();
     const std::int64_t end = csr.row_start[Index(row) + 1];
     to = SortRow(begin, end, to, &csr.column, &csr.value);
     csr.row_start[Index(row) + 1] = to;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::model {
 namespace {
 
@@ -32,6 +34,7 @@ PictureBounds::PictureBounds(int width_px, int height_px,
       static_cast<std::size_t>(finest.columns) * static_cast<std::size_t>(finest.rows), kNothing);
   // A block holds the cells between its pixels and their next: its neighbours' first pixels too.
   for (int y = 0; y < height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width_px; ++x) {
       const double number = value(x, y);
       for (int row = std::max(y - 1, 0) >> kFinestBits; row <= y >> kFinestBits; ++row) {

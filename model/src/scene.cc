@@ -9,11 +9,14 @@
 #include <utility>
 
 #include "random_draws.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/stored_levels.h"
 
 namespace thicklens::model {
 namespace {
+
+constexpr std::size_t kValuesAtOnce = 1 << 16;
 
 constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
 
@@ -59,7 +62,12 @@ StoredPicture StoredBy(const LinearPicture& picture, int bits, const LevelOf& le
             picture.values.size());
   StoredPicture stored{picture.width_px, picture.height_px, picture.channels, bits, {}};
   stored.values.resize(picture.values.size());
-  std::transform(picture.values.begin(), picture.values.end(), stored.values.begin(), level_of);
+  for (std::size_t first = 0; first < picture.values.size(); first += kValuesAtOnce) {
+    ThrowIfCancelled();
+    const std::size_t last = std::min(first + kValuesAtOnce, picture.values.size());
+    std::transform(picture.values.data() + first, picture.values.data() + last,
+                   stored.values.data() + first, level_of);
+  }
   return stored;
 }
 
@@ -226,6 +234,7 @@ LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transf
   LinearPicture linear{picture.width_px, picture.height_px, picture.channels, {}};
   linear.values.reserve(picture.values.size());
   for (const std::uint16_t value : picture.values) {
+    if (linear.values.size() % kValuesAtOnce == 0) ThrowIfCancelled();
     if (value >= light_of.size()) {
       throw Error(fmt::format("picture: a value is {}: at {} bits it must be at most {}", value,
                               picture.bits, picture.full_scale()));
@@ -309,6 +318,7 @@ Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& 
   Scene scene;
   scene.depth_mm.reserve(map.values.size());
   for (int y = 0; y < map.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < map.width_px; ++x) {
       const float value = map.values[scene.depth_mm.size()];
       const double depth_mm = converter.DepthMm(value, x, y, map.integer);

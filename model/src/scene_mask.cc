@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::model {
@@ -91,6 +92,7 @@ void SceneMask::FindExtent() {
     extent_.high_px(axis) = std::max(extent_.high_px(axis), high);
   };
   for (int y = 0; y < height_px_; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < width_px_; ++x) {
       const double here = At(x, y);
       if (here < kHalf) continue;

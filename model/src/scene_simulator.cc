@@ -17,6 +17,7 @@
 #include "scene_survey.h"
 #include "scene_texture.h"
 #include "sensor_noise.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/parallel.h"
@@ -201,6 +202,8 @@ struct SceneSimulator::Impl {
       try {
         drawn[i].emplace(layer.texture, geometry.RequestFor(i),
                          (i < pixels.size() ? pixels[i] : none).texture, &draws, in_texture);
+      } catch (const Interrupted&) {
+        throw;
       } catch (const Error& error) {
         throw Error(place + ": " + error.what());
       }
@@ -259,6 +262,7 @@ RawDepthMap SceneSimulator::RenderDepth() const {
   map.values.reserve(static_cast<std::size_t>(sensor.width_px) *
                      static_cast<std::size_t>(sensor.height_px));
   for (int y = 0; y < sensor.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < sensor.width_px; ++x) {
       const SceneHit hit =
           impl_->geometry.Trace(impl_->geometry.RayAt(Eigen::Vector2d(x, y), {0, 0}));

@@ -6,6 +6,7 @@
 
 #include "ray_irradiance.h"
 #include "ray_set.h"
+#include "thicklens/cancel.h"
 #include "thicklens/model/parallel.h"
 
 namespace thicklens::model {
@@ -329,6 +330,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
   BlockGrid grid{columns_, rows_, 0};
   std::vector<double> reaches;  // block by block, of each of its layers
   for (int row = 0; row < rows_; ++row) {
+    ThrowIfCancelled();
     for (int column = 0; column < columns_; ++column) {
       SceneBlock block;
       block.x0 = column * kBlockPx;
@@ -355,6 +357,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
 
   auto reach = reaches.begin();
   for (int row = 0; row < rows_; ++row) {
+    ThrowIfCancelled();
     for (int column = 0; column < columns_; ++column) {
       SceneBlock& block = blocks_[static_cast<std::size_t>(row * columns_ + column)];
       Detail seen, gloss;

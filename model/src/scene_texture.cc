@@ -12,6 +12,7 @@
 
 #include "square_wave.h"
 #include "texture_canvas.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/parallel.h"
 
@@ -169,6 +170,7 @@ TextureCanvas DrawNoise(const TextureOptions& options, const TextureRequest& req
   const auto draw = [&] {
     cv::Mat samples(canvas.rows, canvas.columns, CV_32F);
     for (int i = 0; i < samples.rows; ++i) {
+      ThrowIfCancelled();
       for (int j = 0; j < samples.cols; ++j) {
         samples.at<float>(i, j) = static_cast<float>(draws->Normal());
       }
@@ -184,6 +186,7 @@ TextureCanvas DrawNoise(const TextureOptions& options, const TextureRequest& req
     // Two independent parts of variance 1.
     channel /= std::hypot(1 - options.saturation, options.saturation);
     for (int i = 0; i < channel.rows; ++i) {
+      ThrowIfCancelled();
       float* row = channel.ptr<float>(i);
       for (int j = 0; j < channel.cols; ++j) {
         row[j] = static_cast<float>(1 + std::tanh(options.contrast / 2 * row[j]));
@@ -198,6 +201,7 @@ TextureCanvas DrawCheckerboard(const TextureOptions& options, const TextureReque
   TextureCanvas canvas =
       MakeTextureCanvas(request.low_mm, request.high_mm, request.coarsest_pixel_mm, period_mm);
   for (int i = 0; i < canvas.rows; ++i) {
+    ThrowIfCancelled();
     for (int j = 0; j < canvas.columns; ++j) {
       const Eigen::Vector2d at_mm = canvas.PositionMm(i, j);
       const double light = 1 + options.contrast *
@@ -221,6 +225,7 @@ TextureCanvas DrawSiemensStar(const TextureOptions& options, const TextureReques
   const double cycles =
       sector_mm > 0 ? std::max(1.0, std::round(kPi * rim_mm / sector_mm)) : kStarCycles;
   for (int i = 0; i < canvas.rows; ++i) {
+    ThrowIfCancelled();
     for (int j = 0; j < canvas.columns; ++j) {
       const Eigen::Vector2d at_mm = canvas.PositionMm(i, j) - request.centre_mm;
       const double light =
@@ -235,6 +240,7 @@ TextureCanvas DrawSiemensStar(const TextureOptions& options, const TextureReques
 cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
   cv::Mat values(picture.height_px, picture.width_px, CV_32F);
   for (int y = 0; y < picture.height_px; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < picture.width_px; ++x) {
       values.at<float>(y, x) = picture.at(x, y, picture.channels < 3 ? 0 : channel);
     }

@@ -1,8 +1,16 @@
 #include "sensor_noise.h"
 
+#include <cstddef>
+
 #include "random_draws.h"
+#include "thicklens/cancel.h"
 
 namespace thicklens::model {
+namespace {
+
+constexpr std::size_t kValuesAtOnce = 4096;
+
+}  // namespace
 
 void AddSensorNoise(const SensorNoise& noise, const EffectSet& on, std::uint64_t seed,
                     std::uint32_t item, LinearPicture* picture) {
@@ -12,7 +20,9 @@ void AddSensorNoise(const SensorNoise& noise, const EffectSet& on, std::uint64_t
   if (!(full_well > 0) || !(shot || read)) return;
   RandomDraws shots(seed, RandomDraws::Purpose::kSensor, item);
   RandomDraws reads(seed, RandomDraws::Purpose::kReadout, item);
+  std::size_t count = 0;
   for (float& light : picture->values) {
+    if (count++ % kValuesAtOnce == 0) ThrowIfCancelled();
     double electrons = static_cast<double>(light) * full_well;
     if (shot) electrons = shots.Poisson(electrons);
     if (read) electrons += noise.read_noise_electrons * reads.Normal();

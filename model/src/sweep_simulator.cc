@@ -15,6 +15,7 @@
 #include "random_draws.h"
 #include "sensor_noise.h"
 #include "sweep_target.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "tilted_target.h"
 
@@ -231,6 +232,7 @@ struct SweepSimulator::Impl {
     light_of_pixel.reserve(static_cast<std::size_t>(sensor.width_px) *
                            static_cast<std::size_t>(sensor.height_px));
     for (int y = 0; y < sensor.height_px; ++y) {
+      ThrowIfCancelled();
       for (int x = 0; x < sensor.width_px; ++x) {
         const double place = (Eigen::Vector2d(x, y) - axis_px).norm() / step_px;
         const auto below = std::min(static_cast<std::size_t>(place), std::size_t{kSteps});
@@ -368,6 +370,7 @@ struct SweepSimulator::Impl {
                           static_cast<std::size_t>(sensor.height_px));
     const auto add = [&](const cv::Mat& light, int first, const auto& factor) {
       for (int i = 0; i < light.rows; ++i) {
+        ThrowIfCancelled();
         const double* row = light.ptr<double>(i);
         float* to =
             picture.values.data() + static_cast<std::ptrdiff_t>(i) * sensor.width_px + first;
@@ -403,6 +406,7 @@ struct SweepSimulator::Impl {
     picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
                           static_cast<std::size_t>(sensor.height_px));
     for (const ColumnStrip& strip : StripsOf(sensor.width_px, ChangePerColumnPx(frame))) {
+      ThrowIfCancelled();
       RenderEdge(frame, strip, &picture);
     }
     return picture;
@@ -449,6 +453,7 @@ struct SweepSimulator::Impl {
     const double dark = lamp * (1 - options_of.contrast);
     const double step = 2 * lamp * options_of.contrast;
     for (int y = 0; y < sensor.height_px; ++y) {
+      ThrowIfCancelled();
       for (int x = strip.first; x < strip.first + strip.count; ++x) {
         const double distance_px = distance_mm(Eigen::Vector2d(x, y) - axis_px) / pixel_mm;
         picture->values[static_cast<std::size_t>(y * sensor.width_px + x)] =

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "square_wave.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::model {
@@ -119,6 +120,7 @@ TargetTile DrawDeadLeaves(const TargetOptions& options, const TileRequest& reque
   const double total = static_cast<double>(columns) * rows;
   double remaining = total;
   while (remaining > 1e-4 * total) {
+    ThrowIfCancelled();
     const double radius =
         1 / std::sqrt(small_term - draws->Uniform() * (small_term - large_term)) / spacing_mm;
     const double x = draws->Uniform() * columns;
@@ -163,6 +165,7 @@ TargetTile DrawNoise(const TargetOptions& options, const TileRequest& request, R
   cv::Mat spectrum;
   cv::dft(samples, spectrum, cv::DFT_COMPLEX_OUTPUT);
   for (int i = 0; i < spectrum.rows; ++i) {
+    ThrowIfCancelled();
     auto* row = spectrum.ptr<std::complex<double>>(i);
     const double fy = std::min(i, spectrum.rows - i) / canvas.height_mm();
     for (int j = 0; j < spectrum.cols; ++j) {
@@ -177,6 +180,7 @@ TargetTile DrawNoise(const TargetOptions& options, const TileRequest& request, R
   const double rms =
       std::sqrt(samples.dot(samples) / (static_cast<double>(samples.rows) * samples.cols));
   for (int i = 0; i < samples.rows; ++i) {
+    ThrowIfCancelled();
     double* row = samples.ptr<double>(i);
     for (int j = 0; j < samples.cols; ++j) {
       row[j] = 1 + std::tanh(options.contrast / 2 * row[j] / rms);
@@ -235,6 +239,7 @@ TargetTile DrawPicture(const TargetOptions& options, const TileRequest& request,
              size.width < source.cols ? cv::INTER_AREA : cv::INTER_CUBIC);
   cv::Mat& samples = canvas.samples();
   for (int i = 0; i < samples.rows; ++i) {
+    ThrowIfCancelled();
     const int row = cv::borderInterpolate(i - samples.rows / 2 + size.height / 2, size.height,
                                           cv::BORDER_REFLECT);
     for (int j = 0; j < samples.cols; ++j) {

@@ -10,6 +10,7 @@
 
 #include "simulated_sweep.h"
 #include "support/error_message.h"
+#include "thicklens/cancel.h"
 #include "thicklens/model/camera_file.h"
 
 namespace thicklens::calib {
@@ -229,6 +230,30 @@ TEST(Calibrate, StopsWhenProgressSaysSo) {
   };
   EXPECT_THROW(Calibrate(s.sweep, options), Interrupted);
   EXPECT_LT(calls, 14);  // other threads may finish a frame meanwhile
+}
+
+// Whatever step it is at, nothing takes the end for a frame or a fit that failed.
+TEST(Calibrate, IsCancelledAtEachStep) {
+  const SimulatedSweep s = Good();
+  CalibrationOptions options;
+  options.threads = 1;
+  int steps = 0;
+  options.progress = [&](int, int) {
+    ++steps;
+    return true;
+  };
+  Calibrate(s.sweep, options);
+  for (int at = 1; at <= steps; at += 1 + steps / 4) {
+    CancelToken token;
+    const CancelScope scope(&token);
+    int step = 0;
+    options.progress = [&](int, int) {
+      if (++step == at) token.Cancel();
+      return true;
+    };
+    EXPECT_THROW(Calibrate(s.sweep, options), Interrupted) << "at step " << at << " of " << steps;
+    EXPECT_LE(step, at + 1);
+  }
 }
 
 // d1 = rho + f2 zf/(zf - f1): a tolerance of f2 goes into it times zf/(zf - f1), one of the pitch

@@ -15,6 +15,7 @@
 #include "picture_kind.h"
 #include "png_check.h"
 #include "svg_plot.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
 
@@ -88,6 +89,7 @@ model::RawDepthMap DecodePfm(const std::string& bytes, const std::string& name) 
   }
   map.values.resize(width * height);
   for (std::size_t row = 0; row < height; ++row) {
+    ThrowIfCancelled();
     const char* stored = bytes.data() + at + (height - 1 - row) * width * sizeof(float);
     for (std::size_t x = 0; x < width; ++x)
       map.values[row * width + x] = FloatFromBytes(stored + x * sizeof(float), *scale < 0);
@@ -148,6 +150,7 @@ model::RawDepthMap ReadDepthMap(const std::string& path) {
   picture.convertTo(values, CV_32F);  // exact: float holds every 16-bit number
   map.values.reserve(values.total());
   for (int y = 0; y < values.rows; ++y) {
+    ThrowIfCancelled();
     const auto* row = values.ptr<float>(y);
     map.values.insert(map.values.end(), row, row + values.cols);
   }

@@ -12,6 +12,7 @@
 #include "page_figures.h"
 #include "page_pictures.h"
 #include "page_style.h"
+#include "thicklens/cancel.h"
 #include "thicklens/estimator/estimate_checks.h"
 
 namespace thicklens::tools {
@@ -78,6 +79,7 @@ cv::Mat ConfidenceMap(const LightFieldPageInput& input, const std::vector<Confid
   const cv::Mat grey = ShownPicture(photo, kMapPx);
   cv::Mat shown(grey.size(), CV_8UC3);
   for (int y = 0; y < shown.rows; ++y) {
+    ThrowIfCancelled();
     const int from_y = static_cast<int>((y + 0.5) * height_px / shown.rows);
     for (int x = 0; x < shown.cols; ++x) {
       const int from_x = static_cast<int>((x + 0.5) * width_px / shown.cols);

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <optional>
 
+#include "thicklens/cancel.h"
+
 namespace thicklens::tools {
 namespace {
 
@@ -70,6 +72,7 @@ std::vector<model::EffectPlace> PlacesOfDepth(const model::Camera& camera,
   const DepthBlocks blocks(camera, scene);
   std::vector<model::EffectPlace> places;
   for (int y = 0; y < scene.picture.height_px; y += kBlockPx) {
+    ThrowIfCancelled();
     for (int x = 0; x < scene.picture.width_px; x += kBlockPx) {
       if (const auto place = blocks.PlaceOf(x, y)) places.push_back(*place);
     }

@@ -13,6 +13,7 @@
 #include <limits>
 #include <memory>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::tools {
@@ -65,6 +66,7 @@ bool Write(const model::LinearPicture& picture, TIFF* tiff) {
   set(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
   set(TIFFTAG_ROWSPERSTRIP, strip_rows);
   for (std::uint32_t y = 0; done && y < height; y += strip_rows) {
+    ThrowIfCancelled();
     const std::size_t rows = std::min(strip_rows, height - y);
     // Only read: the values are in the order of bytes of this machine, as is the file.
     float* values = const_cast<float*>(picture.values.data()) + y * row_values;  // NOLINT

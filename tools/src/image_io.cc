@@ -8,6 +8,7 @@
 
 #include "picture_kind.h"
 #include "png_pixels.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/output_file.h"
 
@@ -17,6 +18,7 @@ namespace {
 template <typename T>
 void CopyValues(const cv::Mat& picture, std::vector<std::uint16_t>* values) {
   for (int y = 0; y < picture.rows; ++y) {
+    ThrowIfCancelled();
     const T* row = picture.ptr<T>(y);
     values->insert(values->end(), row,
                    row + static_cast<std::ptrdiff_t>(picture.cols) * picture.channels());

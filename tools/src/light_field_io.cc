@@ -22,6 +22,7 @@
 #include "picture_kind.h"
 #include "stopwatch.h"
 #include "svg_plot.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/input_file.h"
@@ -81,6 +82,7 @@ model::LinearPicture ReadTiffView(const std::string& path) {
   model::LinearPicture light{picture.cols, picture.rows, picture.channels(), {}};
   light.values.reserve(picture.total() * static_cast<std::size_t>(picture.channels()));
   for (int y = 0; y < picture.rows; ++y) {
+    ThrowIfCancelled();
     const auto* row = picture.ptr<float>(y);
     light.values.insert(light.values.end(), row,
                         row + static_cast<std::ptrdiff_t>(picture.cols) * picture.channels());
@@ -325,6 +327,8 @@ template <typename Work>
 auto NamingTheFolder(const std::string& folder, const Work& work) {
   try {
     return work();
+  } catch (const Interrupted&) {
+    throw;
   } catch (const Error& error) {
     throw Error(fmt::format("{}: {}", folder, error.what()));
   }

@@ -16,6 +16,8 @@ template <typename Work>
 auto NamingTheFile(const std::string& path, const Work& work) {
   try {
     return work();
+  } catch (const Interrupted&) {
+    throw;
   } catch (const UsageError&) {
     throw;
   } catch (const Error& error) {

@@ -12,6 +12,7 @@
 #include "opencv_codecs.h"
 #include "png_pixels.h"
 #include "svg_plot.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/transfer_curve.h"
 
@@ -50,6 +51,7 @@ cv::Mat EncodedSrgb(const cv::Mat& light) {
   const model::TransferCurve srgb = model::TransferCurve::Srgb();
   cv::Mat shown(light.size(), CV_8UC(light.channels()));
   for (int y = 0; y < light.rows; ++y) {
+    ThrowIfCancelled();
     const float* from = light.ptr<float>(y);
     std::uint8_t* to = shown.ptr<std::uint8_t>(y);
     for (int i = 0; i < light.cols * light.channels(); ++i) {
@@ -97,6 +99,7 @@ cv::Mat ShownPicture(const cv::Mat& stored) {
 cv::Mat AmplifiedDifference(const cv::Mat& picture, const cv::Mat& reference, double gain) {
   cv::Mat difference(picture.size(), picture.type());
   for (int y = 0; y < picture.rows; ++y) {
+    ThrowIfCancelled();
     const std::uint8_t* a = picture.ptr<std::uint8_t>(y);
     const std::uint8_t* b = reference.ptr<std::uint8_t>(y);
     std::uint8_t* to = difference.ptr<std::uint8_t>(y);
@@ -112,6 +115,7 @@ int GainForDifferences(const std::vector<std::pair<cv::Mat, cv::Mat>>& pairs) {
   std::size_t total = 0;
   for (const auto& [picture, reference] : pairs) {
     for (int y = 0; y < picture.rows; ++y) {
+      ThrowIfCancelled();
       for (int i = 0; i < picture.cols * picture.channels(); ++i) {
         ++counts[static_cast<std::size_t>(
             std::abs(picture.ptr<std::uint8_t>(y)[i] - reference.ptr<std::uint8_t>(y)[i]))];
@@ -165,6 +169,7 @@ cv::Mat ColourMapped(const std::vector<float>& values, int width_px, int height_
   const cv::Size size = Fitted({width_px, height_px}, longest_edge_px);
   cv::Mat shown(size, CV_8UC3);
   for (int y = 0; y < size.height; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < size.width; ++x) {
       const float value = SampleFor(values, width_px, height_px, size, x, y);
       const auto colour = std::isnan(value) ? HatchColour(x, y) : MapColour(range.Position(value));
@@ -181,6 +186,7 @@ cv::Mat GreyMapped(const std::vector<float>& values, int width_px, int height_px
   const cv::Size size = Fitted({width_px, height_px}, longest_edge_px);
   cv::Mat shown(size, CV_8UC1);
   for (int y = 0; y < size.height; ++y) {
+    ThrowIfCancelled();
     for (int x = 0; x < size.width; ++x) {
       const double value = SampleFor(values, width_px, height_px, size, x, y);
       shown.ptr<std::uint8_t>(y)[x] = Level(kMidGrey + (255 - kMidGrey) * value / range);

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "png_check.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::tools {
@@ -72,6 +73,33 @@ Effort EffortOf(PngPacking packing) {
   return {SPNG_FILTER_CHOICE_ALL, Z_BEST_COMPRESSION, Z_DEFAULT_STRATEGY};
 }
 
+// Row by row, so that it may be stopped between them. An interlaced picture has its rows several
+// times.
+int DecodeRows(const Decoding& decoding, spng_ctx* context, cv::Mat* picture) {
+  int code = spng_decode_image(context, nullptr, 0, decoding.format,
+                               decoding.flags | SPNG_DECODE_PROGRESSIVE);
+  const std::size_t row_bytes = static_cast<std::size_t>(picture->cols) * picture->elemSize();
+  while (code == SPNG_OK) {
+    ThrowIfCancelled();
+    spng_row_info row{};
+    code = spng_get_row_info(context, &row);
+    if (code != SPNG_OK) break;
+    code = spng_decode_row(context, picture->ptr(static_cast<int>(row.row_num)), row_bytes);
+  }
+  return code == SPNG_EOI ? SPNG_OK : code;
+}
+
+int EncodeRows(const cv::Mat& picture, spng_ctx* context) {
+  int code = spng_encode_image(context, nullptr, 0, SPNG_FMT_PNG,
+                               SPNG_ENCODE_PROGRESSIVE | SPNG_ENCODE_FINALIZE);
+  const std::size_t row_bytes = static_cast<std::size_t>(picture.cols) * picture.elemSize();
+  for (int y = 0; y < picture.rows && code == SPNG_OK; ++y) {
+    ThrowIfCancelled();
+    code = spng_encode_row(context, picture.ptr(y), row_bytes);
+  }
+  return code == SPNG_EOI ? SPNG_OK : code;
+}
+
 }  // namespace
 
 cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
@@ -99,8 +127,7 @@ cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
       const Decoding decoding = DecodingOf(header, found == SPNG_OK);
       picture.create(static_cast<int>(header.height), static_cast<int>(header.width),
                      CV_MAKETYPE(decoding.depth, decoding.channels));
-      works(spng_decode_image(context.get(), picture.data, picture.total() * picture.elemSize(),
-                              decoding.format, decoding.flags));
+      works(DecodeRows(decoding, context.get(), &picture));
     }
   }
   if (error == SPNG_OK) return picture;
@@ -127,10 +154,7 @@ std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing) {
     if (error == SPNG_OK) error = spng_set_option(context.get(), option, value);
   }
   if (error == SPNG_OK) error = spng_set_ihdr(context.get(), &header);
-  if (error == SPNG_OK) {
-    error = spng_encode_image(context.get(), whole.data, whole.total() * whole.elemSize(),
-                              SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE);
-  }
+  if (error == SPNG_OK) error = EncodeRows(whole, context.get());
   std::size_t size = 0;
   std::unique_ptr<void, Free> file;
   if (error == SPNG_OK) file.reset(spng_get_png_buffer(context.get(), &size, &error));

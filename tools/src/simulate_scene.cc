@@ -193,12 +193,13 @@ CommandResult SimulateLightField(const SceneOptions& options) {
     const ViewFormat format = options.format == "tiff" ? ViewFormat::kTiff : ViewFormat::kPng;
     clipped = WriteLightField(light_field, format, &folder);
   }
+  const model::SceneTruth truth = simulator.Truth(simulator.RenderDepth());
   ThrowIfInterrupted();
   folder.Commit();
 
   CommandResult result;
   result.is_written = true;
-  result.summary = Summary(options, scene, simulator.Truth(simulator.RenderDepth()), start);
+  result.summary = Summary(options, scene, truth, start);
   result.summary["views"] = {scene.u_count, scene.v_count};
   result.summary["clipped_values"] = clipped;
   result.summary["effects_of_views"] = simulator.effects_of_views().Names();

@@ -16,6 +16,7 @@
 #include "interrupt.h"
 #include "png_check.h"
 #include "svg_plot.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/model/scene.h"
 
@@ -231,6 +232,7 @@ std::string TargetPng(const TargetPage& page, const std::vector<Leaf>& leaves,
     const auto width = static_cast<std::size_t>(size.width_px);
     picture.values.reserve(width * static_cast<std::size_t>(size.height_px));
     for (std::size_t y = 0; y < static_cast<std::size_t>(size.height_px); ++y) {
+      ThrowIfCancelled();
       // A px of RGB24 is a word of 32 bits with blue in its lowest byte; all colours are alike.
       const auto* row = reinterpret_cast<const std::uint32_t*>(bytes + y * stride);
       for (std::size_t x = 0; x < width; ++x)
