@@ -16,6 +16,7 @@
 #include <cstring>
 #include <exception>
 
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::kernels {
@@ -88,8 +89,8 @@ void WriteAll(int descriptor, const std::string& text) {
   // Ctrl-C goes to the whole process group of the terminal, and a service's stop to all of its
   // processes: they are meant for the parent, which then ends this one.
   ::setpgid(0, 0);
-  for (const int signal : {SIGINT, SIGTERM}) ::signal(signal, SIG_IGN);
-  for (const int signal : {SIGHUP, SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::signal(signal, SIG_IGN);
+  for (const int signal : {SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ}) {
     ::signal(signal, SIG_DFL);
   }
   sigset_t all;
@@ -167,7 +168,9 @@ std::string LastLine(const std::string& text) {
 
 // By a signal that a person or a service sends, and no fault does.
 bool EndedByRequest(int status) {
-  return WIFSIGNALED(status) && (WTERMSIG(status) == SIGINT || WTERMSIG(status) == SIGTERM);
+  if (!WIFSIGNALED(status)) return false;
+  const int signal = WTERMSIG(status);
+  return signal == SIGINT || signal == SIGTERM || signal == SIGHUP;
 }
 
 std::string HowItEnded(int status) {
@@ -183,6 +186,7 @@ bool WaitForChild(Child* child, double limit_s, const StopCheck& stop, Pipe* tol
                   ChildOutcome* outcome, std::string* printed) {
   const auto deadline = Clock::now() + std::chrono::duration<double>(limit_s);
   while (true) {
+    ThrowIfCancelled();
     if (stop) stop();
     const bool ended = child->HasEnded();
     told->TakeInto(&outcome->told);

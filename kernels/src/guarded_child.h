@@ -22,9 +22,10 @@ struct ChildOutcome {
 // to this one; it is killed after `limit_s` seconds, with whatever it has started. What it prints
 // is caught. An exception counts as a failure.
 //
-// Whether to stop is for this process to say, by `stop` (may be empty): the copy is out of reach of
-// the terminal's Ctrl-C and ignores SIGINT and SIGTERM. Should one of them end it all the same,
-// Interrupted is thrown.
+// Whether to stop is for this process to say, by its CancelToken and by `stop` (may be empty): the
+// copy is out of reach of the terminal's Ctrl-C and ignores SIGINT, SIGTERM and SIGHUP. Should one
+// of them end it all the same, Interrupted is thrown. It is killed when this process ends, however
+// that ends.
 //
 // The copy has the calling thread alone: locks that other threads hold stay locked in it (not those
 // of malloc), and threads of libraries are missing. So `work` must not use a library that this

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -21,6 +22,7 @@
 #include "guarded_child.h"
 #include "opencl_program.h"
 #include "support/error_message.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 
 namespace thicklens::kernels {
@@ -223,6 +225,7 @@ TEST(RunInChild, LeavesRequestsToStopToTheParent) {
               ::kill(-parents_group, SIGINT);
               ::raise(SIGINT);
               ::raise(SIGTERM);
+              ::raise(SIGHUP);
               tell(::getpgrp() == parents_group ? "in the parent's group" : "went on");
             },
             kLongS);
@@ -262,8 +265,44 @@ TEST(RunInChild, EndsTheChildAndWhatItStartedWhenToldToStop) {
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "the child was not waited for";
 }
 
+// However that ends: here at once, as after a second signal.
+TEST(RunInChild, EndsWithTheProcessThatStartedIt) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const ChildOutcome outcome = RunInChild(
+      [&ends](const Tell&) {
+        std::thread([&ends] {
+          char one = 0;
+          if (::read(ends[0], &one, 1) == 1) ::_exit(3);
+        }).detach();
+        RunInChild(
+            [&ends](const Tell&) {
+              while (::write(ends[1], "+", 1) == 1) ::pause();
+            },
+            kLongS);
+      },
+      kLongS);
+  EXPECT_THAT(outcome.failure, HasSubstr("exit code 3"));
+  // Ends only when nobody has the other end any more.
+  ::close(ends[1]);
+  pollfd hang_up{ends[0], 0, 0};
+  EXPECT_EQ(::poll(&hang_up, 1, 10000), 1) << "the child lives on";
+  ::close(ends[0]);
+}
+
+TEST(RunInChild, IsStoppedByTheTokenToo) {
+  CancelToken token;
+  const CancelScope scope(&token);
+  std::thread other([&token] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    token.Cancel();
+  });
+  EXPECT_THROW(RunInChild([](const Tell&) { ::pause(); }, kLongS), Interrupted);
+  other.join();
+}
+
 TEST(RunInChild, NeverBlamesTheWorkForARequestToStop) {
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     const auto work = [signal](const Tell&) {
       std::signal(signal, SIG_DFL);
       ::raise(signal);
