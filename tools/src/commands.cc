@@ -23,6 +23,7 @@
 #include "thicklens/model/input_file.h"
 #include "thicklens/model/output_file.h"
 #include "thicklens/model/parallel.h"
+#include "thicklens/model/temporaries.h"
 
 namespace thicklens::tools {
 namespace {
@@ -105,7 +106,9 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
     result = command();
     if (!result.is_written) ThrowIfInterrupted();
   } catch (const Interrupted&) {
-    throw;
+    const std::vector<std::string> in_place = model::OutputsInPlace();
+    if (in_place.empty()) throw;
+    throw Error(InterruptedText(in_place));
   } catch (const Error& error) {
     RethrowIfInputWouldBeLost();
     summary.WriteRefusal(MessageLine(error.what()));

@@ -58,13 +58,8 @@ struct Outputs {
   }
   // However a run ends whose light field is not there.
   ~Outputs() {
-    const int kept = checkpoint ? checkpoint->kept() : 0;
-    if (kept == 0) return;
-    spdlog::warn(
-        "{} block(s) that were solved are kept in {}: the same command goes on from there; for "
-        "other "
-        "settings remove it or name another",
-        kept, checkpoint->path());
+    const std::string kept = WhatIsKept();
+    if (!kept.empty()) spdlog::warn("{}", kept);
   }
   Outputs(const Outputs&) = delete;
   Outputs& operator=(const Outputs&) = delete;
@@ -73,6 +68,17 @@ struct Outputs {
   ReportFolder report_folder;
   std::optional<model::OutputFile> report;
   std::unique_ptr<BlockCheckpoint> checkpoint;  // none: it was not asked for
+
+ private:
+  std::string WhatIsKept() const {
+    const int kept = checkpoint ? checkpoint->kept() : 0;
+    if (kept == 0) return "";
+    return fmt::format(
+        "{} block(s) that were solved are kept in {}: the same command goes on from there; for "
+        "other settings remove it or name another",
+        kept, checkpoint->path());
+  }
+  const LastWords last_words_{[this] { return WhatIsKept(); }};
 };
 
 // No part of a picture that is solved for as a whole is larger: what that would take grows, and

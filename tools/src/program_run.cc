@@ -12,6 +12,8 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <mutex>
+#include <set>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -31,6 +33,45 @@ namespace fs = std::filesystem;
 // In the folder of the run.
 constexpr char kOutFile[] = "stdout.txt", kErrFile[] = "stderr.txt";
 constexpr int kNewFile = O_WRONLY | O_CREAT | O_TRUNC;
+
+// From being asked to end to being killed.
+constexpr double kLastSeconds = 0.2;
+constexpr auto kPoll = std::chrono::milliseconds(2);
+
+// Those that run, for EndChildPrograms.
+class RunningPrograms {
+ public:
+  void Add(pid_t pid) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    pids_.insert(pid);
+  }
+  // Before the system may give its number to somebody else's process.
+  template <typename Wait>
+  auto RemoveAfter(pid_t pid, const Wait& wait) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto result = wait();
+    if (result != 0) pids_.erase(pid);
+    return result;
+  }
+  void AskToEnd() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const pid_t pid : pids_) AskToEnd(pid);
+  }
+  // The second time means: at once, without waiting for a library that computes.
+  static void AskToEnd(pid_t pid) {
+    ::kill(pid, SIGTERM);
+    ::kill(pid, SIGTERM);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::set<pid_t> pids_;
+};
+
+RunningPrograms& Running() {
+  static RunningPrograms& running = *new RunningPrograms;  // the process may end meanwhile
+  return running;
+}
 
 class Child {
  public:
@@ -54,35 +95,43 @@ class Child {
       throw Error(fmt::format("{}: cannot be started in {}: {}", program, folder.string(),
                               std::strerror(failure)));
     }
+    Running().Add(pid_);
   }
   ~Child() {
-    if (ended_) return;
-    End();
-    ::waitpid(pid_, &status_, 0);
+    if (HasEnded()) return;
+    RunningPrograms::AskToEnd(pid_);
+    const auto start = Clock::now();
+    while (!HasEnded()) {
+      if (SecondsSince(start) > kLastSeconds) Kill();
+      std::this_thread::sleep_for(kPoll);
+    }
   }
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  bool Ended() {
+  bool HasEnded() {
     if (ended_) return true;
-    const pid_t found = ::waitpid(pid_, &status_, WNOHANG);
-    if (found < 0 && errno != EINTR) {
-      ended_ = true;  // the number may be somebody else's by now
-      throw Error(fmt::format("a child process was lost: {}", std::strerror(errno)));
-    }
-    ended_ = found == pid_;
+    const pid_t found = Running().RemoveAfter(pid_, [this] {
+      const pid_t done = ::waitpid(pid_, &status_, WNOHANG);
+      return done < 0 && errno == EINTR ? 0 : done;
+    });
+    is_lost_ = found < 0;  // the number may be somebody else's by now
+    ended_ = found != 0;
     return ended_;
   }
-  void End() { ::kill(pid_, SIGKILL); }
+  bool is_lost() const { return is_lost_; }
+  void Kill() { ::kill(pid_, SIGKILL); }
   int status() const { return status_; }
 
  private:
   pid_t pid_ = -1;
   int status_ = 0;
-  bool ended_ = false;
+  bool ended_ = false, is_lost_ = false;
 };
 
 }  // namespace
+
+void EndChildPrograms() { Running().AskToEnd(); }
 
 ProgramRun RunProgram(const std::string& program, const std::vector<std::string>& arguments,
                       const fs::path& folder, double limit_seconds) {
@@ -90,14 +139,15 @@ ProgramRun RunProgram(const std::string& program, const std::vector<std::string>
   const auto start = Clock::now();
   const auto seconds = [&] { return SecondsSince(start); };
   Child child(program, arguments, folder);
-  while (!child.Ended()) {
+  while (!child.HasEnded()) {
     ThrowIfInterrupted();
     if (!run.timed_out && seconds() > limit_seconds) {
       run.timed_out = true;
-      child.End();
+      child.Kill();
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    std::this_thread::sleep_for(kPoll);
   }
+  if (child.is_lost()) throw Error(fmt::format("{}: its process was lost", program));
   ThrowIfInterrupted();  // a person's Ctrl-C ends the child as well, and that may be seen first
   run.seconds = seconds();
   if (WIFEXITED(child.status())) run.exit_code = WEXITSTATUS(child.status());

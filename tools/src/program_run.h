@@ -16,11 +16,15 @@ struct ProgramRun {
   std::string out, err;
 };
 
-// Runs a program in a folder, where it prints to stdout.txt and stderr.txt, and waits. Ended after
-// so many seconds, and where the person interrupts (Interrupted is thrown then). Throws Error if it
-// cannot be started.
+// Runs a program in a folder, where it prints to stdout.txt and stderr.txt, and waits. Killed after
+// so many seconds. Where the person interrupts, it is asked to end, killed if it does not, and
+// Interrupted is thrown. Throws Error if it cannot be started.
 ProgramRun RunProgram(const std::string& program, const std::vector<std::string>& arguments,
                       const std::filesystem::path& folder, double limit_seconds);
+
+// Asks every program that RunProgram waits for to end at once: for the thread that ends this
+// process while nobody waits any more.
+void EndChildPrograms();
 
 // The file of the program that runs. Throws Error where the system does not say.
 std::string ThisProgram();

@@ -23,6 +23,7 @@
 #include "process_start.h"
 #include "program_memory.h"
 #include "sanitized.h"
+#include "thicklens/cancel.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/blas.h"
 #include "trusted_environment.h"
@@ -44,6 +45,7 @@ void SetUpMessages() {
 }
 
 int Fail(std::string message, ExitCode code) {
+  tools::BeginEnd(code);
   while (!message.empty() && message.back() == '\n') message.pop_back();
   spdlog::error("{}", message);
   return code;
@@ -79,6 +81,7 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
       throw Error(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
     }
   }
+  tools::BeginEnd(kDone);
   return kDone;
 }
 
@@ -88,6 +91,8 @@ int Main(int argc, char** argv) {
   tools::CatchSignals();
   for (const std::string& line : tools::DistrustRelativePaths()) spdlog::warn("{}", line);
   tools::RequireStack();
+  tools::WatchSignals();
+  const CancelScope scope(tools::ProgramToken());
   CLI::App program(
       "Thick-lens camera calibration from focus sweeps, and light fields from one picture",
       "thicklens");
