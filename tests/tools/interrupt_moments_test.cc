@@ -181,7 +181,7 @@ class InterruptMoments : public ::testing::Test {
     for (const std::string& name : outputs_.Entries()) fs::remove_all(outputs_ / name);
   }
 
-  // What is there is that of a whole run, or part of its outputs, each of them whole.
+  // The outputs that are there are those of a whole run or some of them, each complete.
   void ExpectNothingHalfWritten(const StoppedCommand& command, const StoppedProgram::End& end) {
     EXPECT_THAT(temporary_.Entries(), IsEmpty());
     std::set<std::string> left = NamesBelow(outputs_.path());
@@ -248,8 +248,8 @@ TEST_F(InterruptMoments, EndEveryCommandWithinASecondSlow) {
     std::printf("%-22s %2d after %.2f s: exit %2d, %.3f s (CPU %.3f s; woken up to %.3f s late)\n",
                 command.name.c_str(), signal, wait_s, end.exit_code, end.seconds, end.cpu_seconds,
                 late_s);
-    // What it computes after the signal does not depend on what else the machine does; when it is
-    // woken does.
+    // The CPU time after the signal does not depend on what else the machine does; the wall time
+    // does.
     EXPECT_LE(end.cpu_seconds, kThreadsOfCommand * kRequired_s);
     constexpr double kWakings = 20;
     EXPECT_LE(end.seconds, kRequired_s + kWakings * late_s);

@@ -6,9 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "stopped_program.h"
@@ -40,6 +42,14 @@ class InterruptTest : public ::testing::Test {
     return settings;
   }
 
+  // Until its outputs are claimed, and then until it waits.
+  void WaitUntilBlocked(StoppedProgram* program) const {
+    while (!program->HasEnded() && folder_.Entries().empty()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    program->WaitUntilBlocked();
+  }
+
   testing::TemporaryFolder folder_, scratch_;
   FullPipe pipe_;
 };
@@ -48,7 +58,7 @@ TEST_F(InterruptTest, EachSignalEndsWhatDoesNotLookAtIt) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     SCOPED_TRACE(signal);
     StoppedProgram program(ExplainAtLength({"--json", folder_ / "out.json"}), WithFullStdout());
-    program.WaitUntilBlocked();
+    WaitUntilBlocked(&program);
     EXPECT_THAT(folder_.Entries(), ElementsAre(".out.json.part"));
     program.Send(signal);
     const StoppedProgram::End end = program.Wait();
@@ -60,12 +70,12 @@ TEST_F(InterruptTest, EachSignalEndsWhatDoesNotLookAtIt) {
   }
 }
 
-// What it says must be true.
+// The message must be true.
 TEST_F(InterruptTest, WhatIsInPlaceIsNamed) {
   const std::string figure = folder_ / "blur.svg";
   StoppedProgram program(ExplainAtLength({"--json", folder_ / "out.json", "--figure", figure}),
                          WithFullStdout());
-  program.WaitUntilBlocked();
+  WaitUntilBlocked(&program);
   program.Send(SIGTERM);
   const StoppedProgram::End end = program.Wait();
   EXPECT_EQ(end.exit_code, 1);
@@ -78,7 +88,7 @@ TEST_F(InterruptTest, ASecondSignalEndsItAtOnce) {
   double least_s = 1e9;
   for (int i = 0; i < 10 && least_s >= kGraceSeconds; ++i) {
     StoppedProgram program(ExplainAtLength({"--json", folder_ / "out.json"}), WithFullStdout());
-    program.WaitUntilBlocked();
+    WaitUntilBlocked(&program);
     program.Send(SIGINT);
     program.Send(SIGTERM);
     const StoppedProgram::End end = program.Wait();
@@ -105,7 +115,7 @@ TEST_F(InterruptTest, EndsWhereStandardErrorIsBlocked) {
   StoppedProgram::Settings settings = WithFullStdout();
   settings.stderr_fd = pipe_.write_end();
   StoppedProgram program(ExplainAtLength({"--json", folder_ / "out.json"}), settings);
-  program.WaitUntilBlocked();
+  WaitUntilBlocked(&program);
   program.Send(SIGTERM);
   EXPECT_EQ(program.Wait().exit_code, 1);
   EXPECT_THAT(folder_.Entries(), IsEmpty());

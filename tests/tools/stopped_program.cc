@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <ctime>
+#include <fstream>
 #include <stdexcept>
 #include <thread>
 
@@ -80,14 +81,23 @@ bool StoppedProgram::HasEnded() {
   return has_ended_;
 }
 
+// One that merely gets no processor is not asleep.
 void StoppedProgram::WaitUntilBlocked() {
   double before = -1;
   for (int still = 0; still < 10 && !HasEnded();) {
     const double now = CpuSeconds();
-    still = now == before && now > 0 ? still + 1 : 0;
+    still = IsAsleep() && now == before && now > 0 ? still + 1 : 0;
     before = now;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
+}
+
+bool StoppedProgram::IsAsleep() const {
+  std::ifstream stat("/proc/" + std::to_string(pid_) + "/stat");
+  std::string line;
+  std::getline(stat, line);
+  const std::size_t name_end = line.rfind(')');
+  return name_end != std::string::npos && line.compare(name_end, 3, ") S") == 0;
 }
 
 double StoppedProgram::CpuSeconds() const {

@@ -32,13 +32,14 @@ class StoppedProgram {
   ~StoppedProgram();
 
   bool HasEnded();
-  // Until it waits in the system for somebody else, as for the reader of a full pipe.
+  // Returns once it waits in the system, for example for the reader of a full pipe.
   void WaitUntilBlocked();
   void Send(int signal);
   End Wait();
 
  private:
   double CpuSeconds() const;
+  bool IsAsleep() const;  // its first thread
 
   Settings settings_;
   pid_t pid_ = -1;

@@ -26,7 +26,7 @@ void CatchSignals();
 // Starts the thread. Once, after CatchSignals.
 void WatchSignals();
 
-// What the signals cancel. A command runs in a CancelScope of it.
+// The signals cancel this token. A command runs in a CancelScope of it.
 const CancelToken* ProgramToken();
 
 bool InterruptRequested();

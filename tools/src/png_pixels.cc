@@ -73,8 +73,8 @@ Effort EffortOf(PngPacking packing) {
   return {SPNG_FILTER_CHOICE_ALL, Z_BEST_COMPRESSION, Z_DEFAULT_STRATEGY};
 }
 
-// Row by row, so that it may be stopped between them. An interlaced picture has its rows several
-// times.
+// Decodes row by row, so that it may be stopped between two rows. An interlaced image has its rows
+// several times.
 int DecodeRows(const Decoding& decoding, spng_ctx* context, cv::Mat* picture) {
   int code = spng_decode_image(context, nullptr, 0, decoding.format,
                                decoding.flags | SPNG_DECODE_PROGRESSIVE);

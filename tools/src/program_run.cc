@@ -34,11 +34,11 @@ namespace fs = std::filesystem;
 constexpr char kOutFile[] = "stdout.txt", kErrFile[] = "stderr.txt";
 constexpr int kNewFile = O_WRONLY | O_CREAT | O_TRUNC;
 
-// From being asked to end to being killed.
+// The time between asking a program to end and killing it.
 constexpr double kLastSeconds = 0.2;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
-// Those that run, for EndChildPrograms.
+// The programs that run, for EndChildPrograms.
 class RunningPrograms {
  public:
   void Add(pid_t pid) {

@@ -16,13 +16,17 @@
 // in no defined state, and may be filled again or destroyed. Nothing is printed, and no process
 // ends.
 //
-// The longest interval between two safe points, on one thread of a processor of 2020:
-// - loops of these modules: 0.2 s, for pictures of up to 25 megapixels and up to 9 x 9 views;
+// The longest interval between two safe points, of CPU time of one thread of an Intel Xeon:
+// - loops of these modules: 0.2 s is what they are written for. They look at the token at least
+// once
+//   per row of an image, per solver step, or per 1/32 of a pass over an image; 0.12 s is the
+//   longest that was measured (1282 x 1110 px, 7 x 7 views).
 // - a library that computes in one call: as long as that takes. These are the factorization of one
-//   block by SuiteSparse or Eigen (EstimateByBlocks; about 1 s for 1e5 unknowns, growing with the
-//   power 1.5 to 2 of their number), one picture read, written, blurred, dilated or registered by
-//   OpenCV (up to 3 s for 25 megapixels), cv::inpaint (InpaintHiddenRays; minutes where most of a
-//   large picture is hidden), and an OpenCL driver that compiles or computes (seconds).
+//   block by SuiteSparse or Eigen (EstimateByBlocks: 1 s was measured for blocks of the usual size;
+//   it grows with the power 1.5 to 2 of the number of unknowns), the dense decompositions of
+//   ConditioningOfBlock (2.4 s), one image blurred, transformed or registered by OpenCV,
+//   cv::inpaint (InpaintHiddenRays; minutes where most of a large image is hidden), and an OpenCL
+//   driver that compiles or computes (seconds).
 // A program that has to end at once meanwhile removes what is unfinished by AbandonOutputs
 // (thicklens/model/temporaries.h) and ends its process.
 namespace thicklens {
