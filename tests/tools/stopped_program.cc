@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -18,6 +19,8 @@
 
 namespace thicklens::tools {
 namespace {
+
+constexpr int kSignals[] = {SIGINT, SIGTERM, SIGHUP};
 
 double Seconds(const timespec& time) {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
@@ -47,10 +50,15 @@ StoppedProgram::StoppedProgram(const std::vector<std::string>& arguments, const 
   // Before it is there, so that none arrives earlier.
   using Handler = void (*)(int);
   std::vector<Handler> before;
-  for (const int signal : settings.ignored) before.push_back(std::signal(signal, SIG_IGN));
+  for (const int signal : kSignals) {
+    const auto& ignored = settings.ignored;
+    const bool is_ignored = std::find(ignored.begin(), ignored.end(), signal) != ignored.end();
+    // A shell ignores SIGINT for what it starts in the background.
+    before.push_back(std::signal(signal, is_ignored ? SIG_IGN : SIG_DFL));
+  }
   pid_ = ::fork();
   for (std::size_t i = 0; pid_ != 0 && i < before.size(); ++i) {
-    std::signal(settings.ignored[i], before[i]);
+    std::signal(kSignals[i], before[i]);
   }
   if (pid_ < 0) throw std::runtime_error("no child process could be started");
   if (pid_ > 0) return;
