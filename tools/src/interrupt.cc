@@ -26,7 +26,8 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr int kEndSignals[] = {SIGINT, SIGTERM, SIGHUP};
+// SIGXCPU warns of a limit of processor time, a second or more before the system ends the process.
+constexpr int kEndSignals[] = {SIGINT, SIGTERM, SIGHUP, SIGXCPU};
 constexpr int kInterruptedCode = 1;
 constexpr int kNobody = -1;
 constexpr double kCleaningSeconds = 0.3;
@@ -126,8 +127,9 @@ void CatchSignals() {
   ::sigemptyset(&action.sa_mask);
   for (const int signal : kEndSignals) ::sigaddset(&action.sa_mask, signal);
   for (const int signal : kEndSignals) {
+    // Whoever starts a command with one of them ignored wants it to go on: `nohup`, a shell's `&`.
     struct sigaction before {};
-    if (signal == SIGHUP && ::sigaction(signal, nullptr, &before) == 0 &&
+    if (signal != SIGTERM && ::sigaction(signal, nullptr, &before) == 0 &&
         before.sa_handler == SIG_IGN) {
       continue;
     }
