@@ -61,6 +61,7 @@ struct BlurEvidence {
   double assumed_floor_px2 = 0;        // S0 that a disc's transfer function was told
   MeterRegion region;                  // the whole field, as measured
   RelativeBlur blur;                   // and as fitted
+  double taken_tails = 0;              // of the blur: the family has them (TakeTails)
 };
 
 // Measures edges where the target has them (and is not stated to be a texture), and the relative

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "blur_choices.h"
+#include "blur_tails.h"
 #include "edge_pixels.h"
 #include "floor_choice.h"
 #include "frame_outliers.h"
@@ -39,6 +40,8 @@ class Solution {
     const FloorChoice choice = ChooseFloor(sweep_.floor, evidence_, &result_.warnings);
     evidence_.setup.floor_variance_px2 = choice.variance_px2;
     fit_ = FitBlur(evidence_.setup);
+    if (fit_.done && TakeTails(sweep_.camera.psf, fit_, &evidence_))
+      fit_ = FitBlur(evidence_.setup);
     result_.blur.message = fit_.message;
     if (!fit_.done) return Refuse(fit_.message + StatedFloor());
     FillBlur();
@@ -109,6 +112,7 @@ class Solution {
                  : evidence_.spectrum < 0 ? "edges"
                                           : "edges and relative spectrum";
     blur.family = sweep_.camera.psf;
+    blur.tails = evidence_.taken_tails;
     if (evidence_.spectrum >= 0) blur.band = UsualBand(sweep_.camera.psf);
     blur.better_psf = evidence_.disc_misfit ? evidence_.better_psf : sweep_.camera.psf;
     blur.gaussian_misfit = evidence_.gaussian_misfit;

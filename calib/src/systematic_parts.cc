@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "blur_tails.h"
 #include "pupil_shapes.h"
 #include "systematic_advice.h"
 
@@ -15,8 +16,6 @@ constexpr std::size_t kFewestFrames = 5;
 constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
 // Difference of chi^2 of the frames, 4 standard deviations, beyond which a family is ruled out.
 constexpr double kRuledOut = 16;
-constexpr double kReach = 2;          // standard deviations
-constexpr double kDoubtless = 4;      // the same, of what is beyond doubt
 constexpr double kLawFails = 2;       // chi^2 per degree of freedom of the blur law
 constexpr double kSidesDisagree = 3;  // of their standard deviations
 // What the meters themselves are good for, relative to kappa: measured on simulated sweeps.
@@ -205,21 +204,6 @@ class Parts {
         fit_.chi2_per_dof, trial->fit.values[kBlurRatio], model::PsfName(other)));
   }
 
-  // How far the tails may depart from the family's: to what the frames themselves ask for, as far
-  // as a pupil law makes that; beyond where they ask for it beyond doubt.
-  std::optional<Eigen::Vector2d> TailsRange(const Eigen::Vector2d& of_laws) const {
-    if (evidence_.spectrum < 0 || evidence_.blur.variance_by_tails.size() == 0) return std::nullopt;
-    const model::Estimate& tails = evidence_.blur.tails;
-    Eigen::Vector2d range(std::min(0.0, std::max(tails.value - kReach * tails.sigma, of_laws.x())),
-                          std::max(0.0, std::min(tails.value + kReach * tails.sigma, of_laws.y())));
-    // One step of a fit says too little of tails as large as they are beyond doubt.
-    if (tails.value < -kDoubtless * tails.sigma)
-      range.x() = std::min({range.x(), tails.value, of_laws.x()});
-    if (tails.value > kDoubtless * tails.sigma)
-      range.y() = std::max({range.y(), tails.value, of_laws.y()});
-    return range;
-  }
-
   // What the shape of the blur's tails does to its second moment: pupil laws differ by it.
   void AddTails() {
     const double kappa = fit_.values[kBlurRatio];
@@ -231,7 +215,7 @@ class Parts {
     part.name = "tails of the blur";
     part.remedy =
         "a smaller aperture: of a wide one the light's spread over the pupil is known too little";
-    if (const auto range = TailsRange(TailsOfPupilLaws(optics))) {
+    if (const auto range = TailsLeft(sweep_.camera.psf, fit_, evidence_)) {
       for (const double tails : {range->x(), range->y()}) {
         if (tails == 0) continue;
         BlurSamples moved = FitSamples(evidence_, evidence_.blur, evidence_.region);

@@ -209,6 +209,10 @@ struct BlurFit {
   // to this 2 pi^2 sigma^2 nu^2, with sigma the blur beyond that of the sharpest frame.
   model::Psf family = model::Psf::kGaussian;
   std::optional<double> band;
+  // How the family's shape was changed, its second moment held, because the frames show it beyond
+  // doubt: H exp(4 tails u^2), u = 2 pi^2 sigma^2 nu^2. A pupil that obeys the sine condition has
+  // about (kappa r/d1)^2/2. 0: not at all.
+  double tails = 0;
   model::Psf better_psf = model::Psf::kGaussian;       // the shape that describes the frames better
   std::optional<double> gaussian_misfit, disc_misfit;  // chi^2 per dof of the meter with each
   double outside_mm = 0;  // how far the focus lies outside the sweep; 0: inside
