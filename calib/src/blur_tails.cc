@@ -19,8 +19,9 @@ std::optional<Eigen::Vector2d> LawsLeft(model::Psf psf, const BlurFitResult& fit
       !(zf_mm > lens.front_focal_length_mm)) {
     return std::nullopt;
   }
-  return Eigen::Vector2d(TailsOfPupilLaws(model::PupilOpticsOf(lens, psf, kappa, zf_mm)).array() -
-                         evidence.taken_tails);
+  const model::PupilOptics optics = model::PupilOpticsOf(lens, psf, kappa, zf_mm);
+  if (!(optics.sigma_mm <= model::kWidestPupil * optics.image_distance_mm)) return std::nullopt;
+  return Eigen::Vector2d(TailsOfPupilLaws(optics).array() - evidence.taken_tails);
 }
 
 }  // namespace

@@ -223,7 +223,8 @@ class Parts {
         if (const auto trial = With(moved, evidence_.spectrum)) Include(*trial, &part);
       }
     }
-    if (evidence_.edges >= 0) {
+    const bool is_possible = optics.sigma_mm <= model::kWidestPupil * optics.image_distance_mm;
+    if (evidence_.edges >= 0 && is_possible) {
       const Eigen::Vector2d ratios = EdgeRatiosOfPupilLaws(optics);
       part.blur_ratio.x() = std::min(part.blur_ratio.x(), kappa * (1 / ratios.y() - 1));
       part.blur_ratio.y() = std::max(part.blur_ratio.y(), kappa * (1 / ratios.x() - 1));

@@ -208,7 +208,8 @@ double PupilProfile::Transfer(double x) const {
 double CentreOfPerspectiveMm(const ThickLens& lens, Psf psf, PupilLaw law, double blur_ratio,
                              double focus_depth_mm) {
   if (law == PupilLaw::kUniform || blur_ratio == 0) return 0;
-  const PupilOptics optics = PupilOpticsOf(lens, psf, blur_ratio, focus_depth_mm);
+  PupilOptics optics = PupilOpticsOf(lens, psf, blur_ratio, focus_depth_mm);
+  optics.sigma_mm = std::min(optics.sigma_mm, kWidestPupil * optics.image_distance_mm);
   const Rule rule = GaussRule(psf, kMomentNodes);
   const Law of_light(law, optics, rule);
   const double mean =

@@ -143,6 +143,15 @@ TEST(PupilLaw, NamesWhatItCannotDo) {
                 PupilProfile(PupilLaw::kSineCondition, {Psf::kGaussian, 100, 400, 16, 12});
               }),
               HasSubstr("100 mm"));
+  // The widest pupil has every law, and a wider one is seen from the same centre.
+  const double widest = kWidestPupil * ImageDistanceMm(kWide, 400) / kWide.aperture_radius_mm;
+  for (const PupilLaw law : AllPupilLaws()) {
+    for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
+      EXPECT_NO_THROW(PupilProfile(law, PupilOpticsOf(kWide, psf, widest, 400)));
+      EXPECT_NEAR(CentreOfPerspectiveMm(kWide, psf, law, 5 * widest, 400),
+                  CentreOfPerspectiveMm(kWide, psf, law, widest, 400), 1e-9);
+    }
+  }
   for (const PupilLaw law : AllPupilLaws()) EXPECT_EQ(PupilLawFromName(PupilLawName(law)), law);
 }
 

@@ -231,7 +231,7 @@ TEST(SweepTruth, ComesBackWithTheSameBits) {
   truth.blur_ratio = 0.45;
   truth.blur_floor_px = 0.1;
   truth.bench_offset_mm = -0.0;
-  truth.frames = {{"frames/a, b: c.png", 1.0 / 3, -1e300, 5e-324}, {"b", 2, 3, 4}};
+  truth.frames = {{"frames/a, b: c.png", 1.0 / 3, -1e29, 5e-324}, {"b", 2, 3, 4}};
   const TemporaryFolder folder;
   const std::string file = folder.Put("t.yaml", SweepTruthToYaml(truth));
   const SweepTruth back = ReadSweepTruth(file);

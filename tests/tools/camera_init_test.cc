@@ -105,7 +105,11 @@ TEST(DescribedCamera, TellsEverythingThatIsMissingAtOnce) {
 TEST(DescribedCamera, PrefersWhatIsGivenToThePhotograph) {
   CameraDescription description;
   description.front_focal_length_mm = 26;
-  const PhotoExif photo{25, 2.5, 0.005, "", "Bench 1"};
+  PhotoExif photo;
+  photo.focal_length_mm = 25;
+  photo.f_number = 2.5;
+  photo.pixel_pitch_mm = 0.005;
+  photo.model = "Bench 1";
   const model::Camera camera = DescribedCamera(description, photo, Eigen::Vector2i(32, 24));
   EXPECT_EQ(camera.name, "Bench 1");
   EXPECT_EQ(camera.lens.front_focal_length_mm, 26);

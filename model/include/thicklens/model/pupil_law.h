@@ -33,8 +33,11 @@ struct PupilOptics {
 };
 PupilOptics PupilOpticsOf(const ThickLens& lens, Psf psf, double blur_ratio, double focus_depth_mm);
 
+// Pupils with a sigma of more than this part of d1 (wider than about f/0.8) are not described.
+inline constexpr double kWidestPupil = 0.3;
+
 // The light of a point on the axis over the pupil, scaled so that its second moment per axis is
-// exactly sigma^2 whatever the law (DESIGN: a pupil law changes the shape of the blur, never its
+// exactly sigma^2 whatever the law (a pupil law changes the shape of the blur, never its
 // sigma). The density is held as rings, the nodes of a Gauss rule in A^2 (Laguerre for a Gaussian
 // T, Legendre for a disc), so that its transfer function is a sum of Bessel functions J0. Rays
 // steeper than 72 degrees behind the lens do not exist. Derived here; checked by ray sums in the
@@ -75,7 +78,7 @@ class PupilProfile {
 // proportion to i: the image looks as if the rays came through a point in front of the aperture, at
 // this depth, mm: g K/(g K/zf - 1), g the mean per landing. Derived here: the size in the image
 // goes as 1/(z (1 + c g)), and z (1 + c g) is a straight line in z with its zero there. Needs zf >
-// f1, kappa >= 0. 0 for the uniform law.
+// f1, kappa >= 0; of a pupil beyond kWidestPupil, that of the widest. 0 for the uniform law.
 double CentreOfPerspectiveMm(const ThickLens& lens, Psf psf, PupilLaw law, double blur_ratio,
                              double focus_depth_mm);
 
