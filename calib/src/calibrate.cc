@@ -301,6 +301,7 @@ class Calibrator {
   // paper's law gives the value, the others an interval about it.
   void ReckonWithFalloff(double blur_ratio, double focus_depth_mm, ScaleLaw* law) const {
     const model::Camera& camera = sweep_.camera;
+    law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
     if (!law->done || !(focus_depth_mm > camera.lens.front_focal_length_mm)) return;
     const double line_zero_mm = law->line_zero_mm();
     const auto centre_mm = [&](model::PupilLaw pupil) {
@@ -395,8 +396,9 @@ class Calibrator {
       // Believing it is believing its error too.
       const model::Estimate& zero = *conflicting_offset_mm_;
       const double reach_mm = kZeroReach * zero.sigma;
+      const Eigen::Vector2d& laws_mm = result_.scale.offset_of_pupil_laws_mm;
       WidenByTrials("given offset_mm", "measure offset_mm again: the image scale contradicts it",
-                    WithOffsets(setup, {zero.value - reach_mm, zero.value + reach_mm}), fit,
+                    WithOffsets(setup, {laws_mm.x() - reach_mm, laws_mm.y() + reach_mm}), fit,
                     &result_);
     }
     if (slip_) {

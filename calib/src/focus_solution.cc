@@ -240,7 +240,7 @@ class Solution {
       Refuse(
           fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to "
                       "{:.1f} mm), about {:.0f} +- {:.0f} mm; extend the sweep that way",
-                      side, nearest, farthest, zf, own_zf_sigma));
+                      side, nearest, farthest, zf, std::max(zf_sigma, own_zf_sigma)));
       return false;
     }
     if (!(kappa >= kSmallestRatio && kappa <= kLargestRatio)) {

@@ -274,11 +274,13 @@ class Structure {
     result_.bands_are_columns = ratio < 1;
     const std::vector<double>& deviations =
         result_.bands_are_columns ? column_deviations : row_deviations;
-    const double middle = Median(deviations);
+    // The ratio of two frames has the bands of both, independent of each other.
+    const double of_both = Median(deviations);
     std::vector<double> off;
-    for (const double deviation : deviations) off.push_back(std::abs(deviation - middle));
-    result_.bands = model::Estimate{
-        middle, 1.4826 * Median(off) / std::sqrt(static_cast<double>(deviations.size()))};
+    for (const double deviation : deviations) off.push_back(std::abs(deviation - of_both));
+    const double middle = of_both / std::sqrt(2.0);
+    result_.bands = model::Estimate{middle, 1.4826 / std::sqrt(2.0) * Median(off) /
+                                                std::sqrt(static_cast<double>(deviations.size()))};
   }
 
   // ---- fixed structure ----

@@ -90,7 +90,7 @@ void WriteAll(int descriptor, const std::string& text) {
   // processes: they are meant for the parent, which then ends this one.
   ::setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::signal(signal, SIG_IGN);
-  for (const int signal : {SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ}) {
+  for (const int signal : {SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ, SIGXCPU}) {
     ::signal(signal, SIG_DFL);
   }
   sigset_t all;

@@ -80,10 +80,18 @@ void ConvertFormerBlurRatio(Camera* camera) {
   if (!camera->calibration || !camera->calibration->blur_ratio) return;
   CameraCalibration& calibration = *camera->calibration;
   const std::string& method = calibration.evidence.method;
-  if (method == "source-recipe" || method == "assumed" || !calibration.image_distance_mm) return;
+  if (method != "joint-blur-fit" || !calibration.image_distance_mm) return;
   const double zf_mm = camera->focus_depth_mm();
   Estimate& kappa = *calibration.blur_ratio;
-  if (!std::isfinite(zf_mm) || !(kappa.value > 0)) return;
+  if (!(kappa.value > 0)) return;
+  if (!std::isfinite(zf_mm)) {
+    camera->notices.push_back(fmt::format(
+        "camera '{}': its file is of an earlier schema, in which blur_ratio {:.5g} was that of the "
+        "aperture before fall-off; focused at infinity it cannot be converted and is taken as that "
+        "of the blur. Calibrate again",
+        camera->name, kappa.value));
+    return;
+  }
   const BlurRatioOfBlur of_blur =
       BlurRatioWithFalloff(camera->lens, camera->psf, kappa.value, zf_mm);
   const double converted = std::sqrt(of_blur.squared);

@@ -110,6 +110,13 @@ class FoundPart {
 
 struct NameIsTaken {};
 
+// Where what was opened lies now; empty if that cannot be known.
+std::string PathOf(int fd) {
+  std::error_code failure;
+  const fs::path path = fs::read_symlink(fmt::format("/proc/self/fd/{}", fd), failure);
+  return failure ? "" : path.string();
+}
+
 int Create(const std::string& path, PartKind kind) {
   constexpr int kAlways = O_CLOEXEC | O_NOFOLLOW;
   if (kind == PartKind::kFile)
@@ -195,8 +202,11 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
 OutputPart::~OutputPart() {
   if (fd_ < 0) return;
   std::error_code ignored;
-  if (IsNamed(fd_, path_)) fs::remove_all(path_, ignored);  // else it is somebody else's
-  ::close(fd_);
+  // Somebody may have renamed the folder around it.
+  if (!IsNamed(fd_, path_)) path_ = PathOf(fd_);
+  const bool is_ours = !path_.empty() && IsNamed(fd_, path_);
+  ::close(fd_);  // first: where descriptors are scarce, a folder cannot be emptied without
+  if (is_ours) fs::remove_all(path_, ignored);
 }
 
 void OutputPart::RequireThere(const std::string& shown) const {

@@ -2,6 +2,8 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -36,6 +38,7 @@ struct List {
   unsigned long long last_id = 0;
   std::vector<std::string> in_place;
   bool is_abandoned = false;
+  std::atomic<bool> is_putting{false};  // a thread holds the mutex and puts an output in place
 };
 
 // Never destroyed: threads may need it while the process ends.
@@ -49,6 +52,17 @@ Entry EntryOf(std::string path) {
   if (::lstat(path.c_str(), &made) != 0) return {std::move(path), 0, 0};
   return {std::move(path), made.st_dev, made.st_ino};
 }
+
+class Putting {
+ public:
+  explicit Putting(std::atomic<bool>* is_putting) : is_putting_(is_putting) { *is_putting_ = true; }
+  ~Putting() { *is_putting_ = false; }
+  Putting(const Putting&) = delete;
+  Putting& operator=(const Putting&) = delete;
+
+ private:
+  std::atomic<bool>* is_putting_;
+};
 
 // A folder may get new files from other threads while it is emptied: once more, then.
 void Remove(const Entry& entry, Clock::time_point deadline) {
@@ -99,9 +113,16 @@ std::optional<Temporary> PutInPlace(const std::string& shown,
   List& list = TheList();
   const std::lock_guard<std::timed_mutex> lock(list.mutex);
   if (list.is_abandoned) throw Interrupted();
+  const Putting putting(&list.is_putting);
   const std::optional<std::string> replaced = put();
   if (!replaced) return std::nullopt;
-  list.in_place.push_back(shown);
+  // An output in a temporary folder goes with it, and is no news.
+  const bool is_temporary =
+      std::any_of(list.entries.begin(), list.entries.end(), [&](const auto& entry) {
+        const std::string& folder = entry.second.path;
+        return !folder.empty() && shown.rfind(folder + "/", 0) == 0;
+      });
+  if (!is_temporary) list.in_place.push_back(shown);
   Temporary rest;
   if (!replaced->empty()) {
     rest.path_ = *replaced;
@@ -124,7 +145,10 @@ std::vector<std::string> AbandonOutputs(double limit_s) {
   std::map<unsigned long long, Entry> entries;
   std::vector<std::string> in_place;
   {
-    const std::unique_lock<std::timed_mutex> lock(list.mutex, deadline);
+    std::unique_lock<std::timed_mutex> lock(list.mutex, deadline);
+    // An output that is being put in place would be torn: its end is waited for, however long.
+    constexpr auto kPause = std::chrono::milliseconds(20);
+    while (!lock.owns_lock() && list.is_putting) static_cast<void>(lock.try_lock_for(kPause));
     if (!lock.owns_lock()) return {};
     list.is_abandoned = true;
     entries = list.entries;

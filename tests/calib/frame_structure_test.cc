@@ -92,7 +92,7 @@ TEST(FrameStructure, BandsOfTheLightAreFoundAlongTheirDirection) {
     ASSERT_TRUE(found.HasBands());
     EXPECT_EQ(found.bands_are_columns, along_columns);
     // The ratio of two sines of random phases has their amplitude as its standard deviation.
-    EXPECT_NEAR(found.bands->value, 0.1, 0.03);
+    EXPECT_NEAR(found.bands->value, 0.1 / std::sqrt(2.0), 0.02);
     EXPECT_THAT(StructureInWords(found),
                 HasSubstr(along_columns ? "whole columns brighten" : "whole rows brighten"));
   }

@@ -58,7 +58,7 @@ bool IsSystemHeader(const std::string& header) {
       "inttypes.h", "limits.h", "locale.h", "math.h", "setjmp.h", "signal.h", "stdarg.h",
       "stddef.h", "stdint.h", "stdio.h", "stdlib.h", "string.h", "time.h", "dirent.h", "dlfcn.h",
       "fcntl.h", "fnmatch.h", "glob.h", "libgen.h", "poll.h", "pthread.h", "pwd.h", "sched.h",
-      "spawn.h", "strings.h", "termios.h", "unistd.h",
+      "semaphore.h", "spawn.h", "strings.h", "termios.h", "unistd.h",
       // Vector instructions of the compiler, for the hot files with run-time dispatch.
       "immintrin.h",
       // The settings of the GNU C library's allocator.

@@ -87,16 +87,22 @@ TEST(CompareExif, BothFocalLengthsOfAThickLensCount) {
 }
 
 TEST(CompareExif, TheFNumberMayBeOffByAThirdOfAStopAtMost) {
-  const auto verdict = [](double number) {
+  const auto verdict = [](double number, double camera_number = 2.8) {
+    model::Camera camera = BenchLens();
+    camera.lens.aperture_radius_mm = 50 / (2 * camera_number);
     PhotoExif exif;
     exif.f_number = number;
-    return VerdictOn("f-number", exif);
+    return VerdictOn("f-number", exif, camera);
   };
   EXPECT_EQ(verdict(2.8), "agrees");
   EXPECT_EQ(verdict(2.9), "undecided");
   EXPECT_EQ(verdict(3.2), "contradicts");  // the next third of a stop
   EXPECT_EQ(verdict(2.5), "contradicts");
   EXPECT_EQ(verdict(8), "contradicts");
+  // A whole number is not rounded to one.
+  EXPECT_EQ(verdict(2, 2.4), "contradicts");
+  EXPECT_EQ(verdict(4, 3.5), "contradicts");
+  EXPECT_EQ(verdict(2, 2), "agrees");
 }
 
 TEST(CompareExif, TheFocusDistanceMayBeFromTheApertureOrFromTheSensor) {
@@ -110,6 +116,11 @@ TEST(CompareExif, TheFocusDistanceMayBeFromTheApertureOrFromTheSensor) {
   EXPECT_EQ(verdict(400), "agrees");  // in steps of 100 mm, and rings are rough
   EXPECT_EQ(verdict(480), "undecided");
   EXPECT_EQ(verdict(1000), "undecided");  // a whole number of metres
+  model::Camera half_metre = BenchLens();
+  half_metre.calibration->image_distance_mm->value = model::ImageDistanceMm(half_metre.lens, 500);
+  PhotoExif metre;
+  metre.subject_distance_mm = 1000;
+  EXPECT_EQ(VerdictOn("focus distance", metre, half_metre), "undecided");
   EXPECT_EQ(verdict(1200), "contradicts");
   EXPECT_EQ(verdict(std::numeric_limits<double>::infinity()), "contradicts");
   model::Camera uncalibrated = BenchLens();

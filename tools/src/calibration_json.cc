@@ -208,7 +208,7 @@ json BlurFitJson(const calib::BlurFit& blur) {
           {"meter", TextJson(blur.meter)},
           {"family", model::PsfName(blur.family)},
           {"band", blur.band ? json(*blur.band) : json(nullptr)},
-          {"tails", blur.tails},
+          {"tails", blur.tails > 0 ? json(blur.tails) : json(nullptr)},
           {"weak_direction", TextJson(blur.weak_direction)},
           {"better_psf", compared ? json(model::PsfName(blur.better_psf)) : json(nullptr)},
           {"gaussian_misfit_chi2_per_dof", Number(blur.gaussian_misfit)},

@@ -95,8 +95,7 @@ EstimateAperture ApertureFor(const EstimateOptions& options, const model::Camera
   aperture.views_of = options.aperture_of;
   if (light_field.grid) {
     const model::LightFieldGrid& grid = *light_field.grid;
-    aperture.step_mm =
-        model::ApertureCrossingMm(grid.planes, {0, 0, grid.u_step_mm, grid.v_step_mm}).cwiseAbs();
+    aperture.step_mm = model::ApertureStepsMm(grid, *light_field.camera).cwiseAbs();
   }
   if (!StatesAperture(options.aperture_of)) {
     if (aperture.from == "assumed") TellAssumedShape(options);
@@ -116,11 +115,10 @@ EstimateAperture ApertureFor(const EstimateOptions& options, const model::Camera
 }
 
 void WarnOfOtherSteps(const EstimateOptions& options, const EstimateAperture& aperture,
-                      const model::LightFieldGrid& grid) {
+                      const model::LightFieldGrid& grid, const model::Camera& camera) {
   if (!aperture.step_mm) return;
   constexpr double kTolerance = 0.05;  // as of views that are compared
-  const Eigen::Vector2d here =
-      model::ApertureCrossingMm(grid.planes, {0, 0, grid.u_step_mm, grid.v_step_mm}).cwiseAbs();
+  const Eigen::Vector2d here = model::ApertureStepsMm(grid, camera).cwiseAbs();
   const Eigen::Vector2d& there = *aperture.step_mm;
   for (const int axis : {0, 1}) {
     if (!(here[axis] > 0) || !(there[axis] > 0)) continue;

@@ -192,7 +192,7 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   CheckViewCounts(input.weights);
   if (input.camera) {
     input.grid = GridFor(options, *input.camera, input.weights);
-    WarnOfOtherSteps(options, prepared.aperture, *input.grid);
+    WarnOfOtherSteps(options, prepared.aperture, *input.grid, *input.camera);
   }
   prepared.depth =
       PrepareDepth(map, options.depth_path, options.depth, input.picture,

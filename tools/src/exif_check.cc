@@ -75,13 +75,18 @@ ExifFinding FocalLengthFinding(double exif_mm, const model::Camera& camera) {
   return finding;
 }
 
+// F-numbers are set in steps of a third of a stop: f/2 is none of the numbers from 1.5 to 2.5.
+double RoundingOfFNumber(double number) {
+  return std::min(RoundingOf(number), number < 10 ? 0.05 : 0.5);
+}
+
 ExifFinding FNumberFinding(double exif_number, const model::Camera& camera) {
   const model::ThickLens& lens = camera.lens;
   const double number = lens.front_focal_length_mm / (2 * lens.aperture_radius_mm);
   const double tolerance =
       number * (ToleranceOf(camera, "lens.front_focal_length_mm") / lens.front_focal_length_mm +
                 ToleranceOf(camera, "lens.aperture_radius_mm") / lens.aperture_radius_mm);
-  const double off = std::abs(exif_number - number) - RoundingOf(exif_number) - tolerance;
+  const double off = std::abs(exif_number - number) - RoundingOfFNumber(exif_number) - tolerance;
   ExifFinding finding{"f-number", fmt::format("{:.4g}", exif_number),
                       fmt::format("{} (f1/(2 r))", WithTolerance(number, tolerance)),
                       ExifVerdict::kAgrees, ""};
@@ -111,14 +116,18 @@ std::optional<ExifFinding> FocusDistanceFinding(double exif_mm, const model::Cam
     finding.verdict = ExifVerdict::kContradicts;
   } else {
     constexpr double kMmPerMetre = 1000;
-    const double rounding_mm = kMmPerMetre * RoundingOf(exif_mm / kMmPerMetre);
-    const auto lies_within = [&](double share_below, double share_above) {
+    // Whole metres may be exact or rounded: what agrees only by half a metre of rounding is open.
+    constexpr double kMostRoundingMm = 50;
+    const double whole_mm = kMmPerMetre * RoundingOf(exif_mm / kMmPerMetre);
+    const double close_mm = exif_mm < kFarMm / 2 ? std::min(kMostRoundingMm, whole_mm) : whole_mm;
+    const auto lies_within = [&](double share_below, double share_above, double rounding_mm) {
       return Outside(exif_mm, zf_mm * share_below - rounding_mm,
                      far_mm * share_above + rounding_mm) == 0;
     };
-    if (lies_within(1 - kCoarseDistance, 1 + kCoarseDistance)) return finding;
-    finding.verdict = lies_within(1 / kOtherDistance, kOtherDistance) ? ExifVerdict::kUndecided
-                                                                      : ExifVerdict::kContradicts;
+    if (lies_within(1 - kCoarseDistance, 1 + kCoarseDistance, close_mm)) return finding;
+    finding.verdict = lies_within(1 / kOtherDistance, kOtherDistance, whole_mm)
+                          ? ExifVerdict::kUndecided
+                          : ExifVerdict::kContradicts;
   }
   finding.remark = finding.verdict == ExifVerdict::kUndecided
                        ? "cameras know the distance roughly"

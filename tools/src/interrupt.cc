@@ -18,6 +18,7 @@
 #include <thread>
 #include <utility>
 
+#include "message_line.h"
 #include "printable_text.h"
 #include "program_run.h"
 #include "thicklens/error.h"
@@ -43,7 +44,9 @@ std::timed_mutex words_mutex;        // of what follows
 std::function<std::string()> last_words;
 
 // Nothing but what a signal handler may do.
-void TakeSignal(int /*signal*/) {
+void TakeSignal(int signal) {
+  // The system repeats this warning by itself: it is no second wish.
+  if (signal == SIGXCPU && program_token.IsCancelled()) return;
   const int saved = errno;
   program_token.Cancel();
   const int count = signal_count.fetch_add(1) + 1;
@@ -94,8 +97,8 @@ void RemoveAndTell() {
   const std::vector<std::string> in_place = model::AbandonOutputs(kCleaningSeconds);
   std::string text = ::isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "";  // a line of progress
   const std::string words = WordsToSay();
-  if (!words.empty()) text += "thicklens: warning: " + words + "\n";
-  text += "thicklens: error: " + InterruptedText(in_place) + "\n";
+  if (!words.empty()) text += "thicklens: warning: " + MessageLine(words) + "\n";
+  text += "thicklens: error: " + MessageLine(InterruptedText(in_place)) + "\n";
   WriteMessage(text);
 }
 

@@ -54,6 +54,7 @@ int Fail(std::string message, ExitCode code) {
 // A variable of the shell that was never set gives an empty text, which is never a value.
 void RequireNoEmptyValue(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
+    if (option->get_expected_min() == 0) continue;  // it may stand without a value
     for (const std::string& value : option->results()) {
       if (value.empty()) {
         throw tools::UsageError(fmt::format("{}: a value is expected, found ''",

@@ -43,14 +43,16 @@ class Temporary {
 std::optional<Temporary> PutInPlace(const std::string& shown,
                                     const std::function<std::optional<std::string>()>& put);
 
-// The outputs that this process has put in place, as they were named for messages.
+// The outputs that this process has put in place, those in temporary folders apart, as they were
+// named for messages.
 std::vector<std::string> OutputsInPlace();
 
 // Removes every file and folder in the list whose path still leads to what was made there. From
 // then on no output is put in place and no temporary is made. Meant for the last moment of a
 // process: other threads may be at work, and what they try afterwards fails. Returns
-// OutputsInPlace. Waits no longer than `limit_s` for a thread that is about to create a temporary
-// or to put an output in place, and for folders in which other threads are still making files.
+// OutputsInPlace. Waits to its end for an output that is being put in place, and no longer than
+// `limit_s` for a thread that is about to create a temporary and for folders in which other threads
+// are still making files.
 std::vector<std::string> AbandonOutputs(double limit_s);
 
 }  // namespace thicklens::model
