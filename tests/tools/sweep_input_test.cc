@@ -85,6 +85,15 @@ TEST_F(SweepInputTest, CompressedFramesAreTold) {
               Contains(StartsWith("2 of 3 frames are JPEG files")));
 }
 
+// The file may leave it out where the command line states it.
+TEST_F(SweepInputTest, AReadingSigmaThatIsStatedIsNotMissed) {
+  const auto missed = Contains(HasSubstr("reading_sigma_mm is not stated"));
+  arguments_.reading_sigma_mm.reset();
+  EXPECT_THAT(ReadSweepInput(arguments_).notices, missed);
+  arguments_.reading_sigma_mm = 0.05;
+  EXPECT_THAT(ReadSweepInput(arguments_).notices, Not(missed));
+}
+
 TEST_F(SweepInputTest, TheCameraInUseIsTheOneCompared) {
   Sweep("blur_floor_px: {from_calibration: other.yaml}\n");
   EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),

@@ -178,6 +178,15 @@ SweepInput ReadSweepInput(const SweepArguments& arguments) {
   SweepInput input;
   input.file = ReadFile(arguments, &input.notices);
   TakeArguments(arguments, &input.file);
+  // The file did not state it, but the command line does.
+  if (input.file.reading_sigma_stated) {
+    input.notices.erase(std::remove_if(input.notices.begin(), input.notices.end(),
+                                       [](const std::string& notice) {
+                                         return notice.rfind("reading_sigma_mm is not stated", 0) ==
+                                                0;
+                                       }),
+                        input.notices.end());
+  }
   NoteCompression(input.file.frames, &input.notices);
   input.truth = ReadTruth(arguments, SweepYamlOf(arguments), &input.notices);
   input.sweep = calib::MakeFocusSweep(input.file, model::ReadCamera(input.file.camera_path));
