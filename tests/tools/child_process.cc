@@ -33,6 +33,8 @@ ChildProgram::ChildProgram(const std::vector<std::string>& arguments,
   pid_ = ::fork();
   if (pid_ < 0) throw std::runtime_error("no child process could be started");
   if (pid_ > 0) return;
+  // Who runs the tests in the background may have them ignored, and so would the program.
+  for (const int signal : {SIGINT, SIGHUP}) ::signal(signal, SIG_DFL);
   RedirectTo(out_path_.c_str(), STDOUT_FILENO);
   RedirectTo(err_path_.c_str(), STDERR_FILENO);
   if (max_file_bytes > 0) {
