@@ -116,18 +116,17 @@ struct OutputFolder::Impl {
     // The old folder gets the part's name, under which other runs look for one that nobody holds.
     const Descriptor old(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
     if (old.get() < 0 || ::flock(old.get(), LOCK_EX | LOCK_NB) != 0) return false;
-    const std::optional<Temporary> replaced =
-        PutInPlace(path, [&]() -> std::optional<std::string> {
-          if (!ExchangeNames(part->path(), path)) return std::nullopt;
-          try {
-            // Somebody may have put something into it, or into its place, since the last look.
-            content.RequireReplaceable(part->path(), path, false, false);
-          } catch (const Error&) {
-            ExchangeNames(part->path(), path);
-            throw;
-          }
-          return part->path();
-        });
+    const std::optional<Temporary> replaced = PutInPlace(path, [&]() -> std::optional<std::string> {
+      if (!ExchangeNames(part->path(), path)) return std::nullopt;
+      try {
+        // Somebody may have put something into it, or into its place, since the last look.
+        content.RequireReplaceable(part->path(), path, false, false);
+      } catch (const Error&) {
+        ExchangeNames(part->path(), path);
+        throw;
+      }
+      return part->path();
+    });
     if (!replaced) return false;
     std::error_code failure, ignored;
     fs::remove_all(part->path(), failure);
@@ -141,22 +140,21 @@ struct OutputFolder::Impl {
   // new one cannot take its place.
   void ReplaceByTwoNames() {
     std::error_code ignored;
-    const std::optional<Temporary> replaced =
-        PutInPlace(path, [&]() -> std::optional<std::string> {
-          const fs::path aside = NameToStepAside(path);
-          const bool replaces = fs::exists(fs::symlink_status(path, ignored));
-          std::error_code failure;
-          if (replaces) fs::rename(path, aside, failure);
-          if (failure) return std::nullopt;
-          try {
-            if (replaces) content.RequireReplaceable(aside, path, false, false);
-            Rename(part->path(), path, path);
-          } catch (const Error&) {
-            if (replaces) fs::rename(aside, path, ignored);
-            throw;
-          }
-          return replaces ? aside.string() : std::string();
-        });
+    const std::optional<Temporary> replaced = PutInPlace(path, [&]() -> std::optional<std::string> {
+      const fs::path aside = NameToStepAside(path);
+      const bool replaces = fs::exists(fs::symlink_status(path, ignored));
+      std::error_code failure;
+      if (replaces) fs::rename(path, aside, failure);
+      if (failure) return std::nullopt;
+      try {
+        if (replaces) content.RequireReplaceable(aside, path, false, false);
+        Rename(part->path(), path, path);
+      } catch (const Error&) {
+        if (replaces) fs::rename(aside, path, ignored);
+        throw;
+      }
+      return replaces ? aside.string() : std::string();
+    });
     if (!replaced) {  // a folder from a lower layer of an overlay, as in a container's image
       ReplaceContent();
       return;

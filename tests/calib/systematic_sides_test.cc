@@ -170,9 +170,9 @@ TEST(AddSystematicParts, SidesFartherApartAreAPartAsLargeAsTheirAnswers) {
     const double kappa = c.calibration.blur_ratio->value;
     EXPECT_NEAR(part->blur_ratio.x(), 0.43 - kappa, 1e-9);
     EXPECT_NEAR(part->blur_ratio.y(), 0.46 - kappa, 1e-9);
-    EXPECT_THAT(c.calibration.warnings, Contains(AllOf(HasSubstr("two sides of focus disagree"),
-                                                       HasSubstr("+- 0.3 mm, the farther ones"),
-                                                       HasSubstr("+- 0.4 mm"))));
+    EXPECT_THAT(c.calibration.warnings,
+                Contains(AllOf(HasSubstr("two sides of focus disagree"),
+                               HasSubstr("+- 0.3 mm, the farther ones"), HasSubstr("+- 0.4 mm"))));
   }
 }
 

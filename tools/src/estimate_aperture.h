@@ -36,7 +36,7 @@ EstimateAperture ApertureFor(const EstimateOptions& options, const model::Camera
 // Warns where the views of the estimate stand elsewhere on the aperture than those of
 // --aperture-of, because camera and weights ask for other steps.
 void WarnOfOtherSteps(const EstimateOptions& options, const EstimateAperture& aperture,
-                     const model::LightFieldGrid& grid, const model::Camera& camera);
+                      const model::LightFieldGrid& grid, const model::Camera& camera);
 
 }  // namespace thicklens::tools
 
