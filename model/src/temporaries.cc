@@ -25,6 +25,7 @@ struct Entry {
   std::string path;
   dev_t device = 0;
   ino_t inode = 0;
+  Abandon abandon = Abandon::kWhole;
 
   bool IsStillThere() const {
     struct stat now {};
@@ -47,10 +48,10 @@ List& TheList() {
   return list;
 }
 
-Entry EntryOf(std::string path) {
+Entry EntryOf(std::string path, Abandon abandon) {
   struct stat made {};
-  if (::lstat(path.c_str(), &made) != 0) return {std::move(path), 0, 0};
-  return {std::move(path), made.st_dev, made.st_ino};
+  if (::lstat(path.c_str(), &made) != 0) return {std::move(path), 0, 0, abandon};
+  return {std::move(path), made.st_dev, made.st_ino, abandon};
 }
 
 class Putting {
@@ -68,6 +69,10 @@ class Putting {
 void Remove(const Entry& entry, Clock::time_point deadline) {
   constexpr auto kPause = std::chrono::milliseconds(5);
   std::error_code ignored;
+  if (entry.abandon == Abandon::kIfEmpty) {
+    if (entry.IsStillThere()) fs::remove(entry.path, ignored);
+    return;
+  }
   while (entry.IsStillThere()) {
     fs::remove_all(entry.path, ignored);
     if (Clock::now() > deadline) return;
@@ -77,14 +82,14 @@ void Remove(const Entry& entry, Clock::time_point deadline) {
 
 }  // namespace
 
-Temporary::Temporary(const std::function<std::string()>& create) {
+Temporary::Temporary(const std::function<std::string()>& create, Abandon abandon) {
   List& list = TheList();
   const std::lock_guard<std::timed_mutex> lock(list.mutex);
   if (list.is_abandoned) throw Interrupted();
   const auto at = list.entries.emplace(++list.last_id, Entry()).first;
   try {
     path_ = create();
-    at->second = EntryOf(path_);
+    at->second = EntryOf(path_, abandon);
   } catch (...) {
     list.entries.erase(at);
     throw;
@@ -97,6 +102,13 @@ Temporary::~Temporary() {
   List& list = TheList();
   const std::lock_guard<std::timed_mutex> lock(list.mutex);
   list.entries.erase(id_);
+}
+
+void Temporary::Keep() {
+  List& list = TheList();
+  const std::lock_guard<std::timed_mutex> lock(list.mutex);
+  if (list.is_abandoned) throw Interrupted();
+  list.entries.erase(std::exchange(id_, 0));
 }
 
 Temporary::Temporary(Temporary&& other) noexcept
@@ -120,14 +132,15 @@ std::optional<Temporary> PutInPlace(const std::string& shown,
   const bool is_temporary =
       std::any_of(list.entries.begin(), list.entries.end(), [&](const auto& entry) {
         const std::string& folder = entry.second.path;
-        return !folder.empty() && shown.rfind(folder + "/", 0) == 0;
+        return entry.second.abandon == Abandon::kWhole && !folder.empty() &&
+               shown.rfind(folder + "/", 0) == 0;
       });
   if (!is_temporary) list.in_place.push_back(shown);
   Temporary rest;
   if (!replaced->empty()) {
     rest.path_ = *replaced;
     rest.id_ = ++list.last_id;
-    list.entries.emplace(rest.id_, EntryOf(*replaced));
+    list.entries.emplace(rest.id_, EntryOf(*replaced, Abandon::kWhole));
   }
   return rest;
 }
@@ -154,7 +167,9 @@ std::vector<std::string> AbandonOutputs(double limit_s) {
     entries = list.entries;
     in_place = list.in_place;
   }
-  for (const auto& [id, entry] : entries) Remove(entry, deadline);
+  // A folder is older than what was made in it.
+  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry)
+    Remove(entry->second, deadline);
   return in_place;
 }
 

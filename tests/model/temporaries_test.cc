@@ -69,6 +69,40 @@ TEST_F(AbandonOutputsTest, RemovesWhatIsListedAndNothingElse) {
   });
 }
 
+// A report's folder goes with the part that was begun in it, and stays where a page lies in it.
+TEST_F(AbandonOutputsTest, AFolderOfThePersonsGoesOnlyWhileItIsEmpty) {
+  for (const bool has_output : {false, true}) {
+    EXPECT_RIGHT_IN_A_PROCESS([has_output] {
+      const testing::TemporaryFolder folder;
+      const Temporary report(
+          [&] {
+            fs::create_directory(folder / "report");
+            return folder / "report";
+          },
+          Abandon::kIfEmpty);
+      const Temporary part([&] { return NewFile(folder / "report/.page.part"); });
+      if (has_output) WriteFileAtomically(folder / "report/page.html", "page");
+      const std::vector<std::string> in_place = AbandonOutputs(kLimit_s);
+      EXPECT_EQ(in_place.size(), has_output ? 1U : 0U) << "an output there is news";
+      EXPECT_EQ(fs::exists(folder / "report"), has_output);
+      EXPECT_FALSE(fs::exists(folder / "report/.page.part"));
+      EXPECT_EQ(fs::exists(folder / "report/page.html"), has_output);
+    });
+  }
+}
+
+TEST_F(AbandonOutputsTest, WhatIsKeptBeforeStaysAndAfterwardsNothingCanBeKept) {
+  EXPECT_RIGHT_IN_A_PROCESS([] {
+    const testing::TemporaryFolder folder;
+    Temporary kept([&] { return NewFile(folder / "kept"); });
+    Temporary late([&] { return NewFile(folder / "late"); });
+    kept.Keep();
+    AbandonOutputs(kLimit_s);
+    EXPECT_THROW(late.Keep(), Interrupted);
+    EXPECT_THAT(folder.Entries(), ElementsAre("kept"));
+  });
+}
+
 // Somebody else's file may have taken the name meanwhile.
 TEST_F(AbandonOutputsTest, LeavesWhatIsNotWhatWasMadeThere) {
   EXPECT_RIGHT_IN_A_PROCESS([] {

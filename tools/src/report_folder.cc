@@ -14,14 +14,19 @@ ReportFolder::ReportFolder(const std::string& path) : path_(path) {
   std::error_code failure;
   if (path == "-") throw Error("-: a report cannot go to standard output; name a folder");
   if (path.empty() || fs::exists(path, failure)) return;
-  made_ = fs::create_directory(path, failure);
-  if (failure)
-    throw Error(fmt::format("{}: the folder cannot be made: {}", path, failure.message()));
+  made_ = model::Temporary(
+      [&] {
+        fs::create_directory(path, failure);
+        if (failure)
+          throw Error(fmt::format("{}: the folder cannot be made: {}", path, failure.message()));
+        return path;
+      },
+      model::Abandon::kIfEmpty);
 }
 
 ReportFolder::~ReportFolder() {
   std::error_code not_empty;
-  if (made_) fs::remove(path_, not_empty);
+  if (!made_.path().empty()) fs::remove(path_, not_empty);
 }
 
 }  // namespace thicklens::tools

@@ -4,9 +4,12 @@
 #include <filesystem>
 #include <string>
 
+#include "thicklens/model/temporaries.h"
+
 namespace thicklens::tools {
 
-// A folder that is made if it is missing, and goes again if nothing came into it.
+// A folder that is made if it is missing, and is removed again if nothing was written into it, also
+// where the process is interrupted.
 class ReportFolder {
  public:
   explicit ReportFolder(const std::string& path);  // empty: none. Throws Error
@@ -16,7 +19,7 @@ class ReportFolder {
 
  private:
   std::filesystem::path path_;
-  bool made_ = false;
+  model::Temporary made_;  // by this run
 };
 
 }  // namespace thicklens::tools

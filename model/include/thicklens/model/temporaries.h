@@ -11,6 +11,9 @@
 // in time, removes them by AbandonOutputs.
 namespace thicklens::model {
 
+// What AbandonOutputs does with a folder that is not empty.
+enum class Abandon { kWhole, kIfEmpty };
+
 // The entry of one file or folder in the list of this process. Functions may be called from any
 // thread.
 class Temporary {
@@ -19,11 +22,17 @@ class Temporary {
   // `create` makes the file or folder and returns its path; it must be short and must not make
   // another Temporary. What it throws passes on. After AbandonOutputs it is not called: Interrupted
   // is thrown.
-  explicit Temporary(const std::function<std::string()>& create);
+  // kIfEmpty: the folder is one of the person's, outputs come to lie in it, and it is removed only
+  // while nothing is in it.
+  explicit Temporary(const std::function<std::string()>& create, Abandon abandon = Abandon::kWhole);
   // Takes the entry out of the list. Removes nothing.
   ~Temporary();
   Temporary(Temporary&& other) noexcept;
   Temporary& operator=(Temporary&& other) noexcept;
+
+  // Takes the entry out of the list because the file is complete and stays. Throws Interrupted
+  // after AbandonOutputs, which has removed or is about to remove it.
+  void Keep();
 
   const std::string& path() const { return path_; }  // empty: of nothing
 
@@ -47,7 +56,8 @@ std::optional<Temporary> PutInPlace(const std::string& shown,
 // named for messages.
 std::vector<std::string> OutputsInPlace();
 
-// Removes every file and folder in the list whose path still leads to what was made there. From
+// Removes every file and folder in the list whose path still leads to what was made there, the
+// newest first. From
 // then on no output is put in place and no temporary is made. Meant for the last moment of a
 // process: other threads may be at work, and what they try afterwards fails. Returns
 // OutputsInPlace. Waits to its end for an output that is being put in place, and no longer than
