@@ -60,8 +60,8 @@ void ReadCheckpoint(const std::string& bytes, const TemporaryFolder& folder) {
   {
     tools::JournalFile journal(records, "thicklens-blocks/1");
     const std::size_t half = bytes.find('\n');
-    journal.Append(bytes.substr(0, half));
-    journal.Append(half == std::string::npos ? "" : bytes.substr(half + 1));
+    journal.Append({bytes.substr(0, half)});
+    journal.Append({half == std::string::npos ? "" : bytes.substr(half + 1)});
   }
   for (const std::string& path : {records, folder.Put("estimate.blocks", bytes)}) {
     tools::BlockCheckpoint checkpoint(path);

@@ -120,7 +120,7 @@ TEST_F(BlockCheckpointTest, AnotherEstimateIsToldByWhatDiffers) {
 TEST_F(BlockCheckpointTest, WithoutABlockItHoldsNothing) {
   { BlockCheckpoint(Path()).Begin(SomeRun("1", picture_)); }
   EXPECT_FALSE(fs::exists(Path()));
-  { JournalFile(Path(), "thicklens-blocks/1").Append("[[\"gamma\",\"1\"]]"); }
+  { JournalFile(Path(), "thicklens-blocks/1").Append({"[[\"gamma\",\"1\"]]"}); }
   {
     BlockCheckpoint checkpoint(Path());
     checkpoint.Begin(SomeRun("2", picture_));
@@ -149,7 +149,7 @@ TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
   for (std::size_t i = 0; i < wrong.size(); ++i) {
     SCOPED_TRACE(i);
     folder_.Put("blocks", whole);
-    { JournalFile(Path(), "thicklens-blocks/1").Append(wrong[i]); }
+    { JournalFile(Path(), "thicklens-blocks/1").Append({wrong[i]}); }
     BlockCheckpoint checkpoint(Path());
     checkpoint.Begin(SomeRun("1", picture_));
     const bool has_its_number = i >= 1 && i <= 5 && wrong[i].size() >= 64;
@@ -162,8 +162,8 @@ TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
     folder_.Put("other", "");
     {
       JournalFile journal(folder_ / "other", "thicklens-blocks/1");
-      journal.Append(first);
-      journal.Append(right);
+      journal.Append({first});
+      journal.Append({right});
     }
     BlockCheckpoint other(folder_ / "other");
     EXPECT_FALSE(other.block_px());

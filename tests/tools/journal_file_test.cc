@@ -36,7 +36,7 @@ class JournalFileTest : public ::testing::Test {
   std::string Path() const { return folder_ / "journal"; }
   void Write(const std::vector<std::string>& records) const {
     JournalFile journal(Path(), kSort);
-    for (const std::string& record : records) journal.Append(record);
+    for (const std::string& record : records) journal.Append({record});
   }
   std::vector<std::string> Records() const { return RecordsOf(JournalFile(Path(), kSort)); }
 
@@ -49,7 +49,7 @@ TEST_F(JournalFileTest, RecordsComeBackInTheNextRun) {
     JournalFile journal(Path(), kSort);
     EXPECT_EQ(journal.size(), 0U);
     for (const std::string& record : {std::string("one"), std::string(), bytes}) {
-      journal.Append(record);
+      journal.Append({record});
       EXPECT_EQ(journal.Read(journal.size() - 1), record);
     }
   }
@@ -76,7 +76,7 @@ TEST_F(JournalFileTest, CutAnywhereItKeepsWhatIsWhole) {
       JournalFile journal(Path(), kSort);
       count = journal.size();
       EXPECT_THAT(RecordsOf(journal), ::testing::ElementsAreArray(all.data(), count));
-      journal.Append("new");
+      journal.Append({"new"});
     }
     ASSERT_GE(count, seen);
     seen = count;
@@ -136,7 +136,7 @@ TEST_F(JournalFileTest, BeginsAnew) {
     JournalFile journal(Path(), kSort);
     journal.Clear();
     EXPECT_EQ(journal.size(), 0U);
-    journal.Append("third");
+    journal.Append({"third"});
   }
   EXPECT_THAT(Records(), ElementsAre("third"));
 }
@@ -190,7 +190,7 @@ TEST_F(JournalFileTest, OtherFilesAreLeftAlone) {
 
 TEST_F(JournalFileTest, OneRunHoldsIt) {
   JournalFile journal(Path(), kSort);
-  journal.Append("one");
+  journal.Append({"one"});
   EXPECT_THAT(ErrorOf([&] { Records(); }), AllOf(HasSubstr(Path()), HasSubstr("another run")));
 }
 

@@ -202,9 +202,8 @@ std::optional<std::string> BlockCheckpoint::device() const {
   return std::nullopt;
 }
 
-int BlockCheckpoint::kept() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return is_begun_ ? static_cast<int>(record_of_block_.size()) : 0;
+void BlockCheckpoint::CountKept() {
+  kept_ = is_begun_ ? static_cast<int>(record_of_block_.size()) : 0;
 }
 
 void BlockCheckpoint::Begin(const estimator::BlockRun& run) {
@@ -227,6 +226,7 @@ void BlockCheckpoint::Begin(const estimator::BlockRun& run) {
                  journal_.bytes_left_out());
   }
   is_begun_ = true;
+  CountKept();
 }
 
 std::optional<estimator::SolvedBlock> BlockCheckpoint::Find(int block) {
@@ -243,15 +243,20 @@ std::optional<estimator::SolvedBlock> BlockCheckpoint::Find(int block) {
 void BlockCheckpoint::Keep(int block, const estimator::SolvedBlock& solved) {
   const std::string record = RecordOf(block, solved);
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!here_.empty()) journal_.Append(here_);
-  here_.clear();
-  journal_.Append(record);
+  if (here_.empty()) {
+    journal_.Append({record});
+  } else {
+    journal_.Append({here_, record});
+    here_.clear();
+  }
   record_of_block_[block] = journal_.size() - 1;
+  CountKept();
 }
 
 bool BlockCheckpoint::Remove() {
   const std::lock_guard<std::mutex> lock(mutex_);
   is_begun_ = false;
+  CountKept();
   return journal_.Remove();
 }
 

@@ -1,6 +1,7 @@
 #ifndef THICKLENS_TOOLS_BLOCK_CHECKPOINT_H_
 #define THICKLENS_TOOLS_BLOCK_CHECKPOINT_H_
 
+#include <atomic>
 #include <cstddef>
 #include <map>
 #include <mutex>
@@ -25,8 +26,9 @@ class BlockCheckpoint final : public estimator::BlockStore {
   // that computes as it did.
   std::optional<int> block_px() const;
   std::optional<std::string> device() const;
-  // Blocks that the run which has begun could go on from.
-  int kept() const;
+  // Blocks that the run which has begun could go on from. Waits for nobody: it is asked for when
+  // the process ends, while a disk may hold up the thread that keeps a block.
+  int kept() const { return kept_; }
 
   // Throws Error for a file that is of another estimate, and says what differs.
   void Begin(const estimator::BlockRun& run) override;
@@ -37,6 +39,7 @@ class BlockCheckpoint final : public estimator::BlockStore {
   bool Remove();
 
  private:
+  void CountKept();                                    // with the mutex held
   std::string Setting(const std::string& name) const;  // of the run that left blocks; empty: none
 
   JournalFile journal_;
@@ -45,6 +48,7 @@ class BlockCheckpoint final : public estimator::BlockStore {
   mutable std::mutex mutex_;  // of what follows
   bool is_begun_ = false;
   std::map<int, std::size_t> record_of_block_;
+  std::atomic<int> kept_{0};
 };
 
 }  // namespace thicklens::tools

@@ -220,8 +220,14 @@ std::string JournalFile::Read(std::size_t record, std::size_t most_bytes) const 
   return ReadAt(place.offset, std::min(place.bytes, most_bytes));
 }
 
-void JournalFile::Append(const std::string& record) {
-  const std::string line = fmt::format("{}{} {}\n", kWord, record.size(), Sha256Hex(record));
+void JournalFile::Append(const std::vector<std::string>& records) {
+  std::string bytes;
+  std::vector<Place> places;  // offsets from the first of these bytes
+  for (const std::string& record : records) {
+    bytes += fmt::format("{}{} {}\n", kWord, record.size(), Sha256Hex(record));
+    places.push_back({bytes.size(), record.size()});
+    bytes += record + "\n";
+  }
   const std::lock_guard<std::mutex> lock(mutex_);
   if (records_.empty()) {
     WriteAt(0, first_line_);
@@ -231,10 +237,13 @@ void JournalFile::Append(const std::string& record) {
   if (::ftruncate(file_, static_cast<off_t>(end_)) != 0) {
     throw Failure(path_, "cannot be written", errno);
   }
-  WriteAt(end_, line + record + "\n");
-  without_record_ = {};
-  records_.push_back({end_ + line.size(), record.size()});
-  end_ += line.size() + record.size() + 1;
+  WriteAt(end_, bytes);
+  if (!without_record_.path().empty()) {
+    without_record_.Keep();
+    without_record_ = {};
+  }
+  for (const Place& place : places) records_.push_back({end_ + place.offset, place.bytes});
+  end_ += bytes.size();
 }
 
 void JournalFile::Clear() {

@@ -35,7 +35,9 @@ class JournalFile {
   // From any thread. Throw Error for what the disk does not do. No more than the first bytes, where
   // their number is given.
   std::string Read(std::size_t record, std::size_t most_bytes = SIZE_MAX) const;
-  void Append(const std::string& record);
+  // All of them in one go: the file has none of them or, but for a disk that fails, all. Throws
+  // Interrupted for the first ones of a file that is being removed because the process ends.
+  void Append(const std::vector<std::string>& records);
   // Begins anew, without records.
   void Clear();
   // The file has served its purpose. Whether it could be removed.
