@@ -178,6 +178,20 @@ TEST_F(RunFilesTest, SimulateKeepsWhatItsDescriptionNames) {
   EXPECT_FALSE(fs::exists(out));
 }
 
+// A link to a file that is still to be made names that file: once the camera is written, the link
+// would lead to it, and the summary would take its place.
+TEST_F(RunFilesTest, ALinkToAnotherOutputIsThatOutput) {
+  const std::string out = work_ / "new.yaml";
+  fs::create_symlink("new.yaml", work_ / "link.json");
+  fs::create_symlink("link.json", work_ / "twice.json");
+  for (const char* link : {"link.json", "twice.json"}) {
+    const ProgramRun run = Run({"calibrate", (*this)("sweep"), "-o", out, "--json", work_ / link});
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_THAT(run.err, HasSubstr("two outputs have this name"));
+    EXPECT_FALSE(fs::exists(out));
+  }
+}
+
 TEST_F(RunFilesTest, LightFieldsAreKept) {
   const Words renders = {"render", (*this)("lf"), "--as-captured"};
   for (const char* input : {"lf/lightfield.yaml", "lf/camera.yaml", "lf/views/view_01_00.png"}) {

@@ -26,11 +26,19 @@ FileIdentity IdentityOf(const std::string& path) {
   return std::pair(info.st_dev, info.st_ino);
 }
 
-// The whole path, links followed as far as it exists, without a slash at its end.
+// The whole path, links followed as far as it exists, without a slash at its end. A link to a file
+// that is still to be made is followed too.
 fs::path ResolvedPath(const std::string& path) {
+  constexpr int kMaxLinks = 40;  // as the system allows
   std::error_code failure;
-  fs::path resolved = fs::weakly_canonical(fs::absolute(path), failure);
-  if (failure) resolved = fs::absolute(path).lexically_normal();
+  fs::path named = fs::absolute(path);
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(named, failure); ++i) {
+    const fs::path target = fs::read_symlink(named, failure);
+    if (failure) break;
+    named = named.parent_path() / target;  // `target` alone where it is absolute
+  }
+  fs::path resolved = fs::weakly_canonical(named, failure);
+  if (failure) resolved = named.lexically_normal();
   return resolved.has_filename() ? resolved : resolved.parent_path();
 }
 
