@@ -88,18 +88,21 @@ struct OutputFolder::Impl {
     return file.string();
   }
 
-  void RequireReplaceable(bool without_marker = false) const {
-    content.RequireReplaceable(target.target, path, target.in_place, without_marker);
+  void RequireReplaceable() const {
+    content.RequireReplaceable(target.target, path, target.in_place, false);
   }
 
-  // Removes the content that a run has left which was killed while its output came into place:
-  // nothing of it is whole, and it has no marker.
+  // Removes what a run has left which was killed while it wrote into this folder in place: its part
+  // and, where it was killed while its output came into place, content of which nothing is whole
+  // and which has no marker. This run may replace the folder as a whole (the mount is gone, say).
   void RemoveLeftOver() const {
-    const bool was_killed = HasLeftOverPart(target.target, kInnerPartStem);
-    RequireReplaceable(was_killed);
+    if (!HasLeftOverPart(target.target, kInnerPartStem)) return;
+    content.RequireReplaceable(target.target, path, true, true);
     std::error_code ignored;
-    if (!was_killed || fs::exists(target.target / content.marker_file, ignored)) return;
-    for (const fs::path& entry : EntriesInPlace(target.target)) Remove(entry);
+    if (!fs::exists(target.target / content.marker_file, ignored)) {
+      for (const fs::path& entry : EntriesInPlace(target.target)) Remove(entry);
+    }
+    RemoveLeftOverParts(target.target, kInnerPartStem);
   }
 
   void Remove(const fs::path& entry) const {
@@ -198,8 +201,9 @@ OutputFolder::OutputFolder(const std::string& path, const std::string& marker_fi
   const fs::path& target = impl.target.target;
   impl.path = target.string();
   impl.content = {marker_file, own_entries};
+  impl.RemoveLeftOver();
   if (impl.target.in_place) {
-    impl.RemoveLeftOver();
+    impl.RequireReplaceable();
     impl.part.emplace(target, kInnerPartStem, PartKind::kFolder, path);
   } else {
     impl.part.emplace(impl.target.parent(), target.filename().string(), PartKind::kFolder, path);

@@ -149,6 +149,14 @@ bool HasLeftOverPart(const fs::path& folder, const std::string& stem) {
   return false;
 }
 
+void RemoveLeftOverParts(const fs::path& folder, const std::string& stem) {
+  for (const std::string& path : PartsIn(folder, stem)) {
+    const FoundPart found(path);
+    std::error_code ignored;
+    if (found.what() == Found::kLeftOver) fs::remove_all(path, ignored);
+  }
+}
+
 OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind kind,
                        const std::string& shown) {
   const FolderTurn turn(folder);

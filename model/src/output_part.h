@@ -39,6 +39,8 @@ class OutputPart {
 
 // Whether a run that this user started, and that no longer lives, has left such a part there.
 bool HasLeftOverPart(const std::filesystem::path& folder, const std::string& stem);
+// Removes such parts, as far as they can be removed.
+void RemoveLeftOverParts(const std::filesystem::path& folder, const std::string& stem);
 // Whether the name is one of a part with that stem.
 bool IsPartName(const std::string& name, const std::string& stem);
 

@@ -321,6 +321,30 @@ TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNext) {
   });
 }
 
+// The folder was a mount point when that run was killed, and is none any more.
+TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNextThatReplacesTheFolder) {
+  for (const bool is_whole : {false, true}) {
+    const TemporaryFolder folder;
+    const std::string out = folder / "out";
+    fs::create_directories(out + "/.thicklens.0123456789abcdef.part/frames");
+    fs::create_directories(out + "/frames");
+    std::ofstream(out + "/frames/old") << "x";
+    if (is_whole) std::ofstream(out + "/" + kMarker) << "old";
+    std::ofstream(out + "/mine") << "x";
+    EXPECT_THAT(ErrorOf([&] {
+                  OutputFolder other(out, kMarker, {kMarker, "frames"});
+                }),
+                ::testing::HasSubstr("'mine'"));
+    EXPECT_TRUE(fs::exists(out + "/frames/old"));
+    fs::remove(out + "/mine");
+    WriteFolder(out, "new", {kMarker, "frames"});
+    EXPECT_EQ(ContentOf(out + "/frames/a.png"), "new");
+    EXPECT_FALSE(fs::exists(out + "/frames/old"));
+    EXPECT_EQ(std::distance(fs::directory_iterator(out), {}), 2) << "marker and frames";
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+  }
+}
+
 TEST(OutputPlace, AFullMountPointKeepsTheOlderContent) {
   const TemporaryFolder folder;
   RUN_IN_CHILD([&]() -> std::string {
