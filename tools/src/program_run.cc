@@ -57,10 +57,17 @@ class RunningPrograms {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const pid_t pid : pids_) AskToEnd(pid);
   }
-  // The second time means: at once, without waiting for a library that computes.
+  // The second signal means: at once, without waiting for a library that computes. Two of one kind
+  // may arrive as one, so that it is of another kind, which this process, and with it the child,
+  // does not ignore.
   static void AskToEnd(pid_t pid) {
     ::kill(pid, SIGTERM);
-    ::kill(pid, SIGTERM);
+    for (const int second : {SIGHUP, SIGINT, SIGTERM}) {
+      struct sigaction now {};
+      if (::sigaction(second, nullptr, &now) == 0 && now.sa_handler == SIG_IGN) continue;
+      ::kill(pid, second);
+      return;
+    }
   }
 
  private:
