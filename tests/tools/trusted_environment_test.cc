@@ -49,16 +49,20 @@ std::string VariableOf(const char* name) {
 
 TEST(TrustedEnvironment, PathsThatAreNotAbsoluteAreLeftOut) {
   const SetVariable cache("POCL_CACHE_DIR", "cache"), temporary("TMPDIR", "."),
-      plugins("GDAL_DRIVER_PATH", "/usr/lib:"),
-      data("XDG_DATA_DIRS", "/usr/share:/usr/local/share"), config("XDG_CONFIG_HOME", "/somewhere"),
-      vendors("OCL_ICD_VENDORS", "./vendors"), layers("OPENCL_LAYERS", "libnot-here.so");
+      plugins("GDAL_DRIVER_PATH", "/usr/lib:plugins"), fonts("FONTCONFIG_PATH", ":/etc/fonts:"),
+      hardware("HWLOC_PLUGINS_PATH", ":"), data("XDG_DATA_DIRS", "/usr/share:/usr/local/share"),
+      config("XDG_CONFIG_HOME", "/somewhere"), vendors("OCL_ICD_VENDORS", "./vendors"),
+      layers("OPENCL_LAYERS", "libnot-here.so");
   EXPECT_THAT(DistrustRelativePaths(),
               ElementsAre(AllOf(HasSubstr("TMPDIR"), HasSubstr("'.'")),
                           AllOf(HasSubstr("POCL_CACHE_DIR"), HasSubstr("'cache'")),
-                          HasSubstr("GDAL_DRIVER_PATH"), HasSubstr("OCL_ICD_VENDORS")));
-  for (const char* name : {"TMPDIR", "GDAL_DRIVER_PATH", "OCL_ICD_VENDORS"}) {
+                          AllOf(HasSubstr("GDAL_DRIVER_PATH"), HasSubstr("'plugins'")),
+                          HasSubstr("OCL_ICD_VENDORS")));
+  for (const char* name : {"TMPDIR", "HWLOC_PLUGINS_PATH", "OCL_ICD_VENDORS"}) {
     EXPECT_EQ(VariableOf(name), "(none)") << name;
   }
+  EXPECT_EQ(VariableOf("GDAL_DRIVER_PATH"), "/usr/lib");
+  EXPECT_EQ(VariableOf("FONTCONFIG_PATH"), "/etc/fonts") << "nobody asked for its empty parts";
   EXPECT_EQ(VariableOf("XDG_CONFIG_HOME"), "/somewhere");
   EXPECT_EQ(VariableOf("XDG_DATA_DIRS"), "/usr/share:/usr/local/share");
   EXPECT_EQ(VariableOf("OPENCL_LAYERS"), "libnot-here.so");

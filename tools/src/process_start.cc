@@ -44,12 +44,17 @@ bool IsOneOf(const char* text, const char* const* words) {
 
 // Compiled kernels are code: those of the current folder may be anybody's, and the standard for
 // these folders has relative ones ignored.
+constexpr int kFolderCount = 2;
+constexpr const char* kFolders[kFolderCount] = {"XDG_CACHE_HOME=", "POCL_CACHE_DIR="};
+const char* forgotten_folders[kFolderCount] = {};  // their values; the text itself stays
+
 bool IsRelativeCache(const char* variable) {
-  static const char* const kFolders[] = {"XDG_CACHE_HOME=", "POCL_CACHE_DIR="};
-  for (const char* const name : kFolders) {
-    if (!BeginsWith(variable, name)) continue;
+  for (int i = 0; i < kFolderCount; ++i) {
+    if (!BeginsWith(variable, kFolders[i])) continue;
     while (*variable != '=') ++variable;
-    return variable[1] != '\0' && variable[1] != '/';
+    if (variable[1] == '\0' || variable[1] == '/') return false;
+    forgotten_folders[i] = variable + 1;
+    return true;
   }
   return false;
 }
@@ -81,6 +86,18 @@ __attribute__((section(".preinit_array"),
 #endif
 
 }  // namespace
+
+std::vector<std::pair<std::string, std::string>> ForgottenCaches() {
+  std::vector<std::pair<std::string, std::string>> caches;
+#if defined(__ELF__) && defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
+  for (int i = 0; i < kFolderCount; ++i) {
+    if (forgotten_folders[i] == nullptr) continue;
+    const std::string name = kFolders[i];
+    caches.emplace_back(name.substr(0, name.size() - 1), forgotten_folders[i]);
+  }
+#endif
+  return caches;
+}
 
 void RequireStack() {
   constexpr rlim_t kNeededKib = 512;  // a calibration fails with 128 and works with 256

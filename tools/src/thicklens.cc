@@ -90,6 +90,8 @@ int Main(int argc, char** argv) {
   tools::KeepFreedMemory();
   SetUpMessages();
   tools::CatchSignals();
+  for (const auto& [name, value] : tools::ForgottenCaches())
+    spdlog::warn("{}", tools::RelativePathIsIgnored(name, value));
   for (const std::string& line : tools::DistrustRelativePaths()) spdlog::warn("{}", line);
   tools::RequireStack();
   tools::WatchSignals();

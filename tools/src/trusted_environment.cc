@@ -53,13 +53,19 @@ std::string ValueOf(const char* name) {
 
 bool IsRelative(const std::string& path) { return !path.empty() && path.front() != '/'; }
 
-bool HasRelativePart(const std::string& list) {
-  std::istringstream parts(list);
-  for (std::string part; std::getline(parts, part, ':');) {
-    if (part.empty() || IsRelative(part)) return true;
+// A list without its parts that are not absolute.
+struct ListOfPaths {
+  explicit ListOfPaths(const std::string& list) {
+    std::istringstream parts(list);
+    for (std::string part; std::getline(parts, part, ':');) {
+      if (IsRelative(part)) relative.push_back(part);
+      if (!part.empty() && !IsRelative(part)) absolute += (absolute.empty() ? "" : ":") + part;
+    }
   }
-  return !list.empty() && list.back() == ':';
-}
+
+  std::string absolute;
+  std::vector<std::string> relative;
+};
 
 // A name is taken for that of a file in the current folder where there is one.
 bool IsFoundHere(const std::string& name) {
@@ -69,11 +75,26 @@ bool IsFoundHere(const std::string& name) {
 }
 
 void TakeOut(const char* name, std::vector<std::string>* told) {
-  told->push_back(fmt::format(
-      "{} is left out of account: an absolute path is expected, found '{}', which would "
-      "be looked for in the current folder",
-      name, PrintableUtf8(ValueOf(name))));
+  told->push_back(RelativePathIsIgnored(name, ValueOf(name)));
   ::unsetenv(name);
+}
+
+// An empty part, which a line of a shell's start-up file such as X="$X:/opt/share" leaves, means
+// the current folder to some libraries. Nobody asked for that, and it is taken out without a word.
+void KeepAbsoluteParts(const char* name, std::vector<std::string>* told) {
+  const std::string value = ValueOf(name);
+  const ListOfPaths list(value);
+  for (const std::string& part : list.relative) {
+    told->push_back(fmt::format(
+        "{}: its part '{}' is left out of account, because it would be looked for in the current "
+        "folder; an absolute path is expected",
+        name, PrintableUtf8(part)));
+  }
+  if (list.absolute.empty()) {
+    ::unsetenv(name);
+  } else if (list.absolute != value) {
+    ::setenv(name, list.absolute.c_str(), 1);
+  }
 }
 
 // PoCL's cache holds what it loads as code.
@@ -93,13 +114,20 @@ void GivePoclAPrivateCache() {
 
 }  // namespace
 
+std::string RelativePathIsIgnored(const std::string& name, const std::string& value) {
+  return fmt::format(
+      "{} is left out of account: an absolute path is expected, found '{}', which would "
+      "be looked for in the current folder",
+      name, PrintableUtf8(value));
+}
+
 std::vector<std::string> DistrustRelativePaths() {
   std::vector<std::string> told;
   for (const char* name : kPaths) {
     if (IsRelative(ValueOf(name))) TakeOut(name, &told);
   }
   for (const char* name : kPathLists) {
-    if (HasRelativePart(ValueOf(name))) TakeOut(name, &told);
+    KeepAbsoluteParts(name, &told);
   }
   for (const char* name : kPathsOrNames) {
     std::istringstream parts(ValueOf(name));

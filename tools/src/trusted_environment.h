@@ -13,6 +13,9 @@ namespace thicklens::tools {
 // line for each that was taken out. To be called before any library reads them.
 std::vector<std::string> DistrustRelativePaths();
 
+// The line about a variable that holds one path.
+std::string RelativePathIsIgnored(const std::string& name, const std::string& value);
+
 }  // namespace thicklens::tools
 
 #endif  // THICKLENS_TOOLS_TRUSTED_ENVIRONMENT_H_
