@@ -19,6 +19,8 @@ constexpr double kGaussianReach = 10;
 constexpr int kGaussianNodes = 72;
 // Legendre's rule of n nodes in A^2 is exact to rounding for J0(x A/sigma) up to about x = n - 30.
 constexpr int kDiscNodesBeyond = 40;
+// Below it the series for the disc's edge is not good enough.
+constexpr double kLeastDiscReach = 40;
 constexpr int kMomentNodes = 32;
 
 // Nodes at A^2 of a T of sigma 1, and their weights, which sum to 1.
@@ -43,6 +45,9 @@ Rule GaussRule(Psf psf, int nodes) {
   rule.at = psf == Psf::kDisc ? Eigen::ArrayXd(2 * (1 + rule.at)) : Eigen::ArrayXd(2 * rule.at);
   return rule;
 }
+
+// See PupilProfile::DiscEdge.
+using DiscEdge = PupilProfile::DiscEdge;
 
 // A law with a T of a given sigma: A^2, mm^2, and the light at each node (any sum).
 struct Light {
@@ -76,6 +81,47 @@ class Law {
     light.share /= light.share.sum();
     light.second_moment = 0.5 * (light.share * light.square).sum();
     return light;
+  }
+
+  // Of a disc: the density of the light over u = A^2/sigma^2 at its edge, R^2, with its first two
+  // derivatives. Inside the edge it is w(u)/(sum of w over the rule) times the uniform density.
+  DiscEdge EdgeOf(const Light& light, double transmission_sigma_mm) const {
+    const double sigma2 = light.second_moment;                             // mm^2
+    const double end = 4 * transmission_sigma_mm * transmission_sigma_mm;  // of the rule, mm^2
+    // w = product of (1 + A^2/a)^-m.
+    double a[2] = {distance2_, focus2_}, m[2] = {0, 0};
+    double edge = end, share = 1;
+    switch (law_) {
+      case PupilLaw::kUniform:
+        break;
+      case PupilLaw::kPaper:
+        m[0] = 1.5, m[1] = 0.5;
+        break;
+      case PupilLaw::kCosineFourth:
+        m[0] = 2;
+        break;
+      case PupilLaw::kSineCondition:  // uniform over v = A^2/(1 + A^2/d1^2): w = dv/dA^2
+        m[0] = 2;
+        edge = end / (1 - end / distance2_);
+        break;
+    }
+    const auto w = [&](const Eigen::ArrayXd& square) {
+      return Eigen::ArrayXd((1 + square / a[0]).pow(-m[0]) * (1 + square / a[1]).pow(-m[1]));
+    };
+    if (law_ != PupilLaw::kSineCondition)
+      share = (rule_.weight * w(transmission_sigma_mm * transmission_sigma_mm * rule_.at)).sum();
+    DiscEdge result;
+    result.radius = std::sqrt(edge / sigma2);
+    result.density = w(Eigen::ArrayXd::Constant(1, edge))[0] / share * sigma2 / end;
+    double first = 0, second = 0;  // derivatives of ln w by u
+    for (int i = 0; i < 2; ++i) {
+      const double reach = (a[i] + edge) / sigma2;
+      first -= m[i] / reach;
+      second += m[i] / (reach * reach);
+    }
+    result.slope = result.density * first;
+    result.bend = result.density * (first * first + second);
+    return result;
   }
 
   // The mean of A over i. Of a weight w(A, i) it is E[A_x d ln w/d i_x]; of the sine condition the
@@ -172,7 +218,7 @@ PupilProfile::PupilProfile(PupilLaw law, const PupilOptics& optics, double large
                     optics.sigma_mm, optics.focus_depth_mm, optics.image_distance_mm));
   }
   const bool is_disc = psf_ == Psf::kDisc;
-  const double reach = is_disc ? std::max(largest_x, 1.0) : kGaussianReach;
+  const double reach = is_disc ? std::max(largest_x, kLeastDiscReach) : kGaussianReach;
   const Rule rule =
       GaussRule(psf_, is_disc ? static_cast<int>(reach) + kDiscNodesBeyond : kGaussianNodes);
   const Law of_light(law, optics, rule);
@@ -180,6 +226,7 @@ PupilProfile::PupilProfile(PupilLaw law, const PupilOptics& optics, double large
   const Light light = of_light.Of(transmission_mm);
   transmission_ratio_ = transmission_mm / optics.sigma_mm;
   mean_per_landing_ = of_light.MeanPerLanding(light);
+  if (is_disc) edge_ = of_light.EdgeOf(light, transmission_mm);
   for (Eigen::Index i = 0; i < light.square.size(); ++i) {
     if (light.share[i] > 0)
       rings_.push_back({std::sqrt(light.square[i]) / optics.sigma_mm, light.share[i]});
@@ -195,10 +242,18 @@ double PupilProfile::Sum(double x) const {
   return sum;
 }
 
+// Integration by parts of H = integral of p(u) J0(x sqrt(u)) du from 0 to R^2, again and again:
+// the sum over k of (-1)^k 2^(k + 1) p^(k)(R^2) R^(k + 1) J_(k+1)(x R)/x^(k + 1).
+double PupilProfile::TransferOfEdge(double x) const {
+  const double r = edge_.radius, at = x * r, per_x = r / x;
+  return per_x * (2 * edge_.density * ::j1(at) +
+                  per_x * (-4 * edge_.slope * ::jn(2, at) + per_x * 8 * edge_.bend * ::jn(3, at)));
+}
+
 double PupilProfile::Transfer(double x) const {
   const double position = x / kTableStep;
   const auto node = static_cast<std::size_t>(position);
-  if (node + 4 > table_.size()) return psf_ == Psf::kDisc ? Sum(x) : 0;
+  if (node + 4 > table_.size()) return psf_ == Psf::kDisc ? TransferOfEdge(x) : 0;
   const double t = position - static_cast<double>(node);
   const double* h = &table_[node];  // at t = -1, 0, 1, 2
   return -t * (t - 1) * (t - 2) / 6 * h[0] + (t + 1) * (t - 1) * (t - 2) / 2 * h[1] -

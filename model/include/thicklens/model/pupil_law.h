@@ -44,13 +44,14 @@ inline constexpr double kWidestPupil = 0.3;
 // tests.
 class PupilProfile {
  public:
-  // `largest_x`: how far Transfer is needed. Throws Error unless sigma, zf and d1 are > 0 and a T
-  // with that second moment exists.
+  // `largest_x`: how far Transfer of a disc is to be exact. Throws Error unless sigma, zf and d1
+  // are > 0 and a T with that second moment exists.
   PupilProfile(PupilLaw law, const PupilOptics& optics, double largest_x = 10);
 
   // The transfer function of the blur at x = 2 pi sigma_px nu, sigma_px the blur's sigma on the
-  // sensor, nu in cycles per px. Error below 1e-8 up to `largest_x`; 0 beyond x = 10 of a Gaussian
-  // T.
+  // sensor, nu in cycles per px. Error below 1e-8 up to `largest_x`. Beyond x = 10, that of a
+  // Gaussian T is 0; beyond `largest_x` (or 40), that of a disc is a series about its edge, with an
+  // error below 1e-6 (1e-9 from x = 100 on).
   double Transfer(double x) const;
 
   struct Ring {
@@ -58,6 +59,12 @@ class PupilProfile {
     double share = 0;   // of the light; all shares sum to 1
   };
   const std::vector<Ring>& rings() const { return rings_; }
+
+  // Of a disc: its radius R over sigma, and the density of the light over u = (A/sigma)^2 at R^2
+  // with its first two derivatives. Farther out there is no light.
+  struct DiscEdge {
+    double radius = 0, density = 0, slope = 0, bend = 0;
+  };
 
   // T's own sigma over sigma.
   double transmission_ratio() const { return transmission_ratio_; }
@@ -67,10 +74,12 @@ class PupilProfile {
 
  private:
   double Sum(double x) const;
+  double TransferOfEdge(double x) const;
 
   Psf psf_;
   std::vector<Ring> rings_;
   double transmission_ratio_ = 1, mean_per_landing_ = 0;
+  DiscEdge edge_;
   std::vector<double> table_;  // Transfer at multiples of the step, from one step below 0
 };
 
