@@ -362,16 +362,23 @@ class LawFinder {
     result->message = fmt::format(
         "the image scale does not follow the readings: only {} of {} frames agree with one law "
         "(1/z, reversed or constant){}. Check that every frame has its own reading",
-        following, points_.size(),
-        FollowsInAnotherOrder() ? "; in another order all of them would: the readings belong to "
-                                  "other frames of the sweep (a table sorted otherwise)"
-                                : "");
+        following, points_.size(), InAnotherOrder());
   }
 
-  // The smallest reading to the largest picture and so on (or the other way round): if the law then
-  // holds far better than chance lets sorted values follow it, the readings are those of the sweep
-  // and stand beside other frames.
-  bool FollowsInAnotherOrder() const {
+  std::string InAnotherOrder() const {
+    const std::size_t following = std::max(FollowingWhenSorted(true), FollowingWhenSorted(false));
+    if (static_cast<double>(following) < kSortedFollowing * static_cast<double>(points_.size()))
+      return "";
+    return fmt::format(
+        "; in another order {} of them would: the readings belong to other frames of the sweep (a "
+        "table sorted otherwise)",
+        following == points_.size() ? "all" : std::to_string(following));
+  }
+
+  // How many frames follow the law if the smallest reading belongs to the largest image and so on
+  // (or to the smallest): if they are far more than chance lets sorted values follow it, the
+  // readings are those of the sweep and stand beside other frames.
+  std::size_t FollowingWhenSorted(bool larger_reading_is_farther) const {
     std::vector<double> readings, inverses;
     for (const Point& p : points_) {
       readings.push_back(p.reading_mm);
@@ -379,22 +386,24 @@ class LawFinder {
     }
     std::sort(readings.begin(), readings.end());
     std::sort(inverses.begin(), inverses.end());
+    if (!larger_reading_is_farther) std::reverse(inverses.begin(), inverses.end());
+    const double sign = larger_reading_is_farther ? 1 : -1;
     Points sorted = points_;
     for (std::size_t i = 0; i < sorted.size(); ++i) {
       sorted[i].reading_mm = readings[i];
       sorted[i].inverse_scale = inverses[i];
     }
     const Line line = FitLine(sorted, reading_sigma_mm_);
-    if (!(line.slope > kSignificant * line.slope_sigma)) return false;
-    const Law law{line.intercept / line.slope, 1 / line.slope};
+    if (!(sign * line.slope > kSignificant * line.slope_sigma)) return 0;
+    const Law law{sign * line.intercept / line.slope, sign / line.slope};
     std::size_t following = 0;
     for (const Point& p : sorted) {
       // Sorted noise bends at both ends by more than a hundredth of its range.
       const double within_mm = std::max(kSortedWithin * range_mm_,
                                         kFollowsSigmas * ReadingSigma(p, law, reading_sigma_mm_));
-      following += std::abs(ReadingError(p, law, 1)) < within_mm ? 1U : 0U;
+      following += std::abs(ReadingError(p, law, sign)) < within_mm ? 1U : 0U;
     }
-    return static_cast<double>(following) >= kSortedFollowing * static_cast<double>(sorted.size());
+    return following;
   }
 
   Points points_;

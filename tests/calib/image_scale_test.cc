@@ -183,6 +183,37 @@ TEST(FitScaleLaw, ReadingsInARandomOrderFollowNoLaw) {
   }
 }
 
+// Frames taken at even steps of 1/z, whose table is sorted the wrong way round or in no way at all:
+// the readings are those of the sweep. Mirrored, such readings lie on no line.
+TEST(FitScaleLaw, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
+  for (const BenchDirection direction : {BenchDirection::kAway, BenchDirection::kToward}) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      const double sign = model::DirectionSign(direction);
+      std::vector<ScaleSample> samples(31);
+      std::vector<double> readings;
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        const double depth_mm = 1 / (1 / 300.0 - static_cast<double>(i) * 5e-5);
+        samples[i].frame = i;
+        samples[i].scale = samples[i].registration.scale = 400 / depth_mm;
+        readings.push_back(sign * (depth_mm - 100));
+      }
+      AddScaleErrors(3e-5, seed, &samples);
+      std::mt19937 random(seed);
+      std::shuffle(readings.begin(), readings.end(), random);
+      for (std::size_t i = 0; i < samples.size(); ++i) samples[i].reading_mm = readings[i];
+      const ScaleLaw law = FitScaleLaw(samples, 0, 0.05, direction);
+      EXPECT_FALSE(law.done);
+      EXPECT_THAT(law.message, HasSubstr("in another order all of them would"))
+          << model::BenchDirectionName(direction) << ", seed " << seed;
+      // Two frames more that follow nothing.
+      samples[3].reading_mm = sign * 1900;
+      samples[9].reading_mm = sign * 1000;
+      const ScaleLaw most = FitScaleLaw(samples, 0, 0.05, direction);
+      EXPECT_THAT(most.message, Not(HasSubstr("all of them")));
+    }
+  }
+}
+
 // Readings on a line but for errors that nobody stated. What is told is about their size, and where
 // it is stated the law holds.
 TEST(FitScaleLaw, CoarseReadingsAreToldToStateTheirError) {
