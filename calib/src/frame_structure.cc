@@ -386,6 +386,15 @@ bool FixedStructureIsExcluded(const FrameStructureFinding& structure) {
   return IsExcludedBy(structure.fixed_structure, kLeastFixed);
 }
 
+bool BandsHideFrames(const FrameStructureFinding& structure) {
+  constexpr double kFrames = 0.035;
+  return structure.HasBands() && structure.bands->value > kFrames;
+}
+bool BandsHideMostFrames(const FrameStructureFinding& structure) {
+  constexpr double kMostFrames = 0.09;
+  return structure.HasBands() && structure.bands->value > kMostFrames;
+}
+
 FrameStructureFinding MeasureStructure(const FramePlaces& places) {
   return Structure(places).Run();
 }

@@ -98,15 +98,18 @@ std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameM
   if (!was_tried || law.done || law.shows_no_scale || IsStatedEdge(sweep) ||
       2 * registered >= used.size())
     return "";
+  // Of what is seen only strong bands are known to keep frames from being registered.
   const std::string seen = StructureInWords(structure);
-  return fmt::format(
-      "only {} of {} frames could be registered to one another{}", registered, used.size(),
-      seen.empty()
-          ? std::string(": every frame must show the same part of the target, sharp enough to be "
-                        "recognised. If it is a lone edge, which shows no image scale, state "
-                        "target: knife-edge or printed-edge; if the images look torn or scrambled, "
-                        "their files were decoded wrongly")
-          : ": " + seen);
+  constexpr char kNeeded[] =
+      "every frame must show the same part of the target, sharp enough to be recognised. If it is "
+      "a lone edge, which shows no image scale, state target: knife-edge or printed-edge; if the "
+      "images look torn or scrambled, their files were decoded wrongly";
+  return fmt::format("only {} of {} frames could be registered to one another{}", registered,
+                     used.size(),
+                     seen.empty() ? fmt::format(": {}", kNeeded)
+                     : BandsHideMostFrames(structure)
+                         ? fmt::format(": {}", seen)
+                         : fmt::format(": {}. If that is not the cause: {}", seen, kNeeded));
 }
 
 void ForgetScales(const FocusSweep& sweep, std::vector<ScaleSample>* samples, ScaleLaw* law) {
@@ -163,10 +166,13 @@ void RejectUnregistered(const std::vector<ScaleSample>& samples,
                         const ScaleLaw& law, const FrameStructureFinding& structure,
                         std::vector<FrameMeasurement>* frames) {
   if (!law.done) return;
-  const std::string why =
-      structure.HasBands()
-          ? "its rows or columns brighten in bands of their own"
-          : "it shows another part of the target, or too little of it to be recognised";
+  std::string why = "it shows another part of the target, or too little of it to be recognised";
+  const std::string bands = "its rows or columns brighten in bands of their own";
+  if (BandsHideFrames(structure)) {
+    why = bands;
+  } else if (structure.HasBands()) {
+    why = bands + ", or " + why;
+  }
   std::set<std::size_t> registered;
   for (const ScaleSample& sample : samples) registered.insert(sample.frame);
   for (const std::size_t i : used) {

@@ -243,6 +243,9 @@ class Comparison {
 };
 
 std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) {
+  const double depth_mm = causes.reference_depth_mm;
+  const double f1_mm = sweep.camera.lens.front_focal_length_mm;
+  const bool is_in_front = depth_mm > f1_mm;
   std::string evidence;
   if (causes.chi2_target - causes.chi2_lens >= Diagnosis::kDecisive) {
     evidence =
@@ -252,16 +255,19 @@ std::string LensMovesReason(const FocusSweep& sweep, const ScaleCauses& causes) 
   if (causes.blur_slope) {
     evidence += fmt::format(
         "{}the blur grows with it as behind a lens that moves (blur ratio about {:.2g}); a target "
-        "that moves would need a blur ratio of {:.2g}",
+        "that moves would {}",
         evidence.empty() ? "" : ", and ", causes.blur_slope->RatioOfMovingLens(sweep.camera),
-        causes.blur_slope->RatioOfMovingTarget(sweep.camera, causes.reference_depth_mm));
+        is_in_front ? fmt::format("need a blur ratio of {:.2g}",
+                                  causes.blur_slope->RatioOfMovingTarget(sweep.camera, depth_mm))
+                    : fmt::format("be at {:.3g} mm, nearer than the focal length ({:.3g} mm), "
+                                  "where no image forms",
+                                  depth_mm, f1_mm));
   }
   if (evidence.empty()) {
     evidence = fmt::format(
         "as that of a target that moves, it would put the target at {:.3g} mm, nearer than the "
-        "focal "
-        "length",
-        causes.reference_depth_mm);
+        "focal length",
+        depth_mm);
   }
   std::string meaning;
   const double of_dioptres = 1000 / sweep.camera.lens.rear_focal_length_mm;

@@ -96,8 +96,11 @@ SharpestReading FindSharpestReading(const std::vector<FrameMeasurement>& frames,
   const std::vector<Sharpness> samples = SamplesOf(
       frames, used, [](const FrameMeasurement& frame) { return frame.normalised_edge_slope; });
   if (samples.size() < kFewestFrames) {
-    result.message =
-        fmt::format("{} frames have edges, {} are needed", samples.size(), kFewestFrames);
+    result.message = used.size() < kFewestFrames
+                         ? fmt::format("{} of {} frames passed the checks, {} are needed",
+                                       used.size(), frames.size(), kFewestFrames)
+                         : fmt::format("{} of {} frames have edges, {} are needed", samples.size(),
+                                       used.size(), kFewestFrames);
     return result;
   }
   const std::size_t top = TopOf(samples);

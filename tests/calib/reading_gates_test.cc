@@ -264,7 +264,13 @@ TEST(RegistrationAdvice, SpeaksWhereFewRegisterAndNoLawIsFound) {
               AllOf(HasSubstr("only 10 of 21 frames could be registered to one another: whole rows "
                               "brighten together by 10 %"),
                     HasSubstr("rolling shutter"), Not(HasSubstr("knife-edge"))))
-      << "what is seen comes before what is not";
+      << "such bands keep most frames from being registered";
+  bench.structure.bands = model::Estimate{0.05, 0.005};
+  EXPECT_THAT(advice(), AllOf(HasSubstr("whole rows brighten together by 5 %"),
+                              HasSubstr("If that is not the cause: every frame must show")));
+  bench.structure.bands.reset();
+  bench.structure.vignetting = model::Estimate{-0.3, 0.01};
+  EXPECT_THAT(advice(), AllOf(HasSubstr("vignetting"), HasSubstr("If that is not the cause")));
   bench.structure = {};
   bench.sweep.target = model::SweepTarget::kKnifeEdge;
   EXPECT_EQ(advice(), "") << "it is stated already";
@@ -293,7 +299,11 @@ TEST(RejectUnregistered, NamesFramesThatShowSomethingElseWhereTheOthersFollowALa
   bench.law.done = true;
   bench.structure.bands = model::Estimate{0.1, 0.01};
   reject();
-  EXPECT_THAT(bench.frames[6].rejection, HasSubstr("bands"));
+  EXPECT_THAT(bench.frames[6].rejection, AllOf(HasSubstr("bands"), Not(HasSubstr("another part"))));
+  bench.structure.bands = model::Estimate{0.02, 0.002};
+  reject();
+  EXPECT_THAT(bench.frames[6].rejection,
+              AllOf(HasSubstr("bands"), HasSubstr("or it shows another part of the target")));
   bench.structure = {};
   reject();
   EXPECT_THAT(bench.frames[6].rejection,

@@ -75,7 +75,17 @@ TEST(SharpestReading, FourFramesAreTooFew) {
   const auto frames = Frames(110, 108, 1, 4, 0, 1);
   const SharpestReading found = FindSharpestReading(frames, All(frames));
   EXPECT_FALSE(found.done);
-  EXPECT_THAT(found.message, HasSubstr("4 frames have edges, 5 are needed"));
+  EXPECT_THAT(found.message, HasSubstr("4 of 4 frames passed the checks, 5 are needed"));
+}
+
+// A sweep whose light was refused has no frames, which says nothing about edges.
+TEST(SharpestReading, SaysWhetherFramesOrEdgesAreMissing) {
+  auto frames = Frames(110, 95, 1, 31, 0, 1);
+  EXPECT_THAT(FindSharpestReading(frames, {}).message,
+              HasSubstr("0 of 31 frames passed the checks"));
+  for (std::size_t i = 3; i < frames.size(); ++i) frames[i].normalised_edge_slope = 0;
+  EXPECT_THAT(FindSharpestReading(frames, All(frames)).message,
+              HasSubstr("3 of 31 frames have edges, 5 are needed"));
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ struct Verification {
   int degrees_of_freedom = 0;                 // parameters that are counted
   double chi_square = 0;
   double p_value = 1;
-  // The change of the blur far from focus, px of sigma, by the smallest detectable change of d1.
+  // The blur, px of sigma, that the smallest detectable change of d1 causes at the depth of focus.
   double detectable_blur_px = 0;
   std::vector<std::string> warnings;  // one line each
 };
