@@ -308,8 +308,9 @@ class LawFinder {
     } else {
       result->kind = ScaleKind::kReversed;
       result->message = fmt::format(
-          "the target looks larger at larger readings, so direction must be '{}', not '{}' (or the "
+          "the target looks {} at larger readings, so direction must be '{}', not '{}' (or the "
           "readings are reversed)",
+          line_.slope > 0 ? "smaller" : "larger",
           direction_ == model::BenchDirection::kAway ? "toward" : "away",
           model::BenchDirectionName(direction_));
     }
