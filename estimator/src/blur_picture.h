@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "scene_projection.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
 

@@ -1,7 +1,7 @@
 #ifndef THICKLENS_ESTIMATOR_SRC_ESTIMATE_INPUT_H_
 #define THICKLENS_ESTIMATOR_SRC_ESTIMATE_INPUT_H_
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
 

@@ -1,4 +1,5 @@
-// FillHoles: depth where there is none, along the surfaces around it.
+#include "thicklens/estimator/fill_holes.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +13,6 @@
 #include "hole_territories.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/estimate_checks.h"
-#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 namespace {

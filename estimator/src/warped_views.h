@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
 

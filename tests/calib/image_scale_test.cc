@@ -289,12 +289,14 @@ TEST(FitScaleLaw, RefusesAReversedScaleAndNamesTheDirection) {
                                     BenchDirection::kAway);
   EXPECT_FALSE(away.done);
   EXPECT_EQ(away.kind, ScaleKind::kReversed);
-  EXPECT_THAT(away.message, HasSubstr("larger at larger readings, so direction must be 'toward', not"));
+  EXPECT_THAT(away.message,
+              HasSubstr("larger at larger readings, so direction must be 'toward', not"));
   const ScaleLaw toward = FitScaleLaw(Samples(0, BenchDirection::kAway, 21, 0.05, 1), 10, 0.05,
                                       BenchDirection::kToward);
   EXPECT_FALSE(toward.done);
   EXPECT_EQ(toward.kind, ScaleKind::kReversed);
-  EXPECT_THAT(toward.message, HasSubstr("smaller at larger readings, so direction must be 'away', not"));
+  EXPECT_THAT(toward.message,
+              HasSubstr("smaller at larger readings, so direction must be 'away', not"));
 }
 
 // Registrations on a lone edge can give any scale along it.

@@ -1,4 +1,6 @@
 // Depth where there is none: FillHoles against maps of which the truth is known.
+#include "thicklens/estimator/fill_holes.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,7 +14,6 @@
 #include <vector>
 
 #include "support/error_message.h"
-#include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -18,6 +18,7 @@
 #include "support/error_message.h"
 #include "thicklens/error.h"
 #include "thicklens/estimator/compare.h"
+#include "thicklens/estimator/fill_holes.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/scene_simulator.h"
 

@@ -5,7 +5,7 @@
 #include "attribution.h"
 #include "memory_available.h"
 #include "stopwatch.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field_grid.h"
 

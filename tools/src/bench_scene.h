@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"

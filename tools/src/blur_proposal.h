@@ -6,7 +6,7 @@
 
 #include "light_field_options.h"
 #include "thicklens/estimator/blur_check.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::tools {
 

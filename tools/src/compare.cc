@@ -25,7 +25,7 @@
 #include "option_values.h"
 #include "svg_plot.h"
 #include "thicklens/error.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {

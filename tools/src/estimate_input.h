@@ -9,7 +9,7 @@
 #include "estimate_options.h"
 #include "light_field_options.h"
 #include "thicklens/estimator/aperture_blur.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::tools {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimate_options.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/light_field.h"
 

@@ -9,6 +9,7 @@
 #include "naming_the_file.h"
 #include "option_values.h"
 #include "thicklens/error.h"
+#include "thicklens/estimator/fill_holes.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens::tools {

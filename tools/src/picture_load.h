@@ -1,7 +1,7 @@
 #ifndef THICKLENS_TOOLS_PICTURE_LOAD_H_
 #define THICKLENS_TOOLS_PICTURE_LOAD_H_
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "time_law.h"
 
 namespace thicklens::tools {

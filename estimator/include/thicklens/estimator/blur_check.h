@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
 

@@ -1,19 +1,16 @@
 #ifndef THICKLENS_ESTIMATOR_ESTIMATE_H_
 #define THICKLENS_ESTIMATOR_ESTIMATE_H_
 
-#include <Eigen/Core>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/scene.h"
 
 namespace thicklens::estimator {
 
@@ -68,23 +65,6 @@ struct BlockOptions {
   bool IsValid(std::string* why) const;
 };
 
-// What the estimate starts from.
-struct EstimateInput {
-  model::LinearPicture picture;
-  DisparityMap disparity;   // without holes, of the picture's size
-  Eigen::ArrayXXd weights;  // V x U, sum 1, >= 0
-  model::TransferCurve transfer = model::TransferCurve::Srgb();
-  // Both or none. S x T of the grid is the size of the picture.
-  std::optional<model::LightFieldGrid> grid;
-  std::optional<model::Camera> camera;
-  std::optional<model::Camera>
-      falloff_camera;  // of the fall-off, if it is another, for example thin
-
-  const model::Camera& camera_of_falloff() const {
-    return falloff_camera ? *falloff_camera : *camera;
-  }
-};
-
 struct BlockReport {
   int x = 0, y = 0, width_px = 0, height_px = 0;
   int unknowns = 0;
@@ -126,15 +106,6 @@ struct EstimateSummary {
 // rcond below the limit (naming the block), and a memory limit that no block fits.
 model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOptions& options,
                                    kernels::Backend* backend, EstimateSummary* summary);
-
-// A photograph as radiance: divided by what the irradiance fall-off of (12) leaves of a uniform
-// radiance at each of its pixels.
-model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
-                                    const model::LightFieldGrid& grid, const model::Camera& camera,
-                                    const Eigen::ArrayXXd& weights, int threads);
-
-// The picture warped to every view: the prior of the estimate, and the baseline DIBR.
-model::LightField WarpedLightField(const EstimateInput& input, bool falloff, int threads);
 
 }  // namespace thicklens::estimator
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::estimator {
 

@@ -1,7 +1,7 @@
 #ifndef THICKLENS_ESTIMATOR_GRID_SOLVER_H_
 #define THICKLENS_ESTIMATOR_GRID_SOLVER_H_
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/functional_solver.h"
 
 namespace thicklens::estimator {

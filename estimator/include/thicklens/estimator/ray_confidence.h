@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {

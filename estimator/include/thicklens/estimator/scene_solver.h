@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/ray_confidence.h"
 #include "thicklens/kernels/device.h"
 

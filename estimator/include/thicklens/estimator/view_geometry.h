@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -36,19 +35,6 @@ DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vecto
 // 0 in an integer map. Throws Error if all are holes.
 DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, double offset_px);
 
-// Holes (NaN) filled along the surfaces around them, never between two. Each pixel goes with one of
-// the known pixels around the hole, that to which the shortest way leads without crossing edges of
-// the picture; where the picture does not tell, with the farther surface, since depth sensors are
-// blind beside near things. Inside of one surface the plane through it, fitted with its noise in
-// mind, is bent to meet its rims (the more and the larger the holes are, the nearer to the rims
-// alone); neighbours belong to two surfaces where their disparities differ by more than six times
-// the map's noise, at least .2, at most 1 px per view step. `picture` shows what the map is the
-// depth of. `filled` (may be null) is told how many. No hole is filled with less than
-// `at_infinity`, the disparity of what is infinitely far, where that is known. Throws Error if all
-// are holes or the sizes differ.
-DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
-                       std::size_t* filled,
-                       double at_infinity = -std::numeric_limits<double>::infinity());
 // The disparity on that grid of what is infinitely far, in the unit of DisparityOnGrid.
 double DisparityAtInfinity(const model::LightFieldGrid& grid);
 
