@@ -30,19 +30,31 @@ function(thicklens_unity_build target)
   endif()
 endfunction()
 
-# thicklens_module(<name> SOURCES <files...> HEADERS <files below include/...> PRECOMPILE <headers of libraries...>)
+# thicklens_module(<name> SOURCES <files...> HEADERS <files below [ROOM/]include/...> PRECOMPILE <headers of libraries...>)
 function(thicklens_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PRECOMPILE" ${ARGN})
   set(target thicklens_${name})
   add_library(${target} STATIC ${ARG_SOURCES})
   add_library(thicklens::${name} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
-  target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS include FILES ${ARG_HEADERS})
+  # Each room has its public headers in a folder include/ of its own.
+  set(include_dirs ${ARG_HEADERS})
+  list(TRANSFORM include_dirs REPLACE "include/thicklens/.*$" "include")
+  list(REMOVE_DUPLICATES include_dirs)
+  target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS ${include_dirs} FILES ${ARG_HEADERS})
+  foreach(dir IN LISTS include_dirs)
+    target_include_directories(
+      ${target} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/${dir}>)
+  endforeach()
+  # Private headers are included by their path in the repository.
   target_include_directories(
     ${target}
-    PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>
-           $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
-    PRIVATE src)
+    PUBLIC $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+    PRIVATE "${PROJECT_SOURCE_DIR}")
+  # Those of a module without rooms are included by their name.
+  if(IS_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/src")
+    target_include_directories(${target} PRIVATE src)
+  endif()
   target_compile_features(${target} PUBLIC cxx_std_17)
   thicklens_compile_settings(${target})
   # What takes longest to read of what most files include. Each still includes what it uses: files are
