@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <mutex>
@@ -11,11 +10,10 @@
 #include <utility>
 
 #include "opencl_program.h"
+#include "opencl_use.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::atomic<bool> opencl_in_use{false};
 
 constexpr int kLeastMajor = 1;
 constexpr int kLeastMinor = 2;
@@ -212,9 +210,6 @@ DeviceSurvey SurveyHere() {
 }
 
 }  // namespace
-
-void SetOpenClInUse() { opencl_in_use = true; }
-bool IsOpenClInUse() { return opencl_in_use; }
 
 std::string PlatformLine(int platform, const std::string& name) {
   return fmt::format("platform\t{}\t{}\n", platform, OneLine(name));

@@ -7,6 +7,7 @@
 
 #include "device_survey.h"
 #include "opencl_program.h"
+#include "opencl_use.h"
 #include "thicklens/error.h"
 
 namespace thicklens::kernels {

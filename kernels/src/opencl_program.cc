@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "device_survey.h"
 #include "guarded_child.h"
+#include "opencl_use.h"
 #include "thicklens/error.h"
 
 namespace thicklens::kernels {

@@ -21,6 +21,7 @@
 #include "device_survey.h"
 #include "guarded_child.h"
 #include "opencl_program.h"
+#include "opencl_use.h"
 #include "support/error_message.h"
 #include "thicklens/cancel.h"
 #include "thicklens/error.h"
