@@ -97,13 +97,6 @@ double Quantile(const cv::Mat& values, double fraction) {
   return nth(&sorted, rank);
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 cv::Mat Smoothed(const cv::Mat& grey, double sigma_px) {
   cv::Mat smoothed;
   const int radius = static_cast<int>(std::ceil(5 * sigma_px));

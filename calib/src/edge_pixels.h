@@ -18,7 +18,6 @@ std::vector<cv::Point> EdgePixels(const Gradient& gradient, double threshold, in
 
 // The value below which a fraction of a CV_32F matrix lies.
 double Quantile(const cv::Mat& values, double fraction);
-double Median(std::vector<double> values);
 
 // Gaussian smoothing of a CV_32F frame; sigma >= 0.8 px, where a sampled kernel has the variance it
 // should have.

@@ -10,11 +10,11 @@
 
 #include "blur_choices.h"
 #include "blur_tails.h"
-#include "edge_pixels.h"
 #include "floor_choice.h"
 #include "frame_outliers.h"
 #include "misfit_causes.h"
 #include "systematic_parts.h"
+#include "thicklens/model/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -98,7 +98,7 @@ class Solution {
     for (std::size_t i = 1; i < readings.size(); ++i) {
       if (readings[i] > readings[i - 1]) steps.push_back(readings[i] - readings[i - 1]);
     }
-    return Median(steps);
+    return model::Median(steps);
   }
 
   // ---- results ----

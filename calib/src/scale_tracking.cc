@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "coarse_registration.h"
-#include "edge_pixels.h"
 #include "radial_distortion.h"
 #include "registration.h"
 #include "shift_registration.h"
 #include "thicklens/model/parallel.h"
+#include "thicklens/model/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -53,10 +53,10 @@ class ScalePrediction {
       }
     }
     if (slopes.empty()) return;
-    slope_ = Median(slopes);
+    slope_ = model::Median(slopes);
     std::vector<double> intercepts;
     for (const ScaleSample& s : samples) intercepts.push_back(1 / s.scale - slope_ * s.reading_mm);
-    intercept_ = Median(intercepts);
+    intercept_ = model::Median(intercepts);
   }
 
  private:
