@@ -9,7 +9,6 @@
 #include <set>
 
 #include "blur_examples.h"
-#include "edge_pixels.h"
 #include "thicklens/calib/edge_spread.h"
 #include "thicklens/model/parallel.h"
 

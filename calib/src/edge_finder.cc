@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "thicklens/cancel.h"
@@ -149,19 +148,6 @@ std::vector<FrameScale> FrameScales(const cv::Mat& grey) {
     factor *= 2;
   }
   return scales;
-}
-
-float SampleAt(const cv::Mat& grey, const Eigen::Vector2d& at) {
-  const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
-  if (x < 0 || y < 0 || x + 1 >= grey.cols || y + 1 >= grey.rows) {
-    return std::numeric_limits<float>::quiet_NaN();
-  }
-  const float u = static_cast<float>(at.x()) - static_cast<float>(x);
-  const float v = static_cast<float>(at.y()) - static_cast<float>(y);
-  const auto* above = grey.ptr<float>(y);
-  const auto* below = grey.ptr<float>(y + 1);
-  return (1 - v) * ((1 - u) * above[x] + u * above[x + 1]) +
-         v * ((1 - u) * below[x] + u * below[x + 1]);
 }
 
 std::vector<StraightRegion> StraightRegions(const Gradient& gradient, double threshold, int most) {

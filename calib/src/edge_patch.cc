@@ -1,9 +1,10 @@
+#include "edge_patch.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "edge_finder.h"
 #include "thicklens/model/statistics.h"
 
 // An edge's surroundings resampled along its normal, and what they show.
@@ -205,6 +206,19 @@ class Patch {
 };
 
 }  // namespace
+
+float SampleAt(const cv::Mat& grey, const Eigen::Vector2d& at) {
+  const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
+  if (x < 0 || y < 0 || x + 1 >= grey.cols || y + 1 >= grey.rows) {
+    return std::numeric_limits<float>::quiet_NaN();
+  }
+  const float u = static_cast<float>(at.x()) - static_cast<float>(x);
+  const float v = static_cast<float>(at.y()) - static_cast<float>(y);
+  const auto* above = grey.ptr<float>(y);
+  const auto* below = grey.ptr<float>(y + 1);
+  return (1 - v) * ((1 - u) * above[x] + u * above[x + 1]) +
+         v * ((1 - u) * below[x] + u * below[x + 1]);
+}
 
 std::optional<FeatureCandidate> UndisturbedStep(const FrameScale& scale,
                                                 const StraightRegion& region) {

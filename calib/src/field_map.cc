@@ -9,7 +9,6 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 
-#include "edge_pixels.h"
 #include "evenly_spread.h"
 #include "misfit_causes.h"
 #include "systematic_advice.h"
