@@ -9,6 +9,7 @@
 #include "blur_fit.h"
 #include "frame_store.h"
 #include "spectral_meter.h"
+#include "spectral_options.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/image_scale.h"
 
@@ -82,16 +83,6 @@ struct FittedRegion {
   RelativeBlur blur;
 };
 FittedRegion FitRegion(MeterRegion region, const RelativeBlurOptions& options);
-
-// The shape that is not stated.
-model::Psf OtherPsf(model::Psf psf);
-
-// 2 pi^2 dV nu^2 up to which modes are fitted: below a disc's first zero, and where a Gaussian has
-// not sunk into the noise.
-double UsualBand(model::Psf psf);
-
-// The options that the camera's PSF asks for, at `part` of the usual band.
-RelativeBlurOptions SpectralOptions(model::Psf psf, double floor_variance_px2, double part);
 
 }  // namespace thicklens::calib
 
