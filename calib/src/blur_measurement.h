@@ -10,7 +10,8 @@
 #include "frame_store.h"
 #include "spectral_meter.h"
 #include "spectral_options.h"
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {

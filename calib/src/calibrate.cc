@@ -510,17 +510,6 @@ bool CalibrationOptions::IsValid(std::string* why) const {
   return true;
 }
 
-std::string OutcomeName(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::kOk:
-      return "ok";
-    case Outcome::kPartial:
-      return "partial";
-    default:
-      return "refused";
-  }
-}
-
 Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options) {
   std::string why;
   if (!options.IsValid(&why)) throw Error("calibration options: " + why);

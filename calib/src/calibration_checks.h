@@ -9,7 +9,8 @@
 #include "blur_fit.h"
 #include "reading_gates.h"
 #include "scale_bend.h"
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
 

@@ -3,7 +3,8 @@
 
 #include "blur_measurement.h"
 #include "frame_store.h"
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
 

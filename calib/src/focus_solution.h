@@ -2,7 +2,8 @@
 #define THICKLENS_CALIB_SRC_FOCUS_SOLUTION_H_
 
 #include "blur_measurement.h"
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
 

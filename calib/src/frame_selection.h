@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
+#include "thicklens/calib/frame_gates.h"
 
 namespace thicklens::calib {
 

@@ -15,9 +15,6 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kSignificant = 4;
-constexpr double kLeastVignetting = 0.1;  // of ln: what less does to a scale is below its errors
-constexpr double kLeastBands = 0.01, kLeastFixed = 0.002;
 constexpr double kDarkest = 1e-3;  // of full scale, added before a logarithm
 
 cv::Mat LogLight(const cv::Mat& grey) {
@@ -269,7 +266,8 @@ class Structure {
     if (of_target > kAnisotropy || of_target < 1 / kAnisotropy) return;
     const double ratio = model::Median(ratios);
     if (ratio <= kAnisotropy && ratio >= 1 / kAnisotropy) {
-      result_.bands = model::Estimate{0, kLeastBands / kSignificant};
+      result_.bands = model::Estimate{
+          0, FrameStructureFinding::kLeastBands / FrameStructureFinding::kSignificant};
       return;
     }
     result_.bands_are_columns = ratio < 1;
@@ -368,23 +366,13 @@ bool IsExcludedBy(const std::optional<model::Estimate>& found, double least) {
   return found && std::abs(found->value) + 2 * found->sigma < least;
 }
 
-bool IsThere(const std::optional<model::Estimate>& found, double least) {
-  return found && std::abs(found->value) > std::max(least, kSignificant * found->sigma);
-}
-
 }  // namespace
 
-bool FrameStructureFinding::HasVignetting() const { return IsThere(vignetting, kLeastVignetting); }
-bool FrameStructureFinding::HasBands() const { return IsThere(bands, kLeastBands); }
-bool FrameStructureFinding::HasFixedStructure() const {
-  return IsThere(fixed_structure, kLeastFixed);
-}
-
 bool VignettingIsExcluded(const FrameStructureFinding& structure) {
-  return IsExcludedBy(structure.vignetting, kLeastVignetting);
+  return IsExcludedBy(structure.vignetting, FrameStructureFinding::kLeastVignetting);
 }
 bool FixedStructureIsExcluded(const FrameStructureFinding& structure) {
-  return IsExcludedBy(structure.fixed_structure, kLeastFixed);
+  return IsExcludedBy(structure.fixed_structure, FrameStructureFinding::kLeastFixed);
 }
 
 bool BandsHideFrames(const FrameStructureFinding& structure) {

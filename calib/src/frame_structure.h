@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {

@@ -4,7 +4,8 @@
 #include <string>
 
 #include "blur_measurement.h"
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
 
 namespace thicklens::calib {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "scale_bend.h"
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
 

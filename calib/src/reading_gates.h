@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
 #include "thicklens/calib/image_scale.h"
 
 namespace thicklens::calib {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
 

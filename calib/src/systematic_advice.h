@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "blur_fit.h"
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
 
 namespace thicklens::calib {
 

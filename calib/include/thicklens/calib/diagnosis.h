@@ -52,6 +52,11 @@ struct SharpestReading {
 // What of a frame's picture stays where it is on the sensor while the target changes its size, or
 // belongs to the light and not to the target. Each is there only where it could be measured.
 struct FrameStructureFinding {
+  // What matters to registrations. Of the logarithm: what less does to a scale is below its errors.
+  static constexpr double kLeastVignetting = 0.1;
+  static constexpr double kLeastBands = 0.01, kLeastFixed = 0.002;
+  static constexpr double kSignificant = 4;  // standard deviations
+
   bool measured = false;
   // ln of the light at the region's corner over that at its centre, fixed to the frame: negative
   // where the corners are darker.

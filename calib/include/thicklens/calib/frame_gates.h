@@ -1,10 +1,11 @@
 #ifndef THICKLENS_CALIB_FRAME_GATES_H_
 #define THICKLENS_CALIB_FRAME_GATES_H_
 
-#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
+
+#include "thicklens/calib/frame_statistics.h"
 
 namespace thicklens::calib {
 
@@ -16,27 +17,6 @@ std::string RejectionKind(const std::string& rejection);
 inline constexpr char kKindDark[] = "dark";
 inline constexpr char kKindBlack[] = "black";
 inline constexpr char kKindSaturated[] = "saturated";
-
-// What a frame is like before anything is normalised; levels in units of full scale.
-struct FrameStatistics {
-  double mean_stored = 0;   // mean of the stored grey values
-  double mean_linear = 0;   // mean of the linear grey
-  double contrast = 0;      // standard deviation over mean, linear, of the smoothed frame
-  double noise_sigma = 0;   // of a linear grey pixel, from the flattest parts
-  double top_gradient = 0;  // 99.5 percentile of the gradient magnitude, per px, linear
-  // Standard deviation of what is 4 px or larger (and no shading) over what the noise alone would
-  // give there: a strongly blurred texture still shows.
-  double coarse_texture = 0;
-  double saturated_fraction = 0;  // of all samples, at full scale or piled up on one value
-  double saturation_level = 0;    // stored value of the pile-up; 0 if none
-  // The same at the dark end. A backlit edge is black on one side by right: there the black pixels
-  // fill one side of a straight line.
-  double black_fraction = 0;
-  double black_level = 0;
-  bool black_is_one_side = false;
-  bool is_mosaic = false;          // one channel, in which the colours of a filter alternate
-  std::uint64_t content_hash = 0;  // equal for equal pixels: a picture that was repeated
-};
 
 struct GateOptions {
   double min_mean_stored = 4.0 / 255;    // below: dark

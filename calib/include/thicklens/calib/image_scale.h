@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/model/sweep_file.h"
 
 namespace thicklens::calib {
 

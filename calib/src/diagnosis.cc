@@ -1,8 +1,17 @@
-#include <algorithm>
-
 #include "thicklens/calib/diagnosis.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace thicklens::calib {
+namespace {
+
+bool IsThere(const std::optional<model::Estimate>& found, double least) {
+  return found && std::abs(found->value) >
+                      std::max(least, FrameStructureFinding::kSignificant * found->sigma);
+}
+
+}  // namespace
 
 bool Diagnosis::Names(const std::string& cause) const {
   for (std::size_t i = 0; i < named; ++i) {
@@ -25,6 +34,12 @@ void SortCauses(Diagnosis* diagnosis) {
   for (const CauseFit& cause : causes) {
     if (cause.chi2 - causes.front().chi2 < Diagnosis::kDecisive) ++diagnosis->named;
   }
+}
+
+bool FrameStructureFinding::HasVignetting() const { return IsThere(vignetting, kLeastVignetting); }
+bool FrameStructureFinding::HasBands() const { return IsThere(bands, kLeastBands); }
+bool FrameStructureFinding::HasFixedStructure() const {
+  return IsThere(fixed_structure, kLeastFixed);
 }
 
 }  // namespace thicklens::calib
