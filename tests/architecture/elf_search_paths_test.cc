@@ -1,23 +1,21 @@
 // Where programs and libraries look for libraries: in absolute folders or beside themselves, never
 // in the current folder, which an empty entry means. In the build tree, or in the folder that
 // THICKLENS_INSTALLED names (install_test.cmake).
-#include <elf.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <sstream>
 #include <string>
 #include <system_error>
 #include <vector>
 
-namespace thicklens {
+#include "architecture/elf_bytes.h"
+
+namespace thicklens::architecture {
 namespace {
 
 namespace fs = std::filesystem;
@@ -29,25 +27,10 @@ struct SearchPaths {
   std::vector<std::string> needed;  // DT_NEEDED
 };
 
-template <typename T>
-std::optional<T> At(const std::string& bytes, std::size_t offset) {
-  T value;
-  if (offset > bytes.size() || bytes.size() - offset < sizeof value) return std::nullopt;
-  std::memcpy(&value, bytes.data() + offset, sizeof value);
-  return value;
-}
-
-std::string TextAt(const std::string& bytes, std::size_t offset) {
-  if (offset >= bytes.size()) return "";
-  return {bytes.c_str() + offset, ::strnlen(bytes.c_str() + offset, bytes.size() - offset)};
-}
-
 // The search paths of a program or a shared library of this machine's kind; none: it is neither.
 std::optional<SearchPaths> ReadSearchPaths(const std::string& bytes) {
-  const auto header = At<Elf64_Ehdr>(bytes, 0);
-  if (!header || std::memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 ||
-      header->e_ident[EI_CLASS] != ELFCLASS64 || header->e_ident[EI_DATA] != ELFDATA2LSB ||
-      (header->e_type != ET_EXEC && header->e_type != ET_DYN)) {
+  const auto header = HeaderOf(bytes);
+  if (!header || (header->e_type != ET_EXEC && header->e_type != ET_DYN)) {
     return std::nullopt;
   }
   std::vector<Elf64_Phdr> segments;
@@ -99,14 +82,6 @@ std::vector<std::string> Dubious(const SearchPaths& paths) {
   return dubious;
 }
 
-std::string BytesOf(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  char magic[SELFMAG] = {};
-  if (!file.read(magic, SELFMAG) || std::memcmp(magic, ELFMAG, SELFMAG) != 0) return "";
-  file.seekg(0);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 TEST(ElfSearchPaths, AreAbsoluteOrBesideTheProgram) {
   const char* const installed = std::getenv("THICKLENS_INSTALLED");
   const fs::path root = installed != nullptr
@@ -135,4 +110,4 @@ TEST(ElfSearchPaths, AnEmptyEntryIsSeen) {
 }
 
 }  // namespace
-}  // namespace thicklens
+}  // namespace thicklens::architecture

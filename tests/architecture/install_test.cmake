@@ -1,7 +1,7 @@
 # Installs the build tree into a fresh prefix, then builds and runs a project that uses it.
 cmake_minimum_required(VERSION 3.25)
 
-foreach(name IN ITEMS build_dir config work_dir configs_dir bin data generator compiler house_test)
+foreach(name IN ITEMS build_dir config work_dir configs_dir bin data generator compiler architecture_test)
   if("${${name}}" STREQUAL "")
     message(FATAL_ERROR "install test: give -D ${name}=...")
   endif()
@@ -23,7 +23,7 @@ file(REMOVE_RECURSE "${work_dir}")
 run(${CMAKE_COMMAND} --install "${build_dir}" --config ${config} --prefix "${prefix}")
 
 # No program or library looks for another in the current folder.
-run(${CMAKE_COMMAND} -E env "THICKLENS_INSTALLED=${prefix}" "${house_test}"
+run(${CMAKE_COMMAND} -E env "THICKLENS_INSTALLED=${prefix}" "${architecture_test}"
     --gtest_filter=ElfSearchPaths.*)
 
 run("${prefix}/${bin}/thicklens" --help)

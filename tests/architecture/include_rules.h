@@ -1,0 +1,24 @@
+#ifndef THICKLENS_TESTS_ARCHITECTURE_INCLUDE_RULES_H_
+#define THICKLENS_TESTS_ARCHITECTURE_INCLUDE_RULES_H_
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "architecture/rooms_table.h"
+
+namespace thicklens::architecture {
+
+// Path relative to the repository's top, with forward slashes -> text.
+using SourceTree = std::map<std::string, std::string>;
+
+// True for a file whose includes are judged: C, C++ and OpenCL sources and headers.
+bool IsSource(const std::string& path);
+
+// Every include that the table does not allow, every source of a module in no room, and every
+// public header in a wrong place, each as "file:line: what is wrong; what is allowed".
+std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& table);
+
+}  // namespace thicklens::architecture
+
+#endif  // THICKLENS_TESTS_ARCHITECTURE_INCLUDE_RULES_H_

@@ -1,0 +1,23 @@
+#ifndef THICKLENS_TESTS_ARCHITECTURE_REPOSITORY_H_
+#define THICKLENS_TESTS_ARCHITECTURE_REPOSITORY_H_
+
+#include <string>
+#include <vector>
+
+#include "architecture/include_rules.h"
+#include "architecture/rooms_table.h"
+
+namespace thicklens::architecture {
+
+// The content of a file; fails the test where it cannot be read.
+std::string ContentOf(const std::string& path);
+
+// docs/rooms.txt.
+RoomsTable RepositoryTable();
+
+// All sources of these modules.
+SourceTree ReadRepository(const std::vector<std::string>& modules);
+
+}  // namespace thicklens::architecture
+
+#endif  // THICKLENS_TESTS_ARCHITECTURE_REPOSITORY_H_
