@@ -11,7 +11,7 @@
 #include "blur_covariance.h"
 #include "blur_prediction.h"
 #include "cancel_callback.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -125,7 +125,7 @@ class Fit {
             setup_.meters[m].variances_px2[static_cast<Eigen::Index>(i)] -
             PredictBlur(setup_, parameters_.global, Depth(f), setup_.frames[f].scale).value);
       }
-      parameters_.softness_px2[m] = model::Median(rests);
+      parameters_.softness_px2[m] = Median(rests);
     }
     return true;
   }
@@ -191,7 +191,7 @@ class Fit {
                                      .abs();
       // Where a lens follows the law only roughly, that is no fault of single frames.
       const double scatter =
-          std::max(1.0, 1.4826 * model::Median(std::vector<double>(off.begin(), off.end())));
+          std::max(1.0, 1.4826 * Median(std::vector<double>(off.begin(), off.end())));
       for (Eigen::Index i = 0; i < off.size(); ++i)
         set(&weights_.meters[m][i], HuberWeight(off[i] / scatter));
     }

@@ -9,8 +9,8 @@
 #include <set>
 
 #include "blur_examples.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/calib/edge_spread.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -131,7 +131,7 @@ class Measurement {
   std::optional<BlurSamples> EdgeSamples(const std::vector<std::size_t>& chosen, model::Psf psf) {
     const double floor_px = std::sqrt(evidence_.assumed_floor_px2);
     std::vector<std::optional<FrameEdgeSpread>> found(task_.frames.size());
-    model::ParallelFor(static_cast<int>(chosen.size()), task_.threads, [&](int i) {
+    ParallelFor(static_cast<int>(chosen.size()), task_.threads, [&](int i) {
       const std::size_t index = chosen[static_cast<std::size_t>(i)];
       found[index] = MeasureEdgeSpread(task_.store.Grey(task_.frames[index]), psf, floor_px);
       if (task_.tick) task_.tick();

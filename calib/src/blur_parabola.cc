@@ -5,7 +5,7 @@
 #include <random>
 
 #include "blur_fit.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {
@@ -108,7 +108,7 @@ class Search {
       const Eigen::VectorXd sigmas = Sigmas(line);
       const Eigen::ArrayXd off = (Residuals(line).array() / sigmas.array()).abs();
       const double scatter =
-          std::max(1.0, 1.4826 * model::Median(std::vector<double>(off.begin(), off.end())));
+          std::max(1.0, 1.4826 * Median(std::vector<double>(off.begin(), off.end())));
       std::vector<bool> follows(static_cast<std::size_t>(x_.size()));
       Eigen::VectorXd weights(x_.size());
       for (Eigen::Index i = 0; i < x_.size(); ++i) {

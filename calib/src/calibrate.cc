@@ -24,10 +24,10 @@
 #include "sharpness_peak.h"
 #include "source_recipe.h"
 #include "systematic_advice.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/calib/edge_blur.h"
 #include "thicklens/calib/sharpness.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
 #include "thicklens/model/pupil_law.h"
 
 namespace thicklens::calib {
@@ -146,7 +146,7 @@ class Calibrator {
 
   template <typename Work>
   void ForEachUsed(const Work& work) {
-    model::ParallelFor(static_cast<int>(used().size()), options_.threads, [&](int i) {
+    ParallelFor(static_cast<int>(used().size()), options_.threads, [&](int i) {
       work(used()[static_cast<std::size_t>(i)]);
       Tick();
     });
@@ -156,7 +156,7 @@ class Calibrator {
 
   // Absolute gates on every frame, then the blank gate against the median of those that passed.
   bool MeasureAndGate() {
-    model::ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
+    ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
       const auto index = static_cast<std::size_t>(i);
       result_.frames[index].statistics =
           MeasureFrame(RegionOf(store_.Stored(index), sweep_, index), store_.Grey(index));

@@ -3,7 +3,7 @@
 
 #include <ceres/ceres.h>
 
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::calib {
 

@@ -8,7 +8,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "edge_pixels.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::calib {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "edge_pixels.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -22,7 +22,7 @@ std::optional<SourceEdgeBlur> MeasureSourceEdgeBlur(const cv::Mat& grey) {
     if (ratio > 1 && std::isfinite(ratio)) sigmas.push_back(1 / std::sqrt(ratio * ratio - 1));
   }
   if (sigmas.size() < kFewestEdges) return std::nullopt;
-  return SourceEdgeBlur{model::Median(sigmas), static_cast<int>(sigmas.size())};
+  return SourceEdgeBlur{Median(sigmas), static_cast<int>(sigmas.size())};
 }
 
 }  // namespace thicklens::calib

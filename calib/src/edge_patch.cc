@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 // An edge's surroundings resampled along its normal, and what they show.
 
@@ -121,9 +121,9 @@ class Patch {
     const auto column = static_cast<std::size_t>(d + kHalfWidth);
     // Where the frame has cut off too much of the column, the patch ends.
     const bool is_there = static_cast<double>(values.size()) > 0.6 * kept_.Count();
-    profile_[column] = is_there ? model::Median(values) : kMissing;
+    profile_[column] = is_there ? Median(values) : kMissing;
     for (double& value : values) value = std::abs(value - profile_[column]);
-    spread_[column] = is_there ? 1.4826 * model::Median(std::move(values)) : kMissing;
+    spread_[column] = is_there ? 1.4826 * Median(std::move(values)) : kMissing;
   }
 
   // The steepest place near the middle, and outward to where the slope has fallen to a twentieth.

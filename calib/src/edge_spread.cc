@@ -6,7 +6,7 @@
 
 #include "edge_finder.h"
 #include "step_fit.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -64,7 +64,7 @@ std::optional<BlurSigma> RobustMean(const std::vector<BlurSigma>& blurs) {
   std::vector<double> errors;
   for (const BlurSigma& blur : blurs) errors.push_back(blur.error_px);
   // No reading may outweigh all others by its own claim.
-  const double least_error = 0.3 * model::Median(errors) + 1e-6;
+  const double least_error = 0.3 * Median(errors) + 1e-6;
   std::vector<Reading> readings;
   double total = 0;
   for (const BlurSigma& blur : blurs) {
@@ -87,7 +87,7 @@ std::optional<BlurSigma> RobustMean(const std::vector<BlurSigma>& blurs) {
   }
   // The median of a chi^2 of one degree of freedom is .455; a median scatters by sqrt(pi/2) more
   // than a mean.
-  const double scatter = std::sqrt(std::max(1.0, model::Median(squares) / 0.455));
+  const double scatter = std::sqrt(std::max(1.0, Median(squares) / 0.455));
   mean.error_px *= std::sqrt(CV_PI / 2) * scatter;
   return mean;
 }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::calib {
 namespace {

@@ -12,7 +12,7 @@
 #include "evenly_spread.h"
 #include "misfit_causes.h"
 #include "systematic_advice.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -155,7 +155,7 @@ class Field {
       return;
     }
     MeasureRegions(setup_, &regions);
-    model::ParallelFor(static_cast<int>(regions.size()), setup_.threads, [&](int i) {
+    ParallelFor(static_cast<int>(regions.size()), setup_.threads, [&](int i) {
       const auto index = static_cast<std::size_t>(i);
       FieldTile& tile = map.tiles[tile_of[index]];
       if (const auto focus = FocusOf(regions[index], &tile.message)) {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -49,7 +49,7 @@ std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
                         frame.scale * frame.scale -
                     defocus);
   }
-  const double softness = model::Median(rests);
+  const double softness = Median(rests);
   return softness > 0 ? std::optional<double>(softness) : std::nullopt;
 }
 

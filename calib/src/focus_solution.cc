@@ -14,7 +14,7 @@
 #include "frame_outliers.h"
 #include "misfit_causes.h"
 #include "systematic_parts.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -98,7 +98,7 @@ class Solution {
     for (std::size_t i = 1; i < readings.size(); ++i) {
       if (readings[i] > readings[i - 1]) steps.push_back(readings[i] - readings[i - 1]);
     }
-    return model::Median(steps);
+    return Median(steps);
   }
 
   // ---- results ----

@@ -9,8 +9,8 @@
 #include <mutex>
 #include <set>
 
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::calib {
 namespace {

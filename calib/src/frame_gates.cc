@@ -14,8 +14,8 @@
 
 #include "edge_pixels.h"
 #include "pile_up.h"
-#include "thicklens/cancel.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -86,7 +86,7 @@ bool HasColourFilter(const cv::Mat& stored) {
   }
   if (deviations[0].size() < 16) return false;
   for (std::vector<double>& of_lattice : deviations) {
-    const double typical = model::Median(of_lattice);
+    const double typical = Median(of_lattice);
     if (!(std::abs(typical) > kLeastDeviation)) continue;
     const auto same = std::count_if(of_lattice.begin(), of_lattice.end(), [&](double d) {
       return d * typical > 0 && std::abs(d) > 0.5 * kLeastDeviation;

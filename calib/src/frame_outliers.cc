@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -50,7 +50,7 @@ class Outliers {
       if (r > 0) ratios.push_back(r);
     }
     if (ratios.empty()) return;
-    const double typical = model::Median(ratios);
+    const double typical = Median(ratios);
     for (std::size_t f = 0; f < evidence_.frame_noise_ratios.size(); ++f) {
       const double ratio = evidence_.frame_noise_ratios[f] / typical;
       if (!(ratio > kScatterOfDamage)) continue;

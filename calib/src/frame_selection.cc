@@ -9,7 +9,7 @@
 #include <numeric>
 #include <set>
 
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -45,7 +45,7 @@ std::optional<std::string> FrameSelection::KeepMeasurable(const GateOptions& gat
     if (!RejectionReason(frame.statistics, 0, gates))
       contrasts.push_back(frame.statistics.contrast);
   }
-  const double median_contrast = model::Median(contrasts);
+  const double median_contrast = Median(contrasts);
   return KeepOnly([&](const FrameMeasurement& frame) {
     return RejectionReason(frame.statistics, median_contrast, gates);
   });
@@ -54,7 +54,7 @@ std::optional<std::string> FrameSelection::KeepMeasurable(const GateOptions& gat
 std::optional<std::string> FrameSelection::KeepThoseWithEdges() {
   std::vector<double> contrasts;
   for (const std::size_t i : used_) contrasts.push_back(frames_[i].statistics.contrast);
-  const double median_contrast = model::Median(contrasts);
+  const double median_contrast = Median(contrasts);
   return KeepOnly([&](const FrameMeasurement& frame) -> std::optional<std::string> {
     if (frame.edge_count >= kFewestEdges ||
         frame.statistics.contrast >= kFaintContrast * median_contrast ||
@@ -156,14 +156,14 @@ std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
     return advice(over, "over-exposed", "lower the exposure (shorter time, less light or gain)");
   constexpr double kSixteenBits = 65535;
   // A hundred steps of the mean alone: no eight bits show so dark a picture so finely.
-  if (2 * under > frames.size() && 2 * clear > under && model::Median(means) * kSixteenBits > 100 &&
+  if (2 * under > frames.size() && 2 * clear > under && Median(means) * kSixteenBits > 100 &&
       have_16_bits()) {
     return fmt::format(
         "{} of {} frames are dark in their files (on the average {:.0f} of 65535), but their "
         "texture "
         "stands clear of the noise: values of 10 or 12 bits that were stored in 16 without being "
         "scaled, or under-exposed; scale the values up, or raise the exposure",
-        under, frames.size(), kSixteenBits * model::Median(means));
+        under, frames.size(), kSixteenBits * Median(means));
   }
   if (2 * under > frames.size())
     return advice(under, "under-exposed", "raise the exposure (longer time, more light)");

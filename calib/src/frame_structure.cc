@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "edge_pixels.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -173,7 +173,7 @@ class Structure {
       std::vector<double> rests;
       for (std::size_t i = 0; i < rows.size(); ++i)
         rests.push_back(std::abs(values[i] - rows[i].dot(terms)));
-      const double scatter = std::max(1e-6, 1.4826 * model::Median(rests));
+      const double scatter = std::max(1e-6, 1.4826 * Median(rests));
       for (std::size_t i = 0; i < rows.size(); ++i)
         weights[i] = 1 / (1 + std::pow(rests[i] / (2 * scatter), 2));
       variance = kCorrelatedPixels * scatter * scatter *
@@ -264,7 +264,7 @@ class Structure {
     double rows = 0, columns = 0;
     const double of_target = RowsOverColumns(mean / static_cast<double>(pairs), &rows, &columns);
     if (of_target > kAnisotropy || of_target < 1 / kAnisotropy) return;
-    const double ratio = model::Median(ratios);
+    const double ratio = Median(ratios);
     if (ratio <= kAnisotropy && ratio >= 1 / kAnisotropy) {
       result_.bands = model::Estimate{
           0, FrameStructureFinding::kLeastBands / FrameStructureFinding::kSignificant};
@@ -274,11 +274,11 @@ class Structure {
     const std::vector<double>& deviations =
         result_.bands_are_columns ? column_deviations : row_deviations;
     // The ratio of two frames has the bands of both, independent of each other.
-    const double of_both = model::Median(deviations);
+    const double of_both = Median(deviations);
     std::vector<double> off;
     for (const double deviation : deviations) off.push_back(std::abs(deviation - of_both));
     const double middle = of_both / std::sqrt(2.0);
-    result_.bands = model::Estimate{middle, 1.4826 / std::sqrt(2.0) * model::Median(off) /
+    result_.bands = model::Estimate{middle, 1.4826 / std::sqrt(2.0) * Median(off) /
                                                 std::sqrt(static_cast<double>(deviations.size()))};
   }
 

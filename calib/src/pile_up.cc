@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::calib {
 namespace {

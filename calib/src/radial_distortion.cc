@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -46,7 +46,7 @@ std::optional<model::Estimate> Solve(const std::vector<Term>& terms) {
   for (int round = 0; round < kRounds; ++round) {
     std::vector<double> distances;
     for (const Term& t : terms) distances.push_back(std::abs(Distance(t, k)));
-    spread = std::max(1.0, 1.4826 * model::Median(distances));
+    spread = std::max(1.0, 1.4826 * Median(distances));
     double right = 0;
     information = 0;
     for (const Term& t : terms) {

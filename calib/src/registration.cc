@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "coarse_registration.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 #include "tile_map.h"
 #include "tile_pass.h"
 

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "spectral_transfer.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::calib {
 namespace {

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -65,9 +65,9 @@ Line MedianLine(const Points& points) {
     }
   }
   Line line;
-  line.slope = slopes.empty() ? 0 : model::Median(slopes);
+  line.slope = slopes.empty() ? 0 : Median(slopes);
   for (const Point& p : points) intercepts.push_back(p.value - line.slope * p.reading_mm);
-  line.intercept = model::Median(intercepts);
+  line.intercept = Median(intercepts);
   return line;
 }
 
@@ -106,7 +106,7 @@ double ChiSquareOfConstant(const Points& points, double slope, double reading_si
                            double widening) {
   std::vector<double> values;
   for (const Point& p : points) values.push_back(p.value);
-  const double middle = model::Median(values);
+  const double middle = Median(values);
   double sum = 0;
   for (const Point& p : points)
     sum += RobustSquare((p.value - middle) /

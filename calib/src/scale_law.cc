@@ -8,8 +8,8 @@
 
 #include "cancel_callback.h"
 #include "radial_distortion.h"
+#include "thicklens/base/statistics.h"
 #include "thicklens/calib/image_scale.h"
-#include "thicklens/model/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -127,21 +127,21 @@ Line FitLine(const Points& points, double reading_sigma_mm) {
         from_here.push_back((a.inverse_scale - b.inverse_scale) / (a.reading_mm - b.reading_mm));
       }
     }
-    if (!from_here.empty()) slopes.push_back(model::Median(from_here));
+    if (!from_here.empty()) slopes.push_back(Median(from_here));
   }
-  line.slope = model::Median(slopes);
+  line.slope = Median(slopes);
   std::vector<double> intercepts, errors, readings, distances, stated;
   for (const Point& p : points) intercepts.push_back(p.inverse_scale - line.slope * p.reading_mm);
-  line.intercept = model::Median(intercepts);
+  line.intercept = Median(intercepts);
   for (const double i : intercepts) errors.push_back(std::abs(i - line.intercept));
   for (const Point& p : points) readings.push_back(p.reading_mm);
-  const double middle_mm = model::Median(readings);
+  const double middle_mm = Median(readings);
   for (const Point& p : points) {
     distances.push_back(std::abs(p.reading_mm - middle_mm));
     stated.push_back(std::hypot(p.inverse_scale_sigma, line.slope * reading_sigma_mm));
   }
-  const double scatter = std::max(1.4826 * model::Median(errors), model::Median(stated));
-  const double spread_mm = 1.4826 * model::Median(distances);  // robust against a wrong reading
+  const double scatter = std::max(1.4826 * Median(errors), Median(stated));
+  const double spread_mm = 1.4826 * Median(distances);  // robust against a wrong reading
   // A repeated median is 1.25 times as uncertain as least squares.
   line.slope_sigma =
       1.25 * scatter / std::max(spread_mm, 1e-12) / std::sqrt(static_cast<double>(points.size()));
@@ -192,8 +192,8 @@ double ScatterOfReadings(const Points& points, const Law& law, double sign,
     errors.push_back(std::abs(ReadingError(p, law, sign)));
     from_scale.push_back(law.reference_depth_mm * p.inverse_scale_sigma);
   }
-  const double scatter_mm = 1.4826 * model::Median(errors);
-  const double scale_mm = model::Median(from_scale);
+  const double scatter_mm = 1.4826 * Median(errors);
+  const double scale_mm = Median(from_scale);
   const double rest = scatter_mm * scatter_mm - scale_mm * scale_mm;
   return std::max({reading_sigma_mm, std::sqrt(std::max(0.0, rest)), 1e-6});
 }
@@ -333,7 +333,7 @@ class LawFinder {
   void ClassifyFlat(double change, double change_sigma, ScaleLaw* result) const {
     std::vector<double> inverses;
     for (const Point& p : points_) inverses.push_back(p.inverse_scale);
-    const double middle = model::Median(inverses);
+    const double middle = Median(inverses);
     std::size_t apart = 0;
     for (const Point& p : points_) {
       const double within = std::max(kConstantChange, kFollowsSigmas * p.inverse_scale_sigma);

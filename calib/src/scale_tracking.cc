@@ -7,8 +7,8 @@
 #include "radial_distortion.h"
 #include "registration.h"
 #include "shift_registration.h"
-#include "thicklens/model/parallel.h"
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -53,10 +53,10 @@ class ScalePrediction {
       }
     }
     if (slopes.empty()) return;
-    slope_ = model::Median(slopes);
+    slope_ = Median(slopes);
     std::vector<double> intercepts;
     for (const ScaleSample& s : samples) intercepts.push_back(1 / s.scale - slope_ * s.reading_mm);
-    intercept_ = model::Median(intercepts);
+    intercept_ = Median(intercepts);
   }
 
  private:
@@ -116,7 +116,7 @@ std::vector<ScaleSample> TrackShifts(const FocusSweep& sweep,
   };
   const cv::Mat reference_grey = read_grey(reference);
   std::vector<std::optional<Registration>> found(frames.size());
-  model::ParallelFor(static_cast<int>(frames.size()), threads, [&](int i) {
+  ParallelFor(static_cast<int>(frames.size()), threads, [&](int i) {
     const auto index = static_cast<std::size_t>(i);
     if (frames[index] == reference) return;
     const double scale = depth_mm(reference) / depth_mm(frames[index]);
@@ -179,7 +179,7 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
   while (done < order.size()) {
     const std::size_t count = std::min(std::max(kFirstWave, done), order.size() - done);
     std::vector<std::optional<FreeRegistration>> found(count);
-    model::ParallelFor(static_cast<int>(count), threads, [&](int i) {
+    ParallelFor(static_cast<int>(count), threads, [&](int i) {
       const std::size_t frame = order[done + static_cast<std::size_t>(i)];
       found[static_cast<std::size_t>(i)] = RegisterAnyhow(
           reference_grey, read_grey(frame), prediction.At(sweep.frames[frame].reading_mm), centre);

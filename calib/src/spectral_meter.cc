@@ -5,7 +5,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -172,7 +172,7 @@ void MeasureRegions(const SpectralMeterSetup& setup, std::vector<MeterRegion>* r
     region.samples.assign(region.frames.size(), {});
   }
   const auto count = static_cast<int>(setup.frames.size());
-  model::ParallelFor(count, setup.threads, [&](int index) {
+  ParallelFor(count, setup.threads, [&](int index) {
     const auto f = static_cast<std::size_t>(index);
     const MeterFrame& frame = setup.frames[f];
     const bool is_used = std::any_of(regions->begin(), regions->end(), [&](const auto& region) {

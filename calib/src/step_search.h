@@ -12,8 +12,8 @@
 
 #include "feature_pixels.h"
 #include "step_fit.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/calib/edge_spread.h"
-#include "thicklens/cancel.h"
 #include "thicklens/model/camera.h"
 
 namespace thicklens::calib {

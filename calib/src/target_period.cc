@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "line_spectrum.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::calib {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "thicklens/model/statistics.h"
+#include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
 namespace {
@@ -99,7 +99,7 @@ std::optional<Solution<kParameters>> FitRobustly(const std::vector<TileShift>& s
     }
     // The residuals of a fit are smaller than the errors.
     const double free = 1 - kParameters / (2.0 * static_cast<double>(shifts.size()));
-    const double excess = model::Median(distances) / (kMedianOfChi2 * free);
+    const double excess = Median(distances) / (kMedianOfChi2 * free);
     if (round + 2 < kRounds) {
       scatter_px2 = std::max(scatter_px2 * std::clamp(excess, 0.1, 10.0),
                              kLeastShiftSigmaPx * kLeastShiftSigmaPx);

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/model/blur_transfer.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -46,7 +46,7 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
   cv::dft(padded, transform, cv::DFT_COMPLEX_OUTPUT);
   nodes_.resize(kLeakageNodes);
   nodes_[0] = Eigen::ArrayXcd::Zero(static_cast<Eigen::Index>(modes.size()));
-  model::ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
+  ParallelFor(kLeakageNodes - 1, threads, [&](int index) {
     const double sigma = step_px_ * (index + 1);
     std::size_t count = 0;
     while (count < modes.size() &&

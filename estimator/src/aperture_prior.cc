@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "lanes.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -225,7 +225,7 @@ void AperturePrior<Real>::ApplyInverse(std::size_t points, std::size_t stride, i
   const std::size_t chunks = (points + kChunk - 1) / kChunk;
   const std::size_t room = inverse_eigenvalues_.size() * kPacket;
   work_.resize(chunks * room);
-  model::ParallelFor(static_cast<int>(chunks), threads, [&](int n) {
+  ParallelFor(static_cast<int>(chunks), threads, [&](int n) {
     const PacketJob<Real> job{{u_count_, across_.data()},
                               {v_count_, down_.data()},
                               inverse_eigenvalues_.data(),

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "shown_views.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

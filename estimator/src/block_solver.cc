@@ -14,12 +14,12 @@
 #include "linear_solver.h"
 #include "residual_guard.h"
 #include "run_cost.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/block_store.h"
 #include "thicklens/estimator/estimate.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -404,7 +404,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   const std::string device_of_solver = NewLinearSolver(given.solver, symmetric)->device();
 
   const auto start = Clock::now();
-  const int threads = model::ResolveThreads(given.threads);
+  const int threads = ResolveThreads(given.threads);
   BlockOptions options = given;
   options.ridge = given.ridge.value_or(1e-2 / static_cast<double>(input.weights.size()));
 
@@ -447,7 +447,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   }
   std::mutex merge_mutex;
   int done = 0;
-  model::ParallelFor(count, threads, [&](int i) {
+  ParallelFor(count, threads, [&](int i) {
     const model::PixelRect& rect = rects[Index(i)];
     const BlockGeometry block = rays.Block(rect.x, rect.y, rect.width, rect.height);
     std::optional<SolvedBlock> solved = FromStore(options, i, block, input.picture.channels);

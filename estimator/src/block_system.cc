@@ -8,8 +8,8 @@
 #include "ray_irradiance.h"
 #include "ray_landing.h"
 #include "same_point.h"
-#include "thicklens/cancel.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/parallel.h"
 #include "warped_views.h"
 
 namespace thicklens::estimator {
@@ -84,7 +84,7 @@ RayField::RayField(const EstimateInput& input, bool falloff, int threads)
     : input_(input), prior_(WarpToAllViews(input, falloff, threads, &disparity_)) {
   if (!falloff || !input.camera) return;
   irradiance_.resize(disparity_.size());
-  model::ParallelFor(u_count() * v_count(), threads, [&](int view) {
+  ParallelFor(u_count() * v_count(), threads, [&](int view) {
     irradiance_[Index(view)] = RelativeFalloff(*input_.grid, input_.camera_of_falloff(),
                                                input_.weights, view % u_count(), view / u_count());
   });

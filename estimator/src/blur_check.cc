@@ -13,9 +13,9 @@
 #include "iteration_progress.h"
 #include "run_cost.h"
 #include "scene_radiance.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/scene_solver.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -174,7 +174,7 @@ BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options)
     check.message = "one view has no blur that could be checked";
     return check;
   }
-  const int threads = model::ResolveThreads(options.threads);
+  const int threads = ResolveThreads(options.threads);
   IterationProgress progress(options.progress, kMostTrials);
   progress.Tell();
   BlurPicture looked = BlurPictureOf(input, options.falloff, threads);

@@ -9,7 +9,7 @@
 #include "run_cost.h"
 #include "scene_bands.h"
 #include "scene_memory.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::estimator {

@@ -10,8 +10,8 @@
 #include <limits>
 #include <utility>
 
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -198,7 +198,7 @@ LightFieldScores CompareLightFields(const model::LightField& reference,
   if (dibr) dibr_views.emplace(*dibr);
   LightFieldScores result;
   result.views.resize(common.size());
-  model::ParallelFor(static_cast<int>(common.size()), threads, [&](int i) {
+  ParallelFor(static_cast<int>(common.size()), threads, [&](int i) {
     const auto index = static_cast<std::size_t>(i);
     const auto [k, l] = common[index];
     try {

@@ -18,7 +18,7 @@
 #include "ray_landing.h"
 #include "scene_projection.h"
 #include "scene_rays.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/kernels/kernels.h"
 
 namespace thicklens::estimator {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thicklens/base/parallel.h"
 #include "thicklens/kernels/picture_filter.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -14,7 +14,7 @@ template <typename Work>
 void ForPieces(std::size_t count, int threads, const Work& work) {
   constexpr std::size_t kPiece = 1 << 16;
   const auto pieces = static_cast<int>((count + kPiece - 1) / kPiece);
-  model::ParallelFor(pieces, threads, [&](int piece) {
+  ParallelFor(pieces, threads, [&](int piece) {
     const std::size_t first = static_cast<std::size_t>(piece) * kPiece;
     work(first, std::min(count, first + kPiece));
   });

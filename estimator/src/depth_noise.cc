@@ -10,8 +10,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -78,7 +78,7 @@ SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads)
   const auto window = WindowWeights();
   SmoothedDepth smoothed{map, 0};
   std::vector<double> variance(Index(map.height_px), 0.0);  // sums of rows
-  model::ParallelFor(map.height_px, model::ResolveThreads(threads), [&](int y) {
+  ParallelFor(map.height_px, ResolveThreads(threads), [&](int y) {
     for (int x = 0; x < map.width_px; ++x) {
       const std::size_t i = Index(y) * Index(map.width_px) + Index(x);
       const float own = map.disparity[i];

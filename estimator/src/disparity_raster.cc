@@ -14,8 +14,8 @@
 #include "disparity_buffer.h"
 #include "hole_filler.h"
 #include "mixed_samples.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {

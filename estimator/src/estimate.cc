@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 Stencil StencilFromName(const std::string& name) {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ray_landing.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -8,8 +8,8 @@
 #include "catmull_rom.h"
 #include "product_row.h"
 #include "surface_taps.h"
-#include "thicklens/cancel.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/parallel.h"
 #include "view_fan.h"
 
 namespace thicklens::estimator {
@@ -55,7 +55,7 @@ std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
                                      const std::vector<unsigned char>& known, int threads) {
   const CellRange range(disparity);
   std::vector<unsigned char> is_product(disparity.disparity.size());
-  model::ParallelFor(fan.height_px, threads, [&](int y) {
+  ParallelFor(fan.height_px, threads, [&](int y) {
     const std::size_t begin = Index(y) * Index(fan.width_px);
     ProductRow row;
     row.y = y;
@@ -207,7 +207,7 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
   filter.width_px = disparity.width_px;
   filter.height_px = height_px;
   std::vector<FilterRow<Real>> rows(Index(height_px));
-  model::ParallelFor((height_px + kBandRows - 1) / kBandRows, threads, [&](int band) {
+  ParallelFor((height_px + kBandRows - 1) / kBandRows, threads, [&](int band) {
     FilterMaker maker(axis, direction, disparity, weights, between);
     const int last = std::min((band + 1) * kBandRows, height_px);
     for (int y = band * kBandRows; y < last; ++y) {

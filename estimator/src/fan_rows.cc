@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "surface_taps.h"
-#include "thicklens/cancel.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/parallel.h"
 #include "view_fan.h"
 
 namespace thicklens::estimator {
@@ -260,7 +260,7 @@ template <typename Real>
 kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,
                                 const std::vector<unsigned char>& is_product, int threads,
                                 const std::function<void()>& freed) {
-  threads = model::ResolveThreads(threads);
+  threads = ResolveThreads(threads);
   kernels::PixelRuns<Real> runs;
   runs.width_px = fan.width_px;
   runs.height_px = fan.height_px;
@@ -269,7 +269,7 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
   std::vector<Band<Real>> parts(Index(count));
   // A sum of a pixel has a place for each pixel of the picture: of these each thread has one set.
   std::atomic<int> next{0};
-  model::ParallelFor(std::min(threads, count), threads, [&](int) {
+  ParallelFor(std::min(threads, count), threads, [&](int) {
     Gatherer<Real> gatherer(runs.stride_px(), fan.height_px);
     for (int n = next++; n < count; n = next++) {
       FillBand(fan, disparity, is_product, borders[Index(n)], borders[Index(n) + 1], &gatherer,
@@ -288,7 +288,7 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
   }
   runs.index.resize(first.back());
   runs.weight.resize(first.back() * Index(kernels::kPixelsOfRun));
-  model::ParallelFor(count, threads, [&](int n) {
+  ParallelFor(count, threads, [&](int n) {
     Band<Real>& part = parts[Index(n)];
     const std::size_t at = first[Index(n)];
     std::copy(part.index.begin(), part.index.end(),

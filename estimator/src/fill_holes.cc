@@ -11,7 +11,7 @@
 
 #include "hole_region.h"
 #include "hole_territories.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/estimate_checks.h"
 
 namespace thicklens::estimator {

@@ -8,8 +8,8 @@
 #include "estimate_input.h"
 #include "residual_guard.h"
 #include "run_cost.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -57,7 +57,7 @@ void StartRun(const std::string& solver, const EstimateInput& input,
   if (!options.IsValid(&why)) throw Error(solver + ": " + why);
   CheckInput(input);
   *summary = FunctionalSummary();
-  summary->threads = model::ResolveThreads(options.threads);
+  summary->threads = ResolveThreads(options.threads);
   summary->gamma = options.gamma;
   summary->ridge = options.ridge.value_or(1e-2 / static_cast<double>(input.weights.size()));
 }

@@ -17,8 +17,8 @@
 #include "run_cost.h"
 #include "scene_projection.h"
 #include "scene_rays.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/kernels/picture_filter.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -64,7 +64,7 @@ class FunctionalSystem {
     const IterationOutcome outcome = solver_.Solve(system, limits, on_iteration, &answer_);
     SpreadOverAperture(answer_);
     const std::size_t stride = rays_.plane_stride();
-    model::ParallelFor(static_cast<int>(rays_.view_count()), threads_, [&](int k) {
+    ParallelFor(static_cast<int>(rays_.view_count()), threads_, [&](int k) {
       Real* plane = planes_.data() + static_cast<std::size_t>(k) * stride;
       for (std::size_t i = 0; i < size_; ++i) plane[i] += photograph_[i];
     });
@@ -186,7 +186,7 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
         LargerResidual(summary->relative_residual, outcome.relative_residual);
     const auto views_start = Clock::now();
     summary->solve_seconds += std::chrono::duration<double>(views_start - solve_start).count();
-    model::ParallelFor(views, threads, [&](int view) {
+    ParallelFor(views, threads, [&](int view) {
       const int k = view % light_field.u_count, l = view / light_field.u_count;
       shown_rays.Show(static_cast<std::size_t>(view), system.plane(static_cast<std::size_t>(view)),
                       light_field.values.data() + light_field.ViewStart(channel, k, l));

@@ -7,7 +7,7 @@
 #include "grid_loops.h"
 #include "grid_photograph.h"
 #include "same_point.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -26,7 +26,7 @@ GridLinks::GridLinks(const DisparityMap& map, std::vector<std::vector<float>> di
       threads_(threads),
       across_(Index(picture.views())),
       down_(Index(picture.views())) {
-  model::ParallelFor(picture.views(), threads, [&](int view) {
+  ParallelFor(picture.views(), threads, [&](int view) {
     across_[Index(view)] = FindLinks(Axis::kU, view);
     down_[Index(view)] = FindLinks(Axis::kV, view);
   });
@@ -128,7 +128,7 @@ void GridLinks::Apply(double gamma, double mu, const Real* x, Real* y) const {
   const std::size_t width = Index(picture_.s_count), view_size = width * Index(picture_.t_count);
   const auto gamma_here = static_cast<Real>(gamma), mu_here = static_cast<Real>(mu);
   // Differences across tie a row of a view to the same row of the next, those down a column.
-  model::ParallelFor(picture_.v_count * picture_.t_count, threads_, [&](int i) {
+  ParallelFor(picture_.v_count * picture_.t_count, threads_, [&](int i) {
     const int l = i / picture_.t_count, t = i % picture_.t_count;
     for (int k = 0; k < picture_.u_count; ++k) {
       const std::size_t from = Index(l * picture_.u_count + k) * view_size + Index(t) * width;
@@ -141,7 +141,7 @@ void GridLinks::Apply(double gamma, double mu, const Real* x, Real* y) const {
     }
   });
   const auto bands = static_cast<int>(BandCount());
-  model::ParallelFor(picture_.u_count * bands, threads_, [&](int i) {
+  ParallelFor(picture_.u_count * bands, threads_, [&](int i) {
     const int k = i / bands;
     const std::size_t band = Index(i % bands);
     for (int l = 0; l + 1 < picture_.v_count; ++l) {

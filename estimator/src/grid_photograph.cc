@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -38,15 +38,15 @@ struct Rows {
 // Calls work(first, last) for bands of the rows, as many for each thread.
 template <typename Work>
 void ForBands(const Rows& rows, int threads, const Work& work) {
-  const int resolved = model::ResolveThreads(threads);
+  const int resolved = ResolveThreads(threads);
   const int rounds = (rows.count + rows.most * resolved - 1) / (rows.most * resolved);
   const int bands = std::min(rows.count, rounds * resolved);
   const auto begin = [&](int band) {
     return static_cast<int>(static_cast<std::int64_t>(rows.count) * band / bands);
   };
   const std::size_t useful = 1 + rows.bytes / kLeastBytesOfThread;
-  model::ParallelFor(bands, static_cast<int>(std::min(Index(resolved), useful)),
-                     [&](int band) { work(begin(band), begin(band + 1)); });
+  ParallelFor(bands, static_cast<int>(std::min(Index(resolved), useful)),
+              [&](int band) { work(begin(band), begin(band + 1)); });
 }
 
 // A pixel gets `share` of the ray nearest to the pixel that is `offset` beside it.

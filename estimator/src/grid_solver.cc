@@ -18,9 +18,9 @@
 #include "ray_landing.h"
 #include "residual_guard.h"
 #include "run_cost.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/kernels/picture_filter.h"
-#include "thicklens/model/parallel.h"
 #include "warped_views.h"
 
 namespace thicklens::estimator {
@@ -80,7 +80,7 @@ class GridSystem {
   template <typename Work>
   void ForViews(const Work& work) const {
     const std::size_t view_size = answer_.size() / static_cast<std::size_t>(picture_.views());
-    model::ParallelFor(picture_.views(), threads_, [&](int view) {
+    ParallelFor(picture_.views(), threads_, [&](int view) {
       work(static_cast<std::size_t>(view) * view_size,
            static_cast<std::size_t>(view + 1) * view_size);
     });
@@ -160,7 +160,7 @@ double LeastGridBytes(const EstimateInput& input, bool falloff) {
 std::vector<std::vector<float>> IrradianceOfViews(const EstimateInput& input, int threads) {
   const auto u_count = static_cast<int>(input.weights.cols());
   std::vector<std::vector<float>> irradiance(static_cast<std::size_t>(input.weights.size()));
-  model::ParallelFor(static_cast<int>(irradiance.size()), threads, [&](int view) {
+  ParallelFor(static_cast<int>(irradiance.size()), threads, [&](int view) {
     irradiance[static_cast<std::size_t>(view)] = RelativeFalloff(
         *input.grid, input.camera_of_falloff(), input.weights, view % u_count, view / u_count);
   });

@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "surface_taps.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -13,9 +13,9 @@
 
 #include "run_cost.h"
 #include "shown_views.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -96,7 +96,7 @@ void FillView(const ViewHoles& holes, const InpaintOptions& options,
   std::transform(holes.is_hole.begin(), holes.is_hole.end(), mask.begin<std::uint8_t>(),
                  [](char is_hole) { return static_cast<std::uint8_t>(is_hole != 0 ? 255 : 0); });
   const cv::Mat padded_mask = Padded(mask);
-  model::ParallelFor(light_field->channels, options.threads, [&](int channel) {
+  ParallelFor(light_field->channels, options.threads, [&](int channel) {
     float* values = light_field->values.data() + light_field->ViewStart(channel, 0, 0) +
                     Index(holes.view) * light_field->view_size();
     // To the mean of its neighbours cv::inpaint adds up to 2 units of the values, meant as grey
@@ -188,7 +188,7 @@ void InpaintHiddenRays(const DisparityMap& map, const InpaintOptions& options,
     }
   }
   std::vector<ViewHoles> views(present.size());
-  model::ParallelFor(static_cast<int>(present.size()), options.threads, [&](int i) {
+  ParallelFor(static_cast<int>(present.size()), options.threads, [&](int i) {
     const int view = present[Index(i)];
     views[Index(i)] =
         HolesOf(map, renderer, view, light_field->u_offset(view % light_field->u_count),
@@ -206,7 +206,7 @@ void InpaintHiddenRays(const DisparityMap& map, const InpaintOptions& options,
       ++summary->views_visited;
       summary->filled += view->left;
       std::vector<std::size_t> carried(static_cast<std::size_t>(views.end() - view), 0);
-      model::ParallelFor(static_cast<int>(carried.size()) - 1, options.threads, [&](int i) {
+      ParallelFor(static_cast<int>(carried.size()) - 1, options.threads, [&](int i) {
         carried[Index(i)] = Carry(map, *view, &*(view + 1 + i), light_field);
       });
       summary->carried += std::accumulate(carried.begin(), carried.end(), std::size_t{0});

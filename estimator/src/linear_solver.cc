@@ -8,7 +8,7 @@
 #include <string>
 
 #include "linear_solver_kinds.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

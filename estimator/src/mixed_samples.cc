@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "surface_taps.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::estimator {
 namespace {

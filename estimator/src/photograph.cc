@@ -11,9 +11,9 @@
 #include "ray_irradiance.h"
 #include "ray_landing.h"
 #include "shown_views.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/render.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -23,7 +23,7 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 // Calls work(view, k, l) for all views.
 template <typename Work>
 void ForEachView(const model::LightField& light_field, int threads, const Work& work) {
-  model::ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int view) {
+  ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int view) {
     work(view, view % light_field.u_count, view / light_field.u_count);
   });
 }
@@ -80,7 +80,7 @@ PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat spla
       [&whole, splat, shares = std::move(shares), kernels, threads, view_size](const float* rays) {
         std::vector<float> weighed(rays, rays + view_size * Index(whole.views()));
         if (!shares.empty()) {
-          model::ParallelFor(whole.views(), threads, [&](int view) {
+          ParallelFor(whole.views(), threads, [&](int view) {
             const std::vector<float>& share = shares[Index(view)];
             float* values = weighed.data() + Index(view) * view_size;
             for (std::size_t i = 0; i < share.size(); ++i) values[i] *= share[i];

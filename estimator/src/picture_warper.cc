@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {

@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "surface_taps.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::estimator {
 namespace {

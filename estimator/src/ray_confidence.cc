@@ -11,9 +11,9 @@
 #include "scene_data.h"
 #include "scene_projection.h"
 #include "seen_share.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/estimate_checks.h"
-#include "thicklens/model/parallel.h"
 #include "view_fan.h"
 
 namespace thicklens::estimator {
@@ -64,7 +64,7 @@ std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads)
   if (input.grid) {
     disparity = PhotographDisparity(disparity, LandingStepPx(*input.camera, *input.grid));
   }
-  threads = model::ResolveThreads(threads);
+  threads = ResolveThreads(threads);
   const ViewFan fan = RenderFan(disparity, input.weights, threads, nullptr);
   const PlainPixels plain =
       FindPlainPixels(disparity, static_cast<int>(input.weights.cols()),

@@ -7,8 +7,8 @@
 #include <cstddef>
 
 #include "ray_landing.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -149,7 +149,7 @@ std::vector<float> FalloffOfPicture(const model::LightFieldGrid& grid, const mod
   const RowIrradiance irradiance(grid, camera);
   const auto width = static_cast<std::size_t>(width_px);
   std::vector<float> falloff(width * static_cast<std::size_t>(height_px));
-  model::ParallelFor(height_px, threads, [&](int y) {
+  ParallelFor(height_px, threads, [&](int y) {
     // Over the rays that are samples of the grid, of each pixel.
     Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(width_px), weight = sum;
     for (int l = 0; l < grid.v_count; ++l) {

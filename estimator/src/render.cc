@@ -12,9 +12,9 @@
 
 #include "catmull_rom.h"
 #include "shown_views.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -139,8 +139,8 @@ model::LinearPicture Refocus(const model::LightField& light_field, double dispar
   }
   model::LinearPicture picture =
       BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
-  model::ParallelFor(light_field.t_count, threads,
-                     [&](int y) { RefocusRow(light_field, views, y, &picture); });
+  ParallelFor(light_field.t_count, threads,
+              [&](int y) { RefocusRow(light_field, views, y, &picture); });
   return picture;
 }
 

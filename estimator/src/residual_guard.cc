@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 

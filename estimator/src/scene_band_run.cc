@@ -11,7 +11,7 @@
 #include "residual_guard.h"
 #include "run_cost.h"
 #include "scene_relief.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

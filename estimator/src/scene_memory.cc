@@ -6,9 +6,9 @@
 
 #include "run_cost.h"
 #include "scene_relief.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/picture_filter.h"
-#include "thicklens/model/parallel.h"
 #include "view_fan.h"
 
 namespace thicklens::estimator {
@@ -47,7 +47,7 @@ SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options
       u_count_(static_cast<int>(input.weights.cols())),
       v_count_(static_cast<int>(input.weights.rows())),
       seen_views_(static_cast<int>((input.weights > 0).count())),
-      threads_(model::ResolveThreads(options.threads)),
+      threads_(ResolveThreads(options.threads)),
       reach_px_(reach_px),
       real_(options.double_precision ? sizeof(double) : sizeof(float)),
       patches_(options.prior == Prior::kPatches),

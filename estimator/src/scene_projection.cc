@@ -8,7 +8,7 @@
 
 #include "plain_pixels.h"
 #include "seen_share.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "surface_taps.h"
-#include "thicklens/cancel.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -180,7 +180,7 @@ SceneRays<Real>::SceneRays(const DisparityMap& disparity, const Eigen::ArrayXXd&
   const std::vector<float> highest =
       OfCells(disparity, [](float a, float b) { return std::max(a, b); });
   const DisparityRenderer renderer(disparity);
-  model::ParallelFor(u_count * v_count, threads, [&](int view) {
+  ParallelFor(u_count * v_count, threads, [&](int view) {
     if (progress) progress();
     if (!(weights_[Index(view)] > 0)) return;
     const double a = view % u_count - (u_count - 1) / 2.0;
@@ -201,7 +201,7 @@ template <typename Real>
 void SceneRays<Real>::Apply(const Real* planes, std::size_t stride, Real* photograph) {
   const std::size_t width = Index(width_px_);
   const int bands = (height_px_ + kBandRows - 1) / kBandRows;
-  model::ParallelFor(bands, threads_, [&](int band) {
+  ParallelFor(bands, threads_, [&](int band) {
     const int first = band * kBandRows, last = std::min(height_px_, first + kBandRows);
     Real* warped = rows_.data() + Index(band) * (width + ViewRays<Real>::kMargin);
     std::fill(photograph + Index(first) * width, photograph + Index(last) * width, Real{0});
@@ -220,7 +220,7 @@ void SceneRays<Real>::Apply(const Real* planes, std::size_t stride, Real* photog
 template <typename Real>
 void SceneRays<Real>::ApplyTransposed(const Real* photograph, Real* planes) {
   const std::size_t width = Index(width_px_), stride = plane_stride();
-  model::ParallelFor(static_cast<int>(views_.size()), threads_, [&](int view) {
+  ParallelFor(static_cast<int>(views_.size()), threads_, [&](int view) {
     const std::size_t k = Index(view);
     Real* plane = planes + k * stride;
     std::fill(plane, plane + stride, Real{0});

@@ -8,8 +8,8 @@
 #include <cstddef>
 #include <opencv2/imgproc.hpp>
 
-#include "thicklens/cancel.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -239,7 +239,7 @@ ReliefShading<Real> FitShading(const Relief<Real>& relief, const std::vector<Rea
   shading.sharp.resize(radiance.size());
   shading.already.resize(radiance.size());
   const int strips = (height_px + kStripRows - 1) / kStripRows;
-  model::ParallelFor(strips, threads, [&](int strip) {
+  ParallelFor(strips, threads, [&](int strip) {
     const int first = strip * kStripRows, last = std::min(first + kStripRows, height_px);
     const int from = std::max(0, first - WindowMeans::ReachPx());
     const int to = std::min(height_px, last + WindowMeans::ReachPx());

@@ -15,8 +15,8 @@
 #include "scene_bands.h"
 #include "scene_memory.h"
 #include "scene_views.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -58,7 +58,7 @@ model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& opt
                              const SceneViewSink* sink, kernels::Backend* backend,
                              SceneSummary* summary, SceneMaps* maps) {
   const auto start = Clock::now();
-  summary->threads = model::ResolveThreads(options.threads);
+  summary->threads = ResolveThreads(options.threads);
   summary->prior = options.prior;
   summary->device = backend != nullptr ? backend->name() : "cpu";
   const bool falloff = options.falloff && input.camera.has_value();

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -17,7 +17,7 @@ constexpr int kBandRows = 16;
 
 void ForBands(int height_px, int threads, const std::function<void(int, int)>& rows) {
   const int bands = (height_px + kBandRows - 1) / kBandRows;
-  model::ParallelFor(bands, threads, [&](int band) {
+  ParallelFor(bands, threads, [&](int band) {
     rows(band * kBandRows, std::min((band + 1) * kBandRows, height_px));
   });
 }

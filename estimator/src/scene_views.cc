@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "surface_taps.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -74,7 +74,7 @@ void ShowInAllViews(const EstimateInput& input, const SolvedScene& solved, int t
   const DisparityRenderer renderer(input.disparity);
   ViewMaker maker(solved.radiance, input.disparity, backend);
   Spare<model::LinearPicture> spare;
-  model::ParallelFor(u_count * v_count, threads, [&](int view) {
+  ParallelFor(u_count * v_count, threads, [&](int view) {
     const int k = view % u_count, l = view / u_count;
     const double a = k - (u_count - 1) / 2.0, b = l - (v_count - 1) / 2.0;
     const CompactView* seen = ViewAt(solved.fan, a, b);

@@ -7,7 +7,7 @@
 
 #include "cell_disparity.h"
 #include "surface_taps.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -79,7 +79,7 @@ std::vector<float> SeenShare(const ViewFan& fan, const DisparityMap& disparity,
                              const std::vector<unsigned char>& known, int threads) {
   const auto same_surface = static_cast<float>(SurfaceTolerance(disparity));
   std::vector<float> share(disparity.disparity.size(), 0.0F);
-  model::ParallelFor(disparity.height_px, threads, [&](int y) {
+  ParallelFor(disparity.height_px, threads, [&](int y) {
     const std::size_t at = Index(y) * Index(disparity.width_px);
     for (const FanView& view : fan.views) {
       AddSeenOf({disparity.width_px, disparity.height_px, y,

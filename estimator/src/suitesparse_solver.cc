@@ -11,7 +11,7 @@
 
 #include "factor_memory.h"
 #include "linear_solver_kinds.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

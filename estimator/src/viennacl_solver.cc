@@ -15,7 +15,7 @@
 
 #include "iterative_solver.h"
 #include "linear_solver_kinds.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens::estimator {

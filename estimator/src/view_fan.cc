@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -81,7 +81,7 @@ ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights,
     }
   }
   const DisparityRenderer renderer(disparity);
-  model::ParallelFor(static_cast<int>(fan.views.size()), threads, [&](int i) {
+  ParallelFor(static_cast<int>(fan.views.size()), threads, [&](int i) {
     if (progress) progress();
     FanView& view = fan.views[Index(i)];
     view.sees = renderer.RenderCompact(view.a, view.b);
@@ -94,7 +94,7 @@ FanAxes AxesOf(const ViewFan& fan, const DisparityMap& disparity, int u_count, i
   FanAxes axes;
   axes.across = {u_count, std::vector<std::vector<float>>(Index(u_count)), {}};
   axes.down = {v_count, std::vector<std::vector<float>>(Index(v_count)), {}};
-  model::ParallelFor(u_count + v_count, threads, [&](int i) {
+  ParallelFor(u_count + v_count, threads, [&](int i) {
     if (i < u_count) {
       axes.across.source_px[Index(i)] =
           SourcesOnAxis(fan, disparity, Offset(i, u_count), v_count, true);

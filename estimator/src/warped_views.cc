@@ -6,7 +6,7 @@
 
 #include "estimate_input.h"
 #include "ray_irradiance.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -38,7 +38,7 @@ model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int t
   const PictureWarper warper(radiance, input.disparity);
   const int views = warped.u_count * warped.v_count;
   if (disparity != nullptr) disparity->resize(Index(views));
-  model::ParallelFor(views, threads, [&](int view) {
+  ParallelFor(views, threads, [&](int view) {
     const int k = view % warped.u_count;
     const int l = view / warped.u_count;
     ViewDisparity shown = renderer.Render(warped.u_offset(k), warped.v_offset(l));

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

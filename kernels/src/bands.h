@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::kernels {
 

@@ -11,7 +11,7 @@
 #include "device_survey.h"
 #include "opencl_device.h"
 #include "opencl_program.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

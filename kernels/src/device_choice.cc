@@ -6,7 +6,7 @@
 #include <cctype>
 #include <tuple>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

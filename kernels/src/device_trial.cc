@@ -8,7 +8,7 @@
 #include "device_survey.h"
 #include "opencl_program.h"
 #include "opencl_use.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

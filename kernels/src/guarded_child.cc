@@ -16,8 +16,8 @@
 #include <cstring>
 #include <exception>
 
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

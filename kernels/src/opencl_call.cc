@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "opencl_program.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "guarded_child.h"
 #include "opencl_use.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

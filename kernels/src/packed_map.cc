@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "bands.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::kernels {
 namespace {

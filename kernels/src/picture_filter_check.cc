@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "arguments.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::kernels {

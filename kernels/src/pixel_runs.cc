@@ -7,7 +7,7 @@
 
 #include "bands.h"
 #include "filter_loops.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::kernels {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/kernels/view_warp.h"
 #include "warp_arguments.h"
 

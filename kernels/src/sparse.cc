@@ -6,8 +6,8 @@
 #include <iterator>
 #include <utility>
 
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

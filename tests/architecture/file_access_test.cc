@@ -28,11 +28,11 @@ const std::regex& WaysToOpenAFile() {
 // Sources that open files, and why.
 const std::set<std::string>& Known() {
   static const std::set<std::string> known = {
-      "model/src/input_file.cc",            // the reader
-      "model/src/output_file.cc",           // the writers
-      "model/src/output_folder.cc",         //
-      "model/src/output_part.cc",           //
-      "model/src/output_target.cc",         //
+      "model/base/input_file.cc",           // the reader
+      "model/base/output_file.cc",          // the writers
+      "model/base/output_folder.cc",        //
+      "model/base/output_part.cc",          //
+      "model/base/output_target.cc",        //
       "tools/src/journal_file.cc",          // grows while a run is on its way
       "tools/src/float_tiff.cc",            // a file in an output folder
       "tools/src/picture_kind.cc",          // libtiff, from memory
@@ -79,7 +79,7 @@ TEST(FileAccess, IsInKnownPlacesAlone) {
       found.insert(name);
       EXPECT_EQ(Known().count(name), 1U)
           << name << " opens files by '" << way
-          << "': model::ReadTextFile, ReadWholeFile, OutputFile or OutputFolder is expected";
+          << "': ReadTextFile, ReadWholeFile, OutputFile or OutputFolder is expected";
     }
   }
   EXPECT_EQ(found, Known()) << "what opens no files any more is not to be known";

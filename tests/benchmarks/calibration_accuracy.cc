@@ -15,8 +15,8 @@
 #include "benchmarks/accuracy/fault_study.h"
 #include "benchmarks/accuracy/pupil_law_study.h"
 #include "benchmarks/accuracy/tables.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::accuracy {
 namespace {
@@ -133,7 +133,7 @@ void RunAll(const Arguments& arguments, Run* run) {
   std::vector<std::vector<Trial>> results(keys.size());
   std::atomic<std::size_t> done{0};
   const auto begin = std::chrono::steady_clock::now();
-  model::ParallelFor(static_cast<int>(keys.size()), arguments.threads, [&](int i) {
+  ParallelFor(static_cast<int>(keys.size()), arguments.threads, [&](int i) {
     const TrialKey& key = keys[static_cast<std::size_t>(i)];
     const bool is_edge = key.target == model::TargetKind::kKnifeEdge;
     results[static_cast<std::size_t>(i)] =

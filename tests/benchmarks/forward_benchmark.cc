@@ -20,12 +20,12 @@
 #include "scene_data.h"
 #include "scene_priors.h"
 #include "scene_projection.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/kernels/radiance_steps.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -50,7 +50,7 @@ void Triad(benchmark::State& state) {
   constexpr int kParts = 64;
   std::vector<float> a(kCount), b(kCount, 1.0F), c(kCount, 2.0F);
   for (auto _ : state) {
-    model::ParallelFor(kParts, kThreads, [&](int part) {
+    ParallelFor(kParts, kThreads, [&](int part) {
       constexpr std::size_t kOfPart = kCount / kParts;
       const std::size_t first = static_cast<std::size_t>(part) * kOfPart;
       TriadOf(b.data() + first, c.data() + first, 3, kOfPart, a.data() + first);

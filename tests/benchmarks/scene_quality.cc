@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/depth_noise.h"
 #include "thicklens/estimator/estimate_checks.h"

@@ -11,9 +11,9 @@
 #include <random>
 #include <vector>
 
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -51,7 +51,7 @@ void ViewNative(benchmark::State& state) {
   const PictureWarper warper(scene.picture, scene.map);
   std::array<model::LinearPicture, kViews> warped;
   for (auto _ : state) {
-    model::ParallelFor(kViews, 2, [&](int i) {
+    ParallelFor(kViews, 2, [&](int i) {
       warper.Warp(view, &warped[static_cast<std::size_t>(i)]);
       benchmark::ClobberMemory();
     });
@@ -79,7 +79,7 @@ void ViewOpenCl(benchmark::State& state) {
   };
   for (int i = 0; i < kViews; ++i) make(i);  // a first call compiles
   for (auto _ : state) {
-    model::ParallelFor(kViews, 2, make);
+    ParallelFor(kViews, 2, make);
     benchmark::ClobberMemory();
   }
   Count(&state);

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "simulated_sweep.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/calib/calibrate.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -43,7 +43,7 @@ void ExpectNoBiasOfSweeps(const std::string& case_name) {
   how.map_field = false;
   how.threads = 1;
   std::vector<Errors> errors(kSweeps);
-  model::ParallelFor(kSweeps, 0, [&](int i) {
+  ParallelFor(kSweeps, 0, [&](int i) {
     const auto seed = static_cast<std::uint64_t>(20000 + i);
     SimulatedSweep s = Simulate(SweepCase(case_name, kSizePx, seed));
     GiveDrawnFloor(&s, seed);

@@ -10,7 +10,7 @@
 
 #include "simulated_sweep.h"
 #include "support/error_message.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/model/camera_file.h"
 
 namespace thicklens::calib {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "support/error_message.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::calib {
 namespace {
@@ -95,7 +95,7 @@ TEST(FrameStore, ThreadsGetTheirFramesAndTheLimitHolds) {
   const CountedSweep counted(16);
   FrameStore store(counted.sweep, 6 * kFrame);
   std::atomic<int> wrong{0}, over{0};
-  model::ParallelFor(2000, 8, [&](int k) {
+  ParallelFor(2000, 8, [&](int k) {
     const auto i = static_cast<std::size_t>(k * 7 % 16);
     if (store.Stored(i).at<std::uint8_t>(9, 19) != i + 1) ++wrong;
     if (store.kept_bytes() > 6 * kFrame) ++over;

@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {

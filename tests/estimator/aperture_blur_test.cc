@@ -7,7 +7,7 @@
 #include <string>
 
 #include "ray_irradiance.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -1,5 +1,5 @@
 // How soon computations end that are cancelled, and that nothing takes the end for an error.
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -12,7 +12,7 @@
 #include <random>
 
 #include "scene_projection.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/functional_solver.h"

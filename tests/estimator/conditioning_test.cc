@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

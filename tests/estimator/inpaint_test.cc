@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "support/error_message.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -16,7 +16,7 @@
 
 #include "support/error_message.h"
 #include "support/sanitizers.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::estimator {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "support/error_message.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/fill_holes.h"
 #include "thicklens/kernels/device.h"

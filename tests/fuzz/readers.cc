@@ -12,7 +12,7 @@
 #include "image_io.h"
 #include "journal_file.h"
 #include "light_field_io.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "thicklens/model/scene_simulator.h"

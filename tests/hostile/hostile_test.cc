@@ -12,9 +12,9 @@
 #include "light_field_io.h"
 #include "printable_text.h"
 #include "program_run.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::hostile {
 namespace {
@@ -114,7 +114,7 @@ HostileTest::HostileTest() {
   model::LightField light_field = model::MakeLightField(kWidthPx, kHeightPx, 2, 2, 3);
   for (std::size_t i = 0; i < light_field.values.size(); ++i)
     light_field.values[i] = 0.2F + 0.01F * static_cast<float>(i * 37 % 50);
-  model::OutputFolder folder(Work("lf"), tools::kLightFieldMarker, tools::LightFieldEntries());
+  OutputFolder folder(Work("lf"), tools::kLightFieldMarker, tools::LightFieldEntries());
   tools::WriteLightField(light_field, tools::ViewFormat::kPng, &folder);
   folder.Commit();
 }

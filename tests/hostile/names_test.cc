@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "hostile/hostile_test.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::hostile {
 namespace {

@@ -23,8 +23,8 @@
 #include "opencl_program.h"
 #include "opencl_use.h"
 #include "support/error_message.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::kernels {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::testing {
 

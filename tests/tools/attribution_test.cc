@@ -12,9 +12,9 @@
 
 #include "child_process.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/scene_simulator.h"
 #include "thicklens/model/sweep_simulator.h"
-#include "thicklens/model/yaml_reader.h"
 
 namespace thicklens::tools {
 namespace {

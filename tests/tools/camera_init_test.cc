@@ -8,9 +8,9 @@
 #include <string>
 
 #include "image_io.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -38,7 +38,7 @@ std::string WritePhoto(const std::string& name, const Exiv2::ExifData& exif) {
   const std::string path = ::testing::TempDir() + "/" + name;
   model::StoredPicture picture{32, 24, 1, 8, {}};
   picture.values.assign(32 * 24, 128);
-  model::WriteFileAtomically(path, EncodePng(picture));
+  WriteFileAtomically(path, EncodePng(picture));
   const auto image = Exiv2::ImageFactory::open(path);
   image->setExifData(exif);
   image->writeMetadata();

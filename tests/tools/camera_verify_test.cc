@@ -17,10 +17,10 @@
 #include "bench_sweep.h"
 #include "child_process.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/verification.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -52,7 +52,7 @@ CalibratedSweep SmallSweep(std::uint64_t seed) {
 // Pairs of sweeps of the same camera, one of which is stored.
 std::vector<CalibratedSweep> Sweeps(int count) {
   std::vector<CalibratedSweep> sweeps(static_cast<std::size_t>(count));
-  model::ParallelFor(count, 0, [&](int i) {
+  ParallelFor(count, 0, [&](int i) {
     sweeps[static_cast<std::size_t>(i)] = SmallSweep(500 + static_cast<std::uint64_t>(i));
   });
   return sweeps;

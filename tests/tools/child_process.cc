@@ -8,7 +8,7 @@
 #include <csignal>
 #include <stdexcept>
 
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -66,8 +66,8 @@ ProgramResult ChildProgram::Wait() {
   if (!ended_) ::waitpid(pid_, &status_, 0);
   ended_ = true;
   return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -1,
-          WIFSIGNALED(status_) ? WTERMSIG(status_) : 0, model::ReadWholeFile(out_path_),
-          model::ReadWholeFile(err_path_)};
+          WIFSIGNALED(status_) ? WTERMSIG(status_) : 0, ReadWholeFile(out_path_),
+          ReadWholeFile(err_path_)};
 }
 
 }  // namespace thicklens::tools

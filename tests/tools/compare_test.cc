@@ -21,9 +21,9 @@
 #include "light_field_io.h"
 #include "support/special_numbers.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field_grid.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -172,7 +172,7 @@ class CompareProgram : public ::testing::Test {
     return Write(name, ReadLightField(PutHci(name + "_hci", n, noise), reading));
   }
   std::string Write(const std::string& name, const model::LightField& light_field) const {
-    model::OutputFolder folder(folder_ / name, kLightFieldMarker, LightFieldEntries());
+    OutputFolder folder(folder_ / name, kLightFieldMarker, LightFieldEntries());
     WriteLightField(light_field, ViewFormat::kPng, &folder);
     folder.Commit();
     return folder_ / name;

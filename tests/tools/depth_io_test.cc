@@ -16,7 +16,7 @@
 #include "png_check.h"
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

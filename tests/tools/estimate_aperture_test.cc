@@ -19,10 +19,10 @@
 #include "image_io.h"
 #include "light_field_io.h"
 #include "support/temporary_folder.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -65,7 +65,7 @@ class SparseApertureTest : public ::testing::Test {
   // The views that are kept, in a folder of the HCI layout, which states no aperture.
   std::string PutHci(bool sparse) const {
     const std::string folder = folder_ / (sparse ? "sparse-hci" : "hci");
-    model::OutputFolder output = ClaimHciFolder(folder);
+    OutputFolder output = ClaimHciFolder(folder);
     WriteHciLightField(Views(sparse), &output);
     output.Commit();
     return folder;
@@ -75,7 +75,7 @@ class SparseApertureTest : public ::testing::Test {
     const std::string folder = folder_ / ("own-" + model::ApertureShapeName(shape));
     model::LightField light_field = Views(true);
     light_field.weights = ShapeOfPresentViews(shape, light_field);
-    model::OutputFolder output(folder, kLightFieldMarker, LightFieldEntries());
+    OutputFolder output(folder, kLightFieldMarker, LightFieldEntries());
     WriteLightField(light_field, ViewFormat::kPng, &output);
     output.Commit();
     return folder;

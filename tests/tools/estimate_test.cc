@@ -26,9 +26,9 @@
 #include "light_field_io.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -502,7 +502,7 @@ TEST_F(EstimateTest, TheBaselineIsRadianceToo) {
     for (int k = 0; k < 3; ++k) model::SetView(&truth, k, l, view);
   }
   const std::string folder = folder_ / "truth";
-  model::OutputFolder output(folder, kLightFieldMarker, LightFieldEntries());
+  OutputFolder output(folder, kLightFieldMarker, LightFieldEntries());
   WriteLightField(truth, ViewFormat::kTiff, &output);
   output.Commit();
 

@@ -6,7 +6,7 @@
 
 #include "explain_table.h"
 #include "support/special_numbers.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {

@@ -21,7 +21,7 @@
 #include "program_run.h"
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -62,11 +62,10 @@ psf: gaussian
 using Contents = std::map<std::string, std::string>;
 Contents ContentsOf(const std::string& path) {
   Contents contents;
-  if (fs::is_regular_file(path)) return {{"", model::ReadWholeFile(path)}};
+  if (fs::is_regular_file(path)) return {{"", ReadWholeFile(path)}};
   for (const auto& entry : fs::recursive_directory_iterator(path)) {
     if (entry.is_regular_file()) {
-      contents[fs::relative(entry.path(), path).string()] =
-          model::ReadWholeFile(entry.path().string());
+      contents[fs::relative(entry.path(), path).string()] = ReadWholeFile(entry.path().string());
     }
   }
   return contents;
@@ -284,7 +283,7 @@ TEST_F(Faults, AFileThatEndsTooEarlyIsTold) {
   for (const std::string name : {"picture.png", "depth.pfm", "camera.yaml"}) {
     SCOPED_TRACE(name);
     const std::string whole = folder_ / "pic/" + name;
-    const std::string bytes = model::ReadWholeFile(whole);
+    const std::string bytes = ReadWholeFile(whole);
     const std::string cut = folder_.Put("cut-" + name, bytes.substr(0, bytes.size() / 2));
     Arguments arguments = job.ways[0];
     std::replace(arguments.begin(), arguments.end(), whole, cut);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

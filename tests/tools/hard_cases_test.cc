@@ -22,9 +22,9 @@
 #include "interrupt.h"
 #include "light_field_io.h"
 #include "support/temporary_folder.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::tools {
@@ -155,7 +155,7 @@ void WriteViewsOf(const fs::path& folder, const HardPicture& shape, const ViewOf
       }
     }
   }
-  model::OutputFolder output((folder / "views").string(), kLightFieldMarker, LightFieldEntries());
+  OutputFolder output((folder / "views").string(), kLightFieldMarker, LightFieldEntries());
   WriteLightField(views, ViewFormat::kTiff, &output);
   output.Commit();
 }
@@ -299,7 +299,7 @@ TEST(DoctorHardCases, RunsOneAndKeepsItsFiles) {
               AllOf(HasSubstr("ok   optics/no-aperture"),
                     HasSubstr("$ thicklens explain camera.yaml"), HasSubstr("1 of 1 as required")));
   EXPECT_TRUE(fs::exists(fs::path(kept) / "optics/no-aperture/camera.yaml"));
-  const auto json = nlohmann::json::parse(model::ReadWholeFile(summary));
+  const auto json = nlohmann::json::parse(ReadWholeFile(summary));
   EXPECT_EQ(json["rows"].size(), 1U);
   EXPECT_EQ(json["rows"][0]["as_required"], true);
   EXPECT_EQ(json["status"], "ok");

@@ -13,8 +13,8 @@
 #include "data_hash.h"
 #include "encoded_picture.h"
 #include "frame_files.h"
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -127,15 +127,13 @@ TEST(FrameFiles, DigestDoesNotDependOnWhatWasReadFirst) {
   std::vector<model::SweepFrame> frames;
   for (int i = 0; i < 3; ++i) {
     frames.push_back({folder + "/digest_" + std::to_string(i) + ".png", 10.5 + i});
-    model::WriteFileAtomically(frames.back().image,
-                               Encoded(cv::Mat(4, 4, CV_8U, cv::Scalar(i)), ".png"));
+    WriteFileAtomically(frames.back().image, Encoded(cv::Mat(4, 4, CV_8U, cv::Scalar(i)), ".png"));
   }
   std::string lines;
   for (const model::SweepFrame& frame : frames) {
-    lines +=
-        Sha256Hex(model::ReadWholeFile(frame.image)) + (frame.reading_mm == 10.5   ? " 10.5\n"
-                                                        : frame.reading_mm == 11.5 ? " 11.5\n"
-                                                                                   : " 12.5\n");
+    lines += Sha256Hex(ReadWholeFile(frame.image)) + (frame.reading_mm == 10.5   ? " 10.5\n"
+                                                      : frame.reading_mm == 11.5 ? " 11.5\n"
+                                                                                 : " 12.5\n");
   }
   FrameFiles unread(frames);
   FrameFiles backwards(frames);

@@ -13,7 +13,7 @@
 #include "program_run.h"
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -38,7 +38,7 @@ class InputKinds : public ::testing::Test {
     Make({"simulate", "picture", scene, "-o", *made_ / "pic"});
     Make({"simulate", "light-field", scene, "--views", "2x2", "-o", *made_ / "lf"});
     Make({"render", *made_ / "lf", "--convert", "hci", "-o", *made_ / "hci"});
-    made_->Put("frames/a.png", model::ReadWholeFile(*made_ / "pic/picture.png"));
+    made_->Put("frames/a.png", ReadWholeFile(*made_ / "pic/picture.png"));
     made_->Put("table.csv", "a.png,300\n");
     made_->Put("sweep.yaml",
                "schema: thicklens/sweep/1\ncamera: case.yaml\n"

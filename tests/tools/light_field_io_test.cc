@@ -18,7 +18,7 @@
 #include "image_io.h"
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {
@@ -74,14 +74,14 @@ class LightFieldFolder : public ::testing::Test {
  protected:
   std::string Write(const model::LightField& light_field, ViewFormat format,
                     std::size_t* clipped = nullptr) {
-    model::OutputFolder folder(folder_ / "lf", kLightFieldMarker, LightFieldEntries());
+    OutputFolder folder(folder_ / "lf", kLightFieldMarker, LightFieldEntries());
     const std::size_t count = WriteLightField(light_field, format, &folder);
     if (clipped != nullptr) *clipped = count;
     folder.Commit();
     return folder_ / "lf";
   }
   std::string WriteHci(const model::LightField& light_field) {
-    model::OutputFolder folder = ClaimHciFolder(folder_ / "hci");
+    OutputFolder folder = ClaimHciFolder(folder_ / "hci");
     WriteHciLightField(light_field, &folder);
     folder.Commit();
     return folder_ / "hci";

@@ -12,7 +12,7 @@
 
 #include "option_values.h"
 #include "support/error_message.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

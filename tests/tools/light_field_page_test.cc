@@ -670,7 +670,7 @@ TEST_F(LightFieldPageTest, SlowStaysBelowFourMegabytesForOrdinaryPictures) {
 class ReportProgram : public ::testing::Test {
  protected:
   std::string Write(const model::LightField& light_field, const std::string& name) {
-    model::OutputFolder folder(folder_ / name, kLightFieldMarker, LightFieldEntries());
+    OutputFolder folder(folder_ / name, kLightFieldMarker, LightFieldEntries());
     WriteLightField(light_field, ViewFormat::kPng, &folder);
     folder.Commit();
     return folder_ / name;

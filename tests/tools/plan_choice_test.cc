@@ -18,8 +18,8 @@
 #include "estimate_profile.h"
 #include "profile_measurement.h"
 #include "support/temporary_folder.h"
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {

@@ -18,8 +18,8 @@
 #include "image_io.h"
 #include "support/part_of.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::tools {
@@ -496,7 +496,7 @@ TEST_F(ProgramTest, AnInterruptLeavesNothingHalfWritten) {
 }
 
 TEST_F(ProgramTest, TwoRunsDoNotWriteTheSameOutput) {
-  const model::OutputFile other_run(folder_ / "camera.yaml");
+  const OutputFile other_run(folder_ / "camera.yaml");
   EXPECT_THAT(Failure({"calibrate", *shared_ / "sweep/sweep.yaml", "-o", folder_ / "camera.yaml"}),
               AllOf(HasSubstr("camera.yaml"), HasSubstr("another run")));
   EXPECT_FALSE(fs::exists(folder_ / "camera.yaml"));

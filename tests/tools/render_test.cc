@@ -22,8 +22,8 @@
 #include "picture_description.h"
 #include "support/part_of.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -65,7 +65,7 @@ model::LightField AtRandom(int u_count, int v_count, unsigned seed) {
 class RenderTest : public ::testing::Test {
  protected:
   std::string Write(const std::string& name, const model::LightField& light_field) const {
-    model::OutputFolder folder(folder_ / name, kLightFieldMarker, LightFieldEntries());
+    OutputFolder folder(folder_ / name, kLightFieldMarker, LightFieldEntries());
     WriteLightField(light_field, ViewFormat::kTiff, &folder);
     folder.Commit();
     return folder_ / name;
@@ -156,7 +156,7 @@ TEST_F(RenderTest, ThePhotographIsTheWeightedMeanInLinearLight) {
 TEST_F(RenderTest, TheProtocolsCommandWorksAsWritten) {
   // 7 x 7 views inside a numbering of 9 a row.
   const model::LightField light_field = AtRandom(7, 7, 2);
-  model::OutputFolder hci = ClaimHciFolder(folder_ / "hci");
+  OutputFolder hci = ClaimHciFolder(folder_ / "hci");
   WriteHciLightField(light_field, &hci);
   hci.Commit();
   fs::create_directories(folder_ / "true");

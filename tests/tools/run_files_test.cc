@@ -12,7 +12,7 @@
 #include "child_process.h"
 #include "program_run.h"
 #include "support/temporary_folder.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {

@@ -19,9 +19,9 @@
 #include "light_field_io.h"
 #include "support/part_of.h"
 #include "support/temporary_folder.h"
+#include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/scene_simulator.h"
-#include "thicklens/model/yaml_reader.h"
 
 namespace thicklens::tools {
 namespace {
@@ -95,7 +95,7 @@ TEST_F(SimulateSceneTest, PictureFolderHoldsWhatTheSimulatorMakes) {
   EXPECT_EQ(camera.image_distance_mm(), options.camera.image_distance_mm());
   EXPECT_EQ(camera.blur_ratio(), 0.45);
   EXPECT_EQ(camera.calibration->blur_floor_px->value, 0.5);
-  const model::YamlNode truth = model::YamlNode::LoadFile(out + "/truth.yaml");
+  const YamlNode truth = YamlNode::LoadFile(out + "/truth.yaml");
   EXPECT_EQ(truth.At("nearest_depth_mm").Number(), 297);
 
   const nlohmann::json json = JsonOf("a.json");
@@ -132,7 +132,7 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndTold) {
            "defocus", "--json", folder_ / "given.json"});
   EXPECT_THAT(given.out, HasSubstr("effects: falloff; left out"));
   EXPECT_EQ(JsonOf("given.json")["bits"], 16);
-  const model::YamlNode truth = model::YamlNode::LoadFile(folder_ / "given" + "/truth.yaml");
+  const YamlNode truth = YamlNode::LoadFile(folder_ / "given" + "/truth.yaml");
   ASSERT_EQ(truth.At("effects").Elements().size(), 1U);
   EXPECT_EQ(truth.At("effects").Elements()[0].Text(), "falloff");
   EXPECT_EQ(model::ReadCamera(folder_ / "given" + "/camera.yaml").sensor.transfer.Name(), "linear");

@@ -15,7 +15,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -134,7 +134,7 @@ StoppedProgram::End StoppedProgram::Wait() {
     end.cpu_seconds = cpu_after_ - cpu_before_;
   }
   if (settings_.stderr_fd < 0) {
-    end.err = model::ReadWholeFile(settings_.scratch_folder + "/stderr");
+    end.err = ReadWholeFile(settings_.scratch_folder + "/stderr");
   }
   return end;
 }

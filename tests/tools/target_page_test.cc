@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

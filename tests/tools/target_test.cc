@@ -21,7 +21,7 @@
 #include "target_drawing.h"
 #include "target_page.h"
 #include "target_texture.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "xml_elements.h"
 
 namespace thicklens::tools {

@@ -14,7 +14,7 @@
 
 #include "estimate_plan.h"
 #include "picture_load.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "program_run.h"
 #include "support/temporary_folder.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {

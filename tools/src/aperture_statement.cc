@@ -7,7 +7,7 @@
 
 #include "light_field_io.h"
 #include "printable_text.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/aperture_weights.h"
 
 namespace thicklens::tools {

@@ -10,9 +10,9 @@
 #include "attribution.h"
 #include "simulated_sweep.h"
 #include "stopwatch.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/calib/calibrate.h"
-#include "thicklens/error.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -28,8 +28,7 @@ class Frames {
       : make_(std::move(make)) {
     if (count * bytes > kMostHeldBytes) return;
     held_.resize(static_cast<std::size_t>(count));
-    model::ParallelFor(count, threads,
-                       [this](int i) { held_[static_cast<std::size_t>(i)] = make_(i); });
+    ParallelFor(count, threads, [this](int i) { held_[static_cast<std::size_t>(i)] = make_(i); });
   }
   Frame At(int i) const { return held_.empty() ? make_(i) : held_[static_cast<std::size_t>(i)]; }
 
@@ -200,7 +199,7 @@ class SweepAttributor {
     const auto with = [&](int i) { return with_noise ? base.Values(i, true) : noiseless.At(i); };
     std::vector<PictureChangeMeter> meters(static_cast<std::size_t>(sweep_.frame_count));
     std::vector<double> rms(meters.size());
-    model::ParallelFor(sweep_.frame_count, run_.threads, [&](int i) {
+    ParallelFor(sweep_.frame_count, run_.threads, [&](int i) {
       const auto at = static_cast<std::size_t>(i);
       rms[at] = meters[at].Add(with(i), world.Values(i, with_noise));
     });

@@ -15,7 +15,7 @@
 #include "printable_text.h"
 #include "simulated_sweep.h"
 #include "svg_plot.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {
@@ -207,7 +207,7 @@ SweepAttribution AttributeSweepOf(const std::string& path,
 }
 
 void WriteAttribution(const Attribution& attribution, const std::string& name,
-                      model::OutputFolder* folder) {
+                      OutputFolder* folder) {
   folder->Write(kAttributionPage, AttributionPage(attribution, name, Version(), NowIso8601()));
   folder->Write(kAttributionTable, AttributionCsv(attribution));
 }

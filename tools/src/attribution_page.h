@@ -6,7 +6,7 @@
 #include "attribution_table.h"
 #include "commands.h"
 #include "progress_line.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 
@@ -26,7 +26,7 @@ SweepAttribution AttributeSweepOf(const std::string& path,
 inline constexpr char kAttributionPage[] = "attribution.html";
 inline constexpr char kAttributionTable[] = "attribution.csv";
 void WriteAttribution(const Attribution& attribution, const std::string& name,
-                      model::OutputFolder* folder);
+                      OutputFolder* folder);
 
 }  // namespace thicklens::tools
 

@@ -26,11 +26,11 @@
 #include "progress_line.h"
 #include "solvers_table.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -143,7 +143,7 @@ CommandResult BenchSolvers(const BenchOptions& options) {
   std::tie(run.width_px, run.height_px) = SizeOf(options.size);
   std::tie(run.u_count, run.v_count) = ViewCounts(options.views);
   if (run.u_count == 0) run.u_count = run.v_count = 7;
-  run.threads = model::ResolveThreads(options.common.threads);
+  run.threads = ResolveThreads(options.common.threads);
   run.repeat = options.repeat;
   SampledPicture picture;
   {

@@ -34,11 +34,11 @@
 #include "progress_line.h"
 #include "simulate_scene.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/output_file.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -280,7 +280,7 @@ std::string ProfilePathOf(const BenchAccuracyOptions& options) {
 }
 
 // Claims a file in a folder that may have to be made.
-model::OutputFile ClaimProfile(const BenchAccuracyOptions& options) {
+OutputFile ClaimProfile(const BenchAccuracyOptions& options) {
   const std::string path = ProfilePathOf(options);
   if (path.empty()) {
     throw UsageError(
@@ -290,13 +290,13 @@ model::OutputFile ClaimProfile(const BenchAccuracyOptions& options) {
     std::error_code failure;
     std::filesystem::create_directories(std::filesystem::path(path).parent_path(), failure);
   }
-  return model::OutputFile(path);
+  return OutputFile(path);
 }
 
 CommandResult SaveProfile(const BenchAccuracyOptions& options) {
-  model::OutputFile file = ClaimProfile(options);
+  OutputFile file = ClaimProfile(options);
   ProfileRun run;
-  run.threads = model::ResolveThreads(options.common.threads);
+  run.threads = ResolveThreads(options.common.threads);
   run.repeat = options.repeat;
   run.seed = options.seed.value_or(kUsualSeed);
   MeasuredProfile measured;
@@ -346,7 +346,7 @@ CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
   const std::vector<Scene> scenes = ScenesOf(options);
   BenchReport report(options.report_folder);
   Backends backends;
-  backends.threads = model::ResolveThreads(options.common.threads);
+  backends.threads = ResolveThreads(options.common.threads);
   backends.processor =
       kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
   std::string notice;

@@ -26,10 +26,10 @@
 #include "option_values.h"
 #include "progress_line.h"
 #include "simulated_sweep.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/calib/calibrate.h"
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
-#include "thicklens/model/parallel.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {
@@ -279,7 +279,7 @@ std::vector<CalibrationRow> Measure(const BenchCalibrationOptions& options,
   ProgressLine progress("calibrating", options.common.quiet);
   std::atomic<int> done{0};
   cv::setNumThreads(1);  // else its threads' time is in nobody's CPU time
-  model::ParallelFor(sweeps, options.common.threads, [&](int i) {
+  ParallelFor(sweeps, options.common.threads, [&](int i) {
     const BenchSweep bench =
         MakeBenchSweep(description, target_picture, grid.fields_px.front(),
                        static_cast<std::uint64_t>(options.seed) + static_cast<std::uint64_t>(i));

@@ -20,11 +20,11 @@
 #include "interrupt.h"
 #include "option_values.h"
 #include "progress_line.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -167,7 +167,7 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
       BenchSummary({{"size", {options.size_px, options.size_px}},
                     {"views", {options.views, options.views}},
                     {"block_solver", estimator::BlockSolverName(estimator::DefaultBlockSolver())},
-                    {"threads", model::ResolveThreads(options.common.threads)},
+                    {"threads", ResolveThreads(options.common.threads)},
                     {"repeat", options.repeat},
                     {"seed", options.seed},
                     {"dibr_psnr_db", dibr_db},

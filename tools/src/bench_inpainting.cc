@@ -20,10 +20,10 @@
 #include "interrupt.h"
 #include "progress_line.h"
 #include "stopwatch.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -146,7 +146,7 @@ json RowJson(const InpaintingRow& row) {
 }
 
 CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
-  const int threads = model::ResolveThreads(options.common.threads);
+  const int threads = ResolveThreads(options.common.threads);
   BenchScene scene;
   {
     ProgressLine progress("simulating", options.common.quiet);

@@ -9,8 +9,8 @@
 #include "build_info.h"
 #include "commands.h"
 #include "stopwatch.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/blas.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -49,7 +49,7 @@ double TriadBytesPerSecond(int threads) {
   double best = 0;
   for (int run = 0; run < kRuns; ++run) {
     const Clock::time_point start = Clock::now();
-    model::ParallelFor(kParts, threads, [&](int part) {
+    ParallelFor(kParts, threads, [&](int part) {
       constexpr std::size_t kOfPart = kCount / kParts;
       const std::size_t first = static_cast<std::size_t>(part) * kOfPart;
       TriadOf(b.data() + first, c.data() + first, kOfPart, a.data() + first);

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "svg_plot.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 
@@ -22,7 +22,7 @@ class BenchReport {
   void Commit(const std::string& page, const std::string& csv, const std::vector<Plot>& figures);
 
  private:
-  std::optional<model::OutputFolder> folder_;
+  std::optional<OutputFolder> folder_;
 };
 
 // The line from point to point of a front, sorted by cost: between two of them one gets what the

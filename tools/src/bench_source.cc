@@ -25,9 +25,9 @@
 #include "option_values.h"
 #include "progress_line.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/parallel.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {
@@ -221,7 +221,7 @@ void CheckUsage(const BenchSourceOptions& options) {
 CommandResult BenchSource(const BenchSourceOptions& options) {
   CheckUsage(options);
   SourceBench bench;
-  bench.threads = model::ResolveThreads(options.common.threads);
+  bench.threads = ResolveThreads(options.common.threads);
   bench.processor =
       kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
   std::string notice;

@@ -18,7 +18,7 @@
 #include "data_hash.h"
 #include "interrupt.h"
 #include "printable_text.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -25,9 +25,9 @@
 #include "sweep_input.h"
 #include "sweep_options.h"
 #include "sweep_understanding.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -71,9 +71,9 @@ struct Outputs {
   }
 
   ReportFolder folder;
-  std::optional<model::OutputFile> camera;
-  std::optional<model::OutputFile> report;
-  std::optional<model::OutputFolder> figures;
+  std::optional<OutputFile> camera;
+  std::optional<OutputFile> report;
+  std::optional<OutputFolder> figures;
 };
 
 const model::SweepTruth* TruthOf(const SweepInput& input) {

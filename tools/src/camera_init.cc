@@ -13,9 +13,9 @@
 #include "image_io.h"
 #include "option_values.h"
 #include "svg_plot.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -121,7 +121,7 @@ void ParseTexts(CameraInitOptions* options) {
 }
 
 CommandResult InitCamera(const CameraInitOptions& options) {
-  std::optional<model::OutputFile> output;
+  std::optional<OutputFile> output;
   if (!options.output.empty()) output.emplace(options.output);
   std::optional<PhotoExif> photo;
   std::optional<Eigen::Vector2i> photo_size_px;

@@ -14,8 +14,8 @@
 #include "progress_line.h"
 #include "sweep_input.h"
 #include "sweep_options.h"
+#include "thicklens/base/error.h"
 #include "thicklens/calib/calibrate.h"
-#include "thicklens/error.h"
 #include "thicklens/model/camera_file.h"
 
 namespace thicklens::tools {

@@ -19,11 +19,11 @@
 #include "printable_text.h"
 #include "run_files.h"
 #include "svg_plot.h"
-#include "thicklens/error.h"
-#include "thicklens/model/input_file.h"
-#include "thicklens/model/output_file.h"
-#include "thicklens/model/parallel.h"
-#include "thicklens/model/temporaries.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/temporaries.h"
 
 namespace thicklens::tools {
 namespace {
@@ -44,7 +44,7 @@ bool MayTellRefusal(const std::string& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return true;
   try {
-    const std::string older = model::ReadOwnFile(path, model::kMaxTextBytes);
+    const std::string older = ReadOwnFile(path, kMaxTextBytes);
     const std::size_t first = older.find_first_not_of(" \t\r\n");
     return first == std::string::npos || older[first] == '{';
   } catch (const Error&) {
@@ -77,7 +77,7 @@ class SummaryOutput {
 
  private:
   std::string path_;
-  std::optional<model::OutputFile> file_;
+  std::optional<OutputFile> file_;
 };
 
 }  // namespace
@@ -98,7 +98,7 @@ void AddCommonOptions(CLI::App* command, CommonOptions* options) {
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command) {
   if (options.verbose) spdlog::set_level(spdlog::level::debug);
   // More than there are cores would not be faster, and the library below would complain.
-  cv::setNumThreads(std::min(model::ResolveThreads(options.threads), model::ResolveThreads(0)));
+  cv::setNumThreads(std::min(ResolveThreads(options.threads), ResolveThreads(0)));
   EnterRunOutput(options.json_path);
   SummaryOutput summary(options.json_path);
   CommandResult result;
@@ -106,7 +106,7 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
     result = command();
     if (!result.is_written) ThrowIfInterrupted();
   } catch (const Interrupted&) {
-    const std::vector<std::string> in_place = model::OutputsInPlace();
+    const std::vector<std::string> in_place = OutputsInPlace();
     if (in_place.empty()) throw;
     throw Error(InterruptedText(in_place));
   } catch (const Error& error) {

@@ -24,9 +24,9 @@
 #include "naming_the_file.h"
 #include "option_values.h"
 #include "svg_plot.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/estimator/estimate_input.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 
 #include "interrupt.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::tools {
 
@@ -23,7 +23,7 @@ void WriteConfidence(const estimator::EstimateInput& input, int threads, LightFi
   const estimator::DisparityRenderer renderer(input.disparity);
   const auto u_count = static_cast<int>(input.weights.cols());
   const auto v_count = static_cast<int>(input.weights.rows());
-  model::ParallelFor(u_count * v_count, model::ResolveThreads(threads), [&](int i) {
+  ParallelFor(u_count * v_count, ResolveThreads(threads), [&](int i) {
     ThrowIfInterrupted();
     const int k = i % u_count, l = i / u_count;
     const estimator::CompactView view =

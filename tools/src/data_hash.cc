@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -15,9 +15,9 @@
 #include "picture_kind.h"
 #include "png_check.h"
 #include "svg_plot.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -131,7 +131,7 @@ cv::Mat Decode(const std::string& bytes, const std::string& name) {
 }  // namespace
 
 model::RawDepthMap ReadDepthMap(const std::string& path) {
-  const std::string bytes = model::ReadWholeFile(path);
+  const std::string bytes = ReadWholeFile(path);
   if (StartsWith(bytes, "PF") && bytes.size() > 2 && IsSpace(bytes[2]))
     throw Error(fmt::format("{}: a PFM of three channels; a depth map has one", path));
   if (StartsWith(bytes, "Pf")) return DecodePfm(bytes, path);

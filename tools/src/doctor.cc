@@ -17,11 +17,11 @@
 #include "light_field_options.h"
 #include "opencv_codecs.h"
 #include "svg_plot.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -240,7 +240,7 @@ nlohmann::json FindingsJson(const Findings& findings) {
 CommandResult Doctor(const DoctorOptions& options) {
   Findings findings;
   findings.cores = static_cast<int>(std::thread::hardware_concurrency());
-  findings.threads = model::ResolveThreads(options.common.threads);
+  findings.threads = ResolveThreads(options.common.threads);
   findings.blas = estimator::BlasDescription();
   findings.block_solvers = BuiltInSolvers();
   ExamineDevice(options, &findings);

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "option_values.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

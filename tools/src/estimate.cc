@@ -35,13 +35,13 @@
 #include "progress_line.h"
 #include "report_folder.h"
 #include "stopwatch.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/output_file.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -64,9 +64,9 @@ struct Outputs {
   Outputs(const Outputs&) = delete;
   Outputs& operator=(const Outputs&) = delete;
 
-  model::OutputFolder light_field;
+  OutputFolder light_field;
   ReportFolder report_folder;
-  std::optional<model::OutputFile> report;
+  std::optional<OutputFile> report;
   std::unique_ptr<BlockCheckpoint> checkpoint;  // none: it was not asked for
 
  private:
@@ -193,7 +193,7 @@ void SolveFunctional(const EstimateOptions& options, const estimator::EstimateIn
 PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::EstimateInput& input,
                           Clock::time_point start) {
   const EstimateProfile profile = ProfileFor(options.profile_path);
-  const int threads = model::ResolveThreads(options.common.threads);
+  const int threads = ResolveThreads(options.common.threads);
   const double speed_ratio =
       profile.IsFromHere(threads) ? 1 : ProbeSeconds(threads) / profile.probe_seconds;
   PictureLoad load = PictureLoadOf(input);

@@ -12,7 +12,7 @@
 #include "page_figures.h"
 #include "page_pictures.h"
 #include "page_style.h"
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/estimator/estimate_checks.h"
 
 namespace thicklens::tools {

@@ -15,7 +15,7 @@
 #include "light_field_effects.h"
 #include "naming_the_file.h"
 #include "option_values.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/depth_noise.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/model/camera_file.h"

@@ -11,7 +11,7 @@
 
 #include "light_field_effects.h"
 #include "option_values.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

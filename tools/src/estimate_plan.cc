@@ -7,7 +7,7 @@
 #include "interrupt.h"
 #include "memory_available.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"

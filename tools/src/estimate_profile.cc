@@ -13,8 +13,8 @@
 #include "bench_machine.h"
 #include "build_info.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
-#include "thicklens/model/input_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
 
 namespace thicklens::tools {
 
@@ -162,7 +162,7 @@ json ProfileJson(const EstimateProfile& profile) {
 }
 
 EstimateProfile ReadProfile(const std::string& path) {
-  EstimateProfile profile = Parse(model::ReadTextFile(path), path);
+  EstimateProfile profile = Parse(ReadTextFile(path), path);
   profile.is_own = true;
   return profile;
 }

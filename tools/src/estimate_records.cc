@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "svg_plot.h"
-#include "thicklens/error.h"
-#include "thicklens/model/input_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -167,7 +167,7 @@ ViewRecord View(const Fields& fields) {
 }  // namespace
 
 EstimateRecord ReadEstimateRecord(const std::string& path) {
-  return ParseEstimateRecord(model::ReadTextFile(path), path);
+  return ParseEstimateRecord(ReadTextFile(path), path);
 }
 
 EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& name) {
@@ -215,7 +215,7 @@ EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& n
 
 ComparisonRecord ReadComparisonRecord(const std::string& path) {
   const std::string kind = "what `thicklens compare TRUE_LF LF --json` writes of two light fields";
-  const json parsed = ParseJson(model::ReadTextFile(path), path, kind);
+  const json parsed = ParseJson(ReadTextFile(path), path, kind);
   RequireResults(parsed, "mean", path, kind);
   const Fields fields(parsed, path, "");
   ComparisonRecord record;

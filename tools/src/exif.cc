@@ -8,8 +8,8 @@
 #include <exiv2/exiv2.hpp>
 #include <limits>
 
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -111,7 +111,7 @@ PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px) {
   PhotoExif photo;
   try {
     // Not by its name, which Exiv2 may take for an address in a network or for standard input.
-    const std::string bytes = model::ReadWholeFile(path);
+    const std::string bytes = ReadWholeFile(path);
     const auto image = Exiv2::ImageFactory::open(
         reinterpret_cast<const Exiv2::byte*>(bytes.data()),  // NOLINT: bytes
         static_cast<long>(bytes.size()));

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "printable_text.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {

@@ -19,8 +19,8 @@
 #include "light_field_options.h"
 #include "option_values.h"
 #include "progress_line.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -148,7 +148,7 @@ std::string CostsText(const EffectCosts& costs) {
 }
 
 CommandResult Explain(const ExplainOptions& options) {
-  std::optional<model::OutputFile> figure;
+  std::optional<OutputFile> figure;
   if (!options.figure_path.empty()) figure.emplace(options.figure_path);
   const model::Camera camera = model::ReadCamera(options.camera_path);
   TellAssumedFields(camera);

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::tools {
 namespace {

@@ -13,8 +13,8 @@
 #include <limits>
 #include <memory>
 
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "data_hash.h"
 #include "image_io.h"
-#include "thicklens/model/output_file.h"
-#include "thicklens/model/yaml_reader.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/yaml_reader.h"
 
 namespace thicklens::tools {
 
@@ -15,7 +15,7 @@ FrameFiles::FrameFiles(std::vector<model::SweepFrame> frames)
     : frames_(std::move(frames)), digests_(frames_.size()) {}
 
 std::string FrameFiles::ReadAndDigest(std::size_t index) {
-  std::string bytes = model::ReadWholeFile(frames_.at(index).image);
+  std::string bytes = ReadWholeFile(frames_.at(index).image);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!digests_[index].empty()) return bytes;
@@ -34,7 +34,7 @@ std::string FrameFiles::DataSha256() {
   std::string lines;
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     if (digests_[i].empty()) ReadAndDigest(i);
-    lines += fmt::format("{} {}\n", digests_[i], model::YamlNumber(frames_[i].reading_mm));
+    lines += fmt::format("{} {}\n", digests_[i], YamlNumber(frames_[i].reading_mm));
   }
   return Sha256Hex(lines);
 }

@@ -12,8 +12,8 @@
 #include "interrupt.h"
 #include "printable_text.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -86,7 +86,7 @@ nlohmann::json SummaryOf(const fs::path& folder) {
   std::error_code unreachable;
   const fs::path file = folder / kSummaryFile;
   if (!fs::exists(file, unreachable)) return nullptr;
-  return nlohmann::json::parse(model::ReadWholeFile(file.string()), nullptr, false);
+  return nlohmann::json::parse(ReadWholeFile(file.string()), nullptr, false);
 }
 
 // Whether a run that may be refused was, with one of the reasons that it may have.

@@ -17,7 +17,7 @@
 #include "option_values.h"
 #include "progress_line.h"
 #include "temporary_folder.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens::tools {

@@ -13,9 +13,9 @@
 
 #include "hard_cases.h"
 #include "hard_views.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -45,7 +45,7 @@ const char kCameraFile[] = "camera.yaml";
 
 void WriteCamera(const fs::path& folder, const HardCamera& camera,
                  const std::string& name = kCameraFile) {
-  model::WriteFileAtomically(
+  WriteFileAtomically(
       (folder / name).string(),
       fmt::format("schema: thicklens/camera/2\nname: hard\n"
                   "lens: {{front_focal_length_mm: {}, rear_focal_length_mm: {}, "
@@ -367,7 +367,7 @@ HardCase Planes(std::string name, std::string why, std::string required, double 
   return Optics(std::move(name), std::move(why), std::move(required),
                 [=](const fs::path& folder, const HardMachine&) {
                   WriteCamera(folder, HardCamera());
-                  model::WriteFileAtomically(
+                  WriteFileAtomically(
                       (folder / "scene.yaml").string(),
                       fmt::format("schema: thicklens/simulate-scene/1\ncamera: camera.yaml\n"
                                   "views: [3, 3]\nuv_depth_mm: {}\nlayers:\n"

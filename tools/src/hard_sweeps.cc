@@ -13,10 +13,10 @@
 #include "image_io.h"
 #include "interrupt.h"
 #include "simulated_sweep.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -73,10 +73,10 @@ model::SweepTruth WriteSweep(const fs::path& folder, const HardSweep& sweep) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const fs::path image = sweep_folder / truth.frames[i].image;
     fs::create_directories(image.parent_path());
-    model::WriteFileAtomically(image.string(), EncodePng(frames[i]));
+    WriteFileAtomically(image.string(), EncodePng(frames[i]));
   }
-  model::WriteFileAtomically((sweep_folder / "camera.yaml").string(), model::CameraToYaml(camera));
-  model::WriteFileAtomically((sweep_folder / "sweep.yaml").string(), model::SweepToYaml(file));
+  WriteFileAtomically((sweep_folder / "camera.yaml").string(), model::CameraToYaml(camera));
+  WriteFileAtomically((sweep_folder / "sweep.yaml").string(), model::SweepToYaml(file));
   return truth;
 }
 

@@ -14,10 +14,10 @@
 #include "estimate_plan.h"
 #include "image_io.h"
 #include "light_field_io.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/estimator/estimate.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -101,7 +101,7 @@ void WritePicture(const fs::path& folder, const HardPicture& shape, const Radian
       }
     }
   }
-  model::WriteFileAtomically((folder / "picture.png").string(), EncodePng(picture));
+  WriteFileAtomically((folder / "picture.png").string(), EncodePng(picture));
 }
 
 void WriteMeanOfViews(const fs::path& folder, const HardPicture& shape, const ViewOf& view) {
@@ -123,7 +123,7 @@ void WriteDepth(const fs::path& folder, const HardPicture& shape, const Disparit
       map.values.push_back(static_cast<float>(disparity(x, y)));
     }
   }
-  model::WriteFileAtomically((folder / "depth.pfm").string(), EncodePfm(map));
+  WriteFileAtomically((folder / "depth.pfm").string(), EncodePfm(map));
 }
 
 HardRun EstimateOf(const HardPicture& shape, const std::vector<std::string>& more,

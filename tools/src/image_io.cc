@@ -8,9 +8,9 @@
 
 #include "picture_kind.h"
 #include "png_pixels.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -51,7 +51,7 @@ cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
 }
 
 cv::Mat ReadPictureFile(const std::string& path) {
-  return DecodePicture(model::ReadWholeFile(path), path);
+  return DecodePicture(ReadWholeFile(path), path);
 }
 
 model::StoredPicture ToStoredPicture(const cv::Mat& picture) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "svg_plot.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

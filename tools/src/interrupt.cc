@@ -21,8 +21,8 @@
 #include "message_line.h"
 #include "printable_text.h"
 #include "program_run.h"
-#include "thicklens/error.h"
-#include "thicklens/model/temporaries.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/temporaries.h"
 
 namespace thicklens::tools {
 namespace {
@@ -94,7 +94,7 @@ std::string WordsToSay() {
 
 void RemoveAndTell() {
   EndChildPrograms();
-  const std::vector<std::string> in_place = model::AbandonOutputs(kCleaningSeconds);
+  const std::vector<std::string> in_place = AbandonOutputs(kCleaningSeconds);
   std::string text = ::isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "";  // a line of progress
   const std::string words = WordsToSay();
   if (!words.empty()) text += "thicklens: warning: " + MessageLine(words) + "\n";

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/cancel.h"
+#include "thicklens/base/cancel.h"
 
 // How SIGINT, SIGTERM and SIGHUP end the program:
 // - The first one cancels ProgramToken(). Loops look at it and end by Interrupted, so that

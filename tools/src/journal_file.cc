@@ -16,8 +16,8 @@
 #include <utility>
 
 #include "data_hash.h"
-#include "thicklens/error.h"
-#include "thicklens/model/input_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -32,8 +32,8 @@ Error Failure(const std::string& path, const std::string& what, int error) {
 }
 
 Error NoRegularFile(const std::string& path, const struct stat& info) {
-  return Error(fmt::format("{}: is no regular file but {}; name another", path,
-                           model::KindOfFile(info.st_mode)));
+  return Error(
+      fmt::format("{}: is no regular file but {}; name another", path, KindOfFile(info.st_mode)));
 }
 
 bool IsTaken(int error) { return error == EEXIST || error == ENOENT || error == ELOOP; }
@@ -87,7 +87,7 @@ JournalFile::JournalFile(std::string path, const std::string& kind,
   try {
     Open();
     ReadRecords(stop);
-    if (records_.empty()) without_record_ = model::Temporary([this] { return followed_; });
+    if (records_.empty()) without_record_ = Temporary([this] { return followed_; });
   } catch (...) {
     if (file_ >= 0) ::close(file_);
     throw;
@@ -249,7 +249,7 @@ void JournalFile::Append(const std::vector<std::string>& records) {
 void JournalFile::Clear() {
   const std::lock_guard<std::mutex> lock(mutex_);
   records_.clear();
-  without_record_ = model::Temporary([this] { return followed_; });
+  without_record_ = Temporary([this] { return followed_; });
 }
 
 bool JournalFile::Remove() { return IsNamed(file_, followed_) && ::unlink(followed_.c_str()) == 0; }

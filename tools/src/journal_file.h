@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/model/temporaries.h"
+#include "thicklens/base/temporaries.h"
 
 namespace thicklens::tools {
 
@@ -63,8 +63,8 @@ class JournalFile {
   int file_ = -1;
   mutable std::mutex mutex_;  // of the two that grow
   std::vector<Place> records_;
-  model::Temporary without_record_;  // the file, as long as there is none
-  std::uint64_t end_ = 0;            // of the last record
+  Temporary without_record_;  // the file, as long as there is none
+  std::uint64_t end_ = 0;     // of the last record
   std::uint64_t bytes_left_out_ = 0;
 };
 

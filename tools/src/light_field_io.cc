@@ -22,12 +22,12 @@
 #include "picture_kind.h"
 #include "stopwatch.h"
 #include "svg_plot.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/input_file.h"
 #include "thicklens/model/light_field_file.h"
-#include "thicklens/model/parallel.h"
 
 namespace thicklens::tools {
 
@@ -68,7 +68,7 @@ model::LinearPicture ReadPngView(const std::string& path, const model::TransferC
 }
 
 model::LinearPicture ReadTiffView(const std::string& path) {
-  const std::string bytes = model::ReadWholeFile(path);
+  const std::string bytes = ReadWholeFile(path);
   std::string why;
   const cv::Mat picture = DecodeUnchanged(bytes, path, {PictureKind::kTiff}, &why);
   if (picture.empty()) {
@@ -120,9 +120,9 @@ void TellFilesOf(const std::string& folder, const model::LightFieldDescription& 
   for (int l = 0; l < frame.v_count; ++l) {
     for (int k = 0; k < frame.u_count; ++k) {
       if (!frame.IsPresent(k, l)) continue;
-      model::TellInput((fs::path(folder) / ViewFile(k, l, description.view_format)).string());
+      TellInput((fs::path(folder) / ViewFile(k, l, description.view_format)).string());
       if (!description.has_confidence) continue;
-      model::TellInput((fs::path(folder) / ConfidenceFile(k, l)).string());
+      TellInput((fs::path(folder) / ConfidenceFile(k, l)).string());
     }
   }
 }
@@ -195,7 +195,7 @@ int HciRowLength(const std::string& folder) {
   const std::string path = (fs::path(folder) / kHciMarker).string();
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return 0;
-  std::istringstream lines(model::ReadTextFile(path));
+  std::istringstream lines(ReadTextFile(path));
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
     const auto equals = line.find('=');
@@ -230,7 +230,7 @@ ViewSource OpenHci(const std::string& folder, int grid, bool sparse) {
     throw Error(fmt::format("{}: no light field: neither {} nor {}, {}, ... are in it", folder,
                             kLightFieldMarker, HciFile(0), HciFile(1)));
   }
-  for (const int number : numbers) model::TellInput((fs::path(folder) / HciFile(number)).string());
+  for (const int number : numbers) TellInput((fs::path(folder) / HciFile(number)).string());
   const int row = grid > 0 ? grid : InferredRowLength(folder, numbers);
   int first_u = row, last_u = 0;
   for (const int number : numbers) {
@@ -351,7 +351,7 @@ void RequireValid(const model::LightField& light_field) {
 // Calls write(k, l, picture) for every view that there is, on several threads.
 void ForEachView(const model::LightField& light_field,
                  const std::function<void(int, int, const model::LinearPicture&)>& write) {
-  model::ParallelFor(light_field.u_count * light_field.v_count, Threads(), [&](int i) {
+  ParallelFor(light_field.u_count * light_field.v_count, Threads(), [&](int i) {
     ThrowIfInterrupted();
     const int k = i % light_field.u_count;
     const int l = i / light_field.u_count;
@@ -420,7 +420,7 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
   // Bits of one vector cannot be set by several threads.
   const std::vector<bool> present = std::exchange(light_field.present, {});
-  model::ParallelFor(frame.u_count * frame.v_count, Threads(), [&](int i) {
+  ParallelFor(frame.u_count * frame.v_count, Threads(), [&](int i) {
     const int k = i % frame.u_count;
     const int l = i / frame.u_count;
     if (!frame.IsPresent(k, l)) return;
@@ -448,7 +448,7 @@ std::vector<std::string> LightFieldEntries() {
 }
 
 LightFieldWriter::LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format,
-                                   model::OutputFolder* folder)
+                                   OutputFolder* folder)
     : transfer_(transfer), format_(format), folder_(folder) {
   constexpr int kBits = 16;
   if (format_ == ViewFormat::kPng) levels_.emplace(transfer, kBits);
@@ -510,17 +510,17 @@ void WriteViews(const model::LightField& light_field, LightFieldWriter* writer) 
 }
 
 std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
-                            model::OutputFolder* folder) {
+                            OutputFolder* folder) {
   LightFieldWriter writer(light_field.transfer, format, folder);
   WriteViews(light_field, &writer);
   return writer.Finish(light_field);
 }
 
-model::OutputFolder ClaimHciFolder(const std::string& path) {
+OutputFolder ClaimHciFolder(const std::string& path) {
   const fs::path parameters = fs::path(path) / kHciMarker;
   std::error_code ignored;
   if (fs::exists(parameters, ignored) &&
-      model::ReadOwnFile(parameters.string(), model::kMaxTextBytes).rfind(kHciSignature, 0) != 0) {
+      ReadOwnFile(parameters.string(), kMaxTextBytes).rfind(kHciSignature, 0) != 0) {
     throw Error(
         fmt::format("{}: this folder holds a light field that thicklens did not write, and is not "
                     "replaced; choose another name",
@@ -529,10 +529,10 @@ model::OutputFolder ClaimHciFolder(const std::string& path) {
   constexpr int kMostViews = 10000;
   std::vector<std::string> entries = {kHciMarker};
   for (int i = 0; i < kMostViews; ++i) entries.push_back(HciFile(i));
-  return model::OutputFolder(path, kHciMarker, entries);
+  return OutputFolder(path, kHciMarker, entries);
 }
 
-std::size_t WriteHciLightField(const model::LightField& light_field, model::OutputFolder* folder) {
+std::size_t WriteHciLightField(const model::LightField& light_field, OutputFolder* folder) {
   RequireValid(light_field);
   constexpr int kBits = 8;
   const model::TransferCurve srgb = model::TransferCurve::Srgb();

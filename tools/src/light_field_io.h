@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/light_field.h"
-#include "thicklens/model/output_file.h"
 #include "thicklens/model/stored_levels.h"
 
 namespace thicklens::tools {
@@ -44,8 +44,7 @@ std::vector<std::string> LightFieldEntries();
 class LightFieldWriter {
  public:
   // The folder must outlive it, and is committed by the caller.
-  LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format,
-                   model::OutputFolder* folder);
+  LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder);
 
   void WriteView(int k, int l, const model::LinearPicture& view);
   // One byte a ray, row by row (docs/file-formats.md); of all views or of none.
@@ -64,7 +63,7 @@ class LightFieldWriter {
   const model::TransferCurve transfer_;
   std::optional<model::StoredLevels> levels_;  // of PNG
   const ViewFormat format_;
-  model::OutputFolder* folder_;
+  OutputFolder* folder_;
   std::mutex mutex_;
   std::size_t clipped_ = 0;
   std::array<std::size_t, 256> confidence_counts_{};
@@ -78,16 +77,16 @@ void WriteViews(const model::LightField& light_field, LightFieldWriter* writer);
 // Writes views/view_VV_UU.png or .tiff, lightfield.yaml, and camera.yaml if there is a camera,
 // below the folder's staging path; the caller commits. Returns how many values were clipped.
 std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
-                            model::OutputFolder* folder);
+                            OutputFolder* folder);
 
 // HCI layout: input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path. Returns how
 // many values were clipped.
 extern const char kHciMarker[];  // "parameters.cfg"
-std::size_t WriteHciLightField(const model::LightField& light_field, model::OutputFolder* folder);
+std::size_t WriteHciLightField(const model::LightField& light_field, OutputFolder* folder);
 
 // Claims a folder for it. The benchmark's own folders look the same: one that this program did not
 // write is not replaced. Throws Error.
-model::OutputFolder ClaimHciFolder(const std::string& path);
+OutputFolder ClaimHciFolder(const std::string& path);
 
 // How many values a file of 8 or 16 bits cannot hold: those more than half a level below 0 or above
 // full scale, and NaN.

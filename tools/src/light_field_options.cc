@@ -8,7 +8,7 @@
 
 #include "naming_the_file.h"
 #include "option_values.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/fill_holes.h"
 #include "thicklens/kernels/device.h"
 

@@ -7,7 +7,7 @@
 
 #include "option_values.h"
 #include "printable_text.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 

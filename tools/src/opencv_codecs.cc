@@ -9,7 +9,7 @@
 #include <system_error>
 #include <vector>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 

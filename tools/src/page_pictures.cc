@@ -12,8 +12,8 @@
 #include "opencv_codecs.h"
 #include "png_pixels.h"
 #include "svg_plot.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/transfer_curve.h"
 
 namespace thicklens::tools {

@@ -4,7 +4,7 @@
 
 #include <exiv2/exiv2.hpp>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -19,7 +19,7 @@
 #include "png_check.h"
 #include "png_pixels.h"
 #include "printable_text.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <vector>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

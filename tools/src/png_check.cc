@@ -8,7 +8,7 @@
 #include <cstring>
 #include <optional>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -10,8 +10,8 @@
 #include <memory>
 
 #include "png_check.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

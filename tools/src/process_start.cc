@@ -6,7 +6,7 @@
 #include <sys/resource.h>
 
 #include "sanitized.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 // OpenBLAS starts a thread for each processor when it is loaded, before main() and although the
 // program lets it use one. Where memory is short such a thread asks for some for ever, and a fork

@@ -27,11 +27,11 @@
 #include "picture_load.h"
 #include "program_run.h"
 #include "temporary_folder.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
-#include "thicklens/model/parallel.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::tools {
@@ -100,10 +100,9 @@ Prepared Prepare(const ProfileCase& what, const ProfileRun& run, const fs::path&
   options.depth_path = (folder / kDepth).string();
   options.camera_path = (folder / kCamera).string();
   options.output_folder = (folder / kLightField).string();
-  model::WriteFileAtomically(options.picture_path,
-                             EncodePng(what.colour ? stored : FirstChannel(stored)));
-  model::WriteFileAtomically(options.depth_path, EncodePfm(simulator.RenderDepth()));
-  model::WriteFileAtomically(options.camera_path, model::CameraToYaml(simulator.camera()));
+  WriteFileAtomically(options.picture_path, EncodePng(what.colour ? stored : FirstChannel(stored)));
+  WriteFileAtomically(options.depth_path, EncodePfm(simulator.RenderDepth()));
+  WriteFileAtomically(options.camera_path, model::CameraToYaml(simulator.camera()));
   options.depth.kind = "z";
   options.depth.unit = "mm";
   options.views.text = fmt::format("{0}x{0}", what.views);
@@ -152,8 +151,8 @@ nlohmann::json RunOnce(const std::string& program, const Prepared& prepared,
       RunProgram(program, words, prepared.folder, std::numeric_limits<double>::infinity());
   nlohmann::json summary;
   if (ended.exit_code == 0) {
-    summary = nlohmann::json::parse(model::ReadWholeFile((prepared.folder / kSummary).string()),
-                                    nullptr, false);
+    summary =
+        nlohmann::json::parse(ReadWholeFile((prepared.folder / kSummary).string()), nullptr, false);
   }
   if (!summary.is_object() || !summary.contains("seconds")) {
     throw Error(fmt::format("{} {}: it ended with {} (signal {}) and said: {}", program,
@@ -258,7 +257,7 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
   profile.processor = ProcessorName();
   profile.date = NowIso8601();
   profile.build = BuildInfo();
-  profile.threads = model::ResolveThreads(run.threads);
+  profile.threads = ResolveThreads(run.threads);
   profile.probe_seconds = ProbeSeconds(profile.threads);
   profile.runs = run.repeat;
   profile.from = "this run";

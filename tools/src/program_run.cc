@@ -20,8 +20,8 @@
 
 #include "interrupt.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
-#include "thicklens/model/output_file.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 
 extern char** environ;  // NOLINT: POSIX has it so
 
@@ -159,8 +159,8 @@ ProgramRun RunProgram(const std::string& program, const std::vector<std::string>
   run.seconds = seconds();
   if (WIFEXITED(child.status())) run.exit_code = WEXITSTATUS(child.status());
   if (WIFSIGNALED(child.status())) run.signal = WTERMSIG(child.status());
-  run.out = model::ReadWholeFile((folder / kOutFile).string());
-  run.err = model::ReadWholeFile((folder / kErrFile).string());
+  run.out = ReadWholeFile((folder / kOutFile).string());
+  run.err = ReadWholeFile((folder / kErrFile).string());
   return run;
 }
 

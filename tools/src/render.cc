@@ -24,9 +24,9 @@
 #include "option_values.h"
 #include "picture_description.h"
 #include "stopwatch.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/kernels/device.h"
-#include "thicklens/model/output_file.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::tools {
@@ -411,7 +411,7 @@ std::string Description(const Rendering& rendering) {
 
 CommandResult RenderPicture(const RenderOptions& options) {
   const auto start = Clock::now();
-  model::OutputFile output(options.output);
+  OutputFile output(options.output);
   const model::LightField light_field =
       ReadLightField(options.light_field, ReadingOf(options.reading));
   ThrowIfInterrupted();
@@ -452,9 +452,9 @@ CommandResult RenderPicture(const RenderOptions& options) {
 CommandResult Convert(const RenderOptions& options) {
   const auto start = Clock::now();
   const bool is_hci = options.convert == "hci";
-  model::OutputFolder folder =
-      is_hci ? ClaimHciFolder(options.output)
-             : model::OutputFolder(options.output, kLightFieldMarker, LightFieldEntries());
+  OutputFolder folder = is_hci
+                            ? ClaimHciFolder(options.output)
+                            : OutputFolder(options.output, kLightFieldMarker, LightFieldEntries());
   const model::LightField light_field =
       ReadLightField(options.light_field, ReadingOf(options.reading));
   const ViewFormat format =

@@ -27,11 +27,11 @@
 #include "light_field_page.h"
 #include "naming_the_file.h"
 #include "option_values.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
-#include "thicklens/model/output_file.h"
 #include "thicklens/model/sweep_file.h"
 
 namespace thicklens::tools {
@@ -283,7 +283,7 @@ ComparisonRecord ReadMatchingComparison(const ReportOptions& options,
 }
 
 CommandResult Report(const ReportOptions& options) {
-  model::OutputFile output(options.output_path);
+  OutputFile output(options.output_path);
   const model::LightField light_field =
       ReadCropped(options.light_field_path, ReadingOf(options.reading));
   std::optional<model::LightField> truth;
@@ -300,8 +300,8 @@ CommandResult Report(const ReportOptions& options) {
     input.sweep = ReadSweepStrip(options.sweep_path, light_field.camera);
   }
   if (!options.calibration_path.empty()) {
-    input.calibration = InlinedCalibrationReport(model::ReadWholeFile(options.calibration_path),
-                                                 options.calibration_path);
+    input.calibration =
+        InlinedCalibrationReport(ReadWholeFile(options.calibration_path), options.calibration_path);
   }
   if (!options.estimate_path.empty()) input.estimate = ReadMatchingRecord(options, light_field);
   if (!options.comparison_path.empty()) {

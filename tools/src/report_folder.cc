@@ -4,7 +4,7 @@
 
 #include <system_error>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 
@@ -14,7 +14,7 @@ ReportFolder::ReportFolder(const std::string& path) : path_(path) {
   std::error_code failure;
   if (path == "-") throw Error("-: a report cannot go to standard output; name a folder");
   if (path.empty() || fs::exists(path, failure)) return;
-  made_ = model::Temporary(
+  made_ = Temporary(
       [&] {
         fs::create_directory(path, failure);
         if (failure)

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "thicklens/model/temporaries.h"
+#include "thicklens/base/temporaries.h"
 
 namespace thicklens::tools {
 
@@ -19,7 +19,7 @@ class ReportFolder {
 
  private:
   std::filesystem::path path_;
-  model::Temporary made_;  // by this run
+  Temporary made_;  // by this run
 };
 
 }  // namespace thicklens::tools

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "thicklens/model/input_file.h"
+#include "thicklens/base/input_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -175,7 +175,7 @@ RunFiles& FilesOfThisRun() {
 
 void EnterRunOutput(const std::string& output) {
   if (!FilesOfThisRun().Has(output)) FilesOfThisRun().Enter(output);
-  model::WatchInputs([](const std::string& input) { FilesOfThisRun().RequireNoOutput(input); });
+  WatchInputs([](const std::string& input) { FilesOfThisRun().RequireNoOutput(input); });
 }
 
 void RethrowIfInputWouldBeLost() { FilesOfThisRun().RethrowRefusal(); }
@@ -183,7 +183,7 @@ void RethrowIfInputWouldBeLost() { FilesOfThisRun().RethrowRefusal(); }
 void RequireDistinctFiles(const std::vector<std::string>& outputs,
                           const std::vector<std::string>& inputs) {
   for (const std::string& output : outputs) FilesOfThisRun().Enter(output);
-  model::WatchInputs([](const std::string& input) { FilesOfThisRun().RequireNoOutput(input); });
+  WatchInputs([](const std::string& input) { FilesOfThisRun().RequireNoOutput(input); });
   for (const std::string& input : inputs) {
     FilesOfThisRun().RequireNoOutput(input);
     FilesOfThisRun().RequireOutside(input);

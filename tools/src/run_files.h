@@ -10,7 +10,7 @@ namespace thicklens::tools {
 
 // No output of a run may be one of its inputs, by whatever name: the paths of the command line,
 // the files that those name (frames, tables, cameras, textures, maps, views), symbolic and hard
-// links to them. All outputs of a run are entered here before anything is read; model::WatchInputs
+// links to them. All outputs of a run are entered here before anything is read; WatchInputs
 // then names every input.
 
 // An output is one of the inputs. Nothing may be written any more, not even to --json.

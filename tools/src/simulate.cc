@@ -21,9 +21,9 @@
 #include "simulate_scene.h"
 #include "simulated_sweep.h"
 #include "stopwatch.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
-#include "thicklens/model/parallel.h"
 #include "thicklens/model/sweep_simulator.h"
 
 namespace thicklens::tools {
@@ -44,12 +44,12 @@ struct SimulateOptions {
 
 // Returns the bits of what is stored.
 int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
-                 model::OutputFolder* folder) {
+                 OutputFolder* folder) {
   const auto& frames = simulator.truth().frames;
   const int count = static_cast<int>(frames.size());
   ProgressLine progress("rendering", common.quiet);
   std::atomic<int> done{0}, bits{0};
-  model::ParallelFor(count, common.threads, [&](int i) {
+  ParallelFor(count, common.threads, [&](int i) {
     ThrowIfInterrupted();
     const model::StoredPicture stored = simulator.RenderFrame(i);
     bits = stored.bits;
@@ -90,7 +90,7 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
   CheckEffectNames(options.effects, model::SweepEffects());
   ApplyEffectOptions(options.effects, &simulation.effects);
-  model::OutputFolder folder(
+  OutputFolder folder(
       options.output_folder, kMarkerFile,
       {"frames", "sweep.yaml", "camera.yaml", kMarkerFile, kAttributionPage, kAttributionTable});
 

@@ -26,8 +26,8 @@
 #include "progress_line.h"
 #include "simulated_sweep.h"
 #include "stopwatch.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::tools {
@@ -125,9 +125,9 @@ Attribution Attribute(const SceneOptions& options, const model::SceneSimulationO
 CommandResult SimulatePicture(const SceneOptions& options) {
   const auto start = Clock::now();
   const model::SceneSimulationOptions scene = ReadConfig(options);
-  model::OutputFolder folder(options.output_folder, kPictureMarker,
-                             {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker,
-                              kAttributionPage, kAttributionTable});
+  OutputFolder folder(options.output_folder, kPictureMarker,
+                      {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker, kAttributionPage,
+                       kAttributionTable});
 
   const std::vector<model::LayerPixels> pixels = ReadScenePixels(scene);
   const model::SceneSimulator simulator(scene, pixels, options.common.threads);
@@ -180,7 +180,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
 CommandResult SimulateLightField(const SceneOptions& options) {
   const auto start = Clock::now();
   const model::SceneSimulationOptions scene = ReadConfig(options);
-  model::OutputFolder folder(options.output_folder, kLightFieldMarker, LightFieldEntries());
+  OutputFolder folder(options.output_folder, kLightFieldMarker, LightFieldEntries());
 
   const model::SceneSimulator simulator(scene, ReadScenePixels(scene), options.common.threads);
   std::size_t clipped = 0;

@@ -11,9 +11,9 @@
 
 #include "calibration_words.h"
 #include "option_values.h"
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/input_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -159,7 +159,7 @@ std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
   std::error_code failure;
   if (!fs::is_regular_file(beside, failure)) return std::nullopt;
   // Also where it is not used: it belongs to the sweep.
-  model::TellInput(beside.string());
+  TellInput(beside.string());
   try {
     return model::ReadSweepTruth(beside.string());
   } catch (const Error& error) {

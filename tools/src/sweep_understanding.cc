@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "printable_text.h"
+#include "thicklens/base/error.h"
 #include "thicklens/calib/calibrate.h"
-#include "thicklens/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -16,8 +16,8 @@
 #include "target_drawing.h"
 #include "target_page.h"
 #include "target_texture.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/output_file.h"
 
 namespace thicklens::tools {
 namespace {
@@ -117,7 +117,7 @@ CommandResult MakeTarget(const TargetOptions& options, Format format, TargetRequ
   std::optional<PngSize> png_size;
   if (format == Format::kPng) png_size = TargetPngSize(page, options.dots_per_inch);
 
-  model::OutputFile output(options.output_path);
+  OutputFile output(options.output_path);
   const std::vector<Leaf> leaves = DeadLeaves(page);
   const std::string bytes = format == Format::kPdf   ? TargetPdf(page, leaves)
                             : format == Format::kSvg ? TargetSvg(page, leaves)

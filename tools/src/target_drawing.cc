@@ -16,8 +16,8 @@
 #include "interrupt.h"
 #include "png_check.h"
 #include "svg_plot.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::tools {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {

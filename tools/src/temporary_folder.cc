@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <system_error>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "thicklens/model/temporaries.h"
+#include "thicklens/base/temporaries.h"
 
 namespace thicklens::tools {
 
@@ -21,7 +21,7 @@ class TemporaryFolder {
  private:
   static std::string NewFolder(const std::string& purpose);
 
-  model::Temporary temporary_;
+  Temporary temporary_;
   std::filesystem::path path_;
 };
 

@@ -23,8 +23,8 @@
 #include "process_start.h"
 #include "program_memory.h"
 #include "sanitized.h"
-#include "thicklens/cancel.h"
-#include "thicklens/error.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
 #include "thicklens/estimator/blas.h"
 #include "trusted_environment.h"
 

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <iterator>
 
-#include "thicklens/error.h"
+#include "thicklens/base/error.h"
 
 namespace thicklens::tools {
 namespace {

@@ -7,7 +7,7 @@
 #include <iostream>
 
 #include "calib/damaged_sweep.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::accuracy {
 namespace {
@@ -120,7 +120,7 @@ nlohmann::ordered_json RunFaultStudy(const std::vector<std::string>& cases,
   const std::vector<Damage> damages = Damages();
   const auto columns = static_cast<int>(damages.size());
   std::vector<Row> rows(cases.size() * damages.size());
-  model::ParallelFor(static_cast<int>(rows.size()), threads, [&](int i) {
+  ParallelFor(static_cast<int>(rows.size()), threads, [&](int i) {
     rows[static_cast<std::size_t>(i)] =
         RunOne(cases[static_cast<std::size_t>(i / columns)],
                damages[static_cast<std::size_t>(i % columns)], settings);

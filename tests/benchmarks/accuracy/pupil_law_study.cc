@@ -8,7 +8,7 @@
 #include <map>
 
 #include "support/sample_statistics.h"
-#include "thicklens/model/parallel.h"
+#include "thicklens/base/parallel.h"
 
 namespace thicklens::accuracy {
 namespace {
@@ -78,7 +78,7 @@ nlohmann::ordered_json RunPupilLawStudy(const std::vector<std::string>& cases,
   }
   std::vector<Trial> trials(keys.size());
   std::atomic<std::size_t> done{0};
-  model::ParallelFor(static_cast<int>(keys.size()), threads, [&](int i) {
+  ParallelFor(static_cast<int>(keys.size()), threads, [&](int i) {
     const Key& key = keys[static_cast<std::size_t>(i)];
     TrialSettings its = settings;
     its.pupil_law = key.law;

@@ -1,0 +1,114 @@
+#ifndef THICKLENS_MODEL_EFFECTS_EFFECT_BOUNDS_H_
+#define THICKLENS_MODEL_EFFECTS_EFFECT_BOUNDS_H_
+
+#include <vector>
+
+#include "thicklens/model/effect_impact.h"
+
+namespace thicklens::model {
+
+// What the bounds of effects need of a camera and of the effects of a picture, computed once.
+class EffectOptics {
+ public:
+  EffectOptics(const EffectConditions& given, const EffectSet& of_picture);
+
+  const EffectConditions& conditions() const { return conditions_; }
+  const Camera& camera() const { return conditions_.camera; }
+  double inverse_focus() const { return inverse_focus_; }          // 1/zf, per mm
+  double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
+  double scale_px() const { return scale_px_; }                    // K/p
+  double floor_px() const { return floor_px_; }
+  double image_distance_mm() const {
+    return image_distance_mm_;
+  }                                                            // of the thin lens without thickness
+  const TransferCurve& transfer() const { return transfer_; }  // linear without its effect
+  bool is_disc() const { return conditions_.camera.psf == Psf::kDisc; }
+
+  // c(z) kappa r/p: displacement on the sensor, px, per standard deviation of the aperture; its
+  // absolute value is the sigma of defocus.
+  double DefocusPx(double depth_mm) const;
+
+  // What other effects leave of a picture's detail: the variance of their Gaussian blur, the radius
+  // of their disc, px, and whether a pixel's box has made ramps of its jumps.
+  struct Smoothing {
+    double gaussian_px2 = 0;
+    double disc_px = 0;
+    bool boxed = false;
+  };
+  Smoothing SmoothingBy(const EffectSet& effects, const EffectPlace& place) const;
+
+ private:
+  const EffectConditions& conditions_;
+  double inverse_focus_ = 0, aperture_sigma_mm_ = 0, scale_px_ = 0, floor_px_ = 0;
+  double image_distance_mm_ = 0;
+  TransferCurve transfer_;
+};
+
+// Bounds of changes in linear light.
+
+// By a blur of zero mean and `variance_px2` per axis, added to a picture that has `other` already.
+double BlurChange(const EffectPlace& place, double variance_px2,
+                  const EffectOptics::Smoothing& other);
+// By a displacement, px.
+double ShiftChange(const EffectPlace& place, double shift_px, const EffectOptics::Smoothing& other);
+
+// Bounds of changes of stored values, 255 at full scale.
+
+// Of radiance, anywhere between the place's dark and bright.
+double StoredChange(const EffectOptics& optics, const EffectPlace& place, double change);
+// Of light that is (1 + relative) times as strong.
+double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative);
+// What a standard deviation in linear light is in stored values where the place is darkest; curves
+// are continued as odd functions below black, as TransferCurve::Encode has it.
+double StoredSigma(const EffectOptics& optics, const EffectPlace& place, double sigma);
+
+// Throws Error if the conditions are not valid or there is no place.
+void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places);
+bool MattersMore(const EffectImpact& a, const EffectImpact& b);
+// Where it matters most of all places, in a picture with `others`.
+EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
+                         const std::vector<EffectPlace>& places, const EffectSet& others);
+
+// The sections: one function an effect.
+EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others);
+EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
+                           const EffectSet& others);
+EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& place,
+                                 const EffectSet& others);
+EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+                           const EffectSet& others);
+EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& place,
+                              const EffectSet& others);
+EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others);
+EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place,
+                            const EffectSet& others);
+EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others);
+EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& place,
+                               const EffectSet& others);
+EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others);
+EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others);
+EffectImpact QuantisationImpact(const EffectOptics& optics, const EffectPlace& place,
+                                const EffectSet& others);
+EffectImpact TransferCurveImpact(const EffectOptics& optics, const EffectPlace& place,
+                                 const EffectSet& others);
+EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+                               const EffectSet& others);
+EffectImpact FlickerImpact(const EffectOptics& optics, const EffectPlace& place,
+                           const EffectSet& others);
+EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectPlace& place,
+                                 const EffectSet& others);
+EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
+                         const EffectSet& others);
+EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
+                        const EffectSet& others);
+EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectPlace& place,
+                                const EffectSet& others);
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_EFFECTS_EFFECT_BOUNDS_H_

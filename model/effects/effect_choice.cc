@@ -1,0 +1,206 @@
+#include "thicklens/model/effect_choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+#include <utility>
+
+#include "model/effects/effect_bounds.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
+
+namespace thicklens::model {
+namespace {
+
+// What the effects that have been left out have taken of the tolerance.
+class Spent {
+ public:
+  explicit Spent(const EffectTolerance& tolerance) : tolerance_(tolerance) {}
+
+  bool Allows(const EffectFinding& finding) const {
+    if (finding.impact.grey_levels == 0) return true;
+    const EffectFacts& facts = FactsOf(finding.effect);
+    if (facts.random) {
+      return std::hypot(noise_, finding.impact.grey_levels) <= tolerance_.grey_levels;
+    }
+    if (tolerance_.px && facts.unit == EffectUnit::kPx) {
+      return finding.impact.amount <= *tolerance_.px &&
+             bounds_ + finding.impact.aside_grey_levels <= tolerance_.grey_levels;
+    }
+    return bounds_ + finding.impact.grey_levels <= tolerance_.grey_levels;
+  }
+
+  void Add(const EffectFinding& finding) {
+    const EffectFacts& facts = FactsOf(finding.effect);
+    if (facts.random) {
+      noise_ = std::hypot(noise_, finding.impact.grey_levels);
+    } else if (tolerance_.px && facts.unit == EffectUnit::kPx) {
+      bounds_ += finding.impact.aside_grey_levels;
+    } else {
+      bounds_ += finding.impact.grey_levels;
+    }
+  }
+
+ private:
+  const EffectTolerance& tolerance_;
+  double bounds_ = 0, noise_ = 0;
+};
+
+// Whether the bound of another effect is another without this one.
+bool HidesOthers(Effect effect) {
+  return EffectSet{Effect::kThickness, Effect::kDefocus,   Effect::kApertureShape, Effect::kFalloff,
+                   Effect::kPixelBox,  Effect::kLensFloor, Effect::kTransferCurve}
+      .Has(effect);
+}
+
+}  // namespace
+
+bool EffectTolerance::IsValid(std::string* why) const {
+  const std::array<std::pair<const char*, double>, 2> limits = {
+      {{"grey_levels", grey_levels}, {"px", px.value_or(1)}}};
+  for (const auto& [unit, limit] : limits) {
+    if (limit > 0 && std::isfinite(limit)) continue;
+    if (why != nullptr) {
+      *why = fmt::format("tolerance in {} is {}: it must be finite and > 0", unit, limit);
+    }
+    return false;
+  }
+  return true;
+}
+
+EffectTolerance EffectToleranceFromText(const std::string& text) {
+  const auto fail = [&text] {
+    return Error(fmt::format(
+        "tolerance \"{}\": a number > 0 with its unit is expected, such as 0.5gl or 0.1px", text));
+  };
+  std::size_t end = 0;
+  double number = 0;
+  try {
+    number = std::stod(text, &end);
+  } catch (const std::exception&) {
+    throw fail();
+  }
+  EffectTolerance tolerance;
+  const std::string unit = text.substr(end);
+  if (unit == "gl") {
+    tolerance.grey_levels = number;
+  } else if (unit == "px") {
+    tolerance.px = number;
+  } else {
+    throw fail();
+  }
+  if (!tolerance.IsValid(nullptr)) throw fail();
+  return tolerance;
+}
+
+namespace {
+
+// Of `effects` in a picture that has `kept`, too, and keeps them.
+EffectSet ChooseBeside(const EffectSet& kept, const EffectConditions& conditions,
+                       const std::vector<EffectPlace>& places, const EffectSet& effects,
+                       const EffectTolerance& tolerance, int threads) {
+  std::string why;
+  if (!tolerance.IsValid(&why)) throw Error("effects: " + why);
+  CheckEffects(conditions, places);
+  Spent spent(tolerance);
+  EffectSet chosen = effects.With(kept);
+  std::vector<EffectFinding> findings = FindImpacts(conditions, places, chosen, threads);
+  findings.erase(
+      std::remove_if(findings.begin(), findings.end(),
+                     [&](const EffectFinding& finding) { return kept.Has(finding.effect); }),
+      findings.end());
+  while (!findings.empty()) {
+    auto least = findings.end();
+    for (auto finding = findings.begin(); finding != findings.end(); ++finding) {
+      if (!spent.Allows(*finding)) continue;
+      if (least == findings.end() || MattersMore(least->impact, finding->impact)) least = finding;
+    }
+    if (least == findings.end()) break;
+    const Effect left_out = least->effect;
+    spent.Add(*least);
+    chosen.Remove(left_out);
+    findings.erase(least);
+    if (!HidesOthers(left_out)) continue;
+    ParallelFor(static_cast<int>(findings.size()), threads, [&](int i) {
+      EffectFinding& finding = findings[static_cast<std::size_t>(i)];
+      finding = FindImpact(finding.effect, conditions, places, chosen.Without({finding.effect}));
+    });
+  }
+  return chosen;
+}
+
+}  // namespace
+
+EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
+                        const EffectSet& effects, const EffectTolerance& tolerance, int threads) {
+  return ChooseBeside({}, conditions, places, effects, tolerance, threads);
+}
+
+EffectChoice EffectChoiceFromText(const std::string& effects, const std::string& without,
+                                  const std::string& tolerance) {
+  EffectChoice choice;
+  if (effects == "all") {
+    choice.base = EffectChoice::Base::kAll;
+  } else if (effects != "auto") {
+    choice.base = EffectChoice::Base::kGiven;
+    if (effects != "none") choice.given = EffectSetFromNames(effects);
+  }
+  choice.without = EffectSetFromNames(without);
+  if (!tolerance.empty()) choice.tolerance = EffectToleranceFromText(tolerance);
+  return choice;
+}
+
+EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions& conditions,
+                             const std::vector<EffectPlace>& places, const EffectSet& of_model,
+                             int threads) {
+  CheckEffects(conditions, places);
+  const EffectSet foreign = choice.given.With(choice.without).Without(of_model);
+  if (!foreign.empty()) {
+    throw Error(fmt::format("effect {} is not one of this picture's: it has {}",
+                            JoinedNames(foreign), JoinedNames(of_model)));
+  }
+  EffectDecision decision;
+  // What the user takes out is not among the others of the rest.
+  EffectSet base = of_model.Without(choice.without);
+  if (choice.base == EffectChoice::Base::kGiven) base = base.Both(choice.given);
+  const std::vector<Effect> each = of_model.Effects();
+  decision.findings.resize(each.size());
+  ParallelFor(static_cast<int>(each.size()), threads, [&](int i) {
+    const Effect effect = each[static_cast<std::size_t>(i)];
+    decision.findings[static_cast<std::size_t>(i)] =
+        FindImpact(effect, conditions, places, base.Without({effect}));
+  });
+  switch (choice.base) {
+    case EffectChoice::Base::kAll:
+      decision.on = of_model.Without(choice.without);
+      break;
+    case EffectChoice::Base::kGiven:
+      decision.on = choice.given.Without(choice.without);
+      break;
+    case EffectChoice::Base::kAuto:
+      decision.on = ChooseBeside(choice.kept.Both(of_model).Without(choice.without), conditions,
+                                 places, of_model.Without(choice.without).Without(choice.kept),
+                                 choice.tolerance, threads);
+      break;
+  }
+  return decision;
+}
+
+EffectRecord RecordOf(const EffectDecision& decision) {
+  EffectRecord record;
+  for (const EffectFinding& finding : decision.findings) {
+    const std::string name = EffectName(finding.effect);
+    if (decision.on.Has(finding.effect)) {
+      record.on.push_back(name);
+    } else {
+      record.left_out_grey_levels.emplace_back(name, finding.impact.grey_levels);
+    }
+  }
+  return record;
+}
+
+}  // namespace thicklens::model

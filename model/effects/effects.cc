@@ -1,0 +1,122 @@
+#include "thicklens/model/effects.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <sstream>
+
+#include "thicklens/base/error.h"
+
+namespace thicklens::model {
+
+std::string EffectUnitName(EffectUnit unit) {
+  switch (unit) {
+    case EffectUnit::kPx:
+      return "px";
+    case EffectUnit::kRelative:
+      return "relative";
+    case EffectUnit::kGreyLevels:
+      return "grey-levels";
+    case EffectUnit::kMm:
+      return "mm";
+  }
+  throw Error("no such unit of an effect");
+}
+
+const std::vector<EffectFacts>& AllEffects() {
+  static const std::vector<EffectFacts> facts = {
+      {Effect::kThickness, "thickness", "two principal planes, f1 and f2: against the thin lens f1",
+       "the thin lens of focal length f1, focused on the same plane", EffectUnit::kRelative, false},
+      {Effect::kDefocus, "defocus", "blur of what is not in the plane of focus",
+       "a pinhole in the middle of the aperture", EffectUnit::kPx, false},
+      {Effect::kApertureShape, "aperture-shape", "the edge of a disc-shaped aperture",
+       "the Gaussian aperture of the same blur", EffectUnit::kPx, false},
+      {Effect::kFalloff, "falloff", "irradiance cos(alpha) cos^3(beta) toward the corners",
+       "the irradiance of the principal point everywhere", EffectUnit::kRelative, false},
+      {Effect::kVignetting, "vignetting", "rays that the aperture cuts, where UV lies off it",
+       "each pixel has the aperture of the principal point", EffectUnit::kRelative, false},
+      {Effect::kOcclusion, "occlusion", "near things hide parts of far ones from parts of the lens",
+       "what the middle of the lens sees of a surface is what all of it sees", EffectUnit::kPx,
+       false},
+      {Effect::kPixelBox, "pixel-box", "a pixel is the mean over its square",
+       "a pixel is the light at its centre", EffectUnit::kPx, false},
+      {Effect::kLensFloor, "lens-floor", "blur of the lens in its plane of focus",
+       "a lens without aberrations", EffectUnit::kPx, false},
+      {Effect::kDiffraction, "diffraction", "blur by the wave nature of light at the aperture",
+       "rays", EffectUnit::kPx, false},
+      {Effect::kShotNoise, "shot-noise", "electrons arrive one by one", "their mean",
+       EffectUnit::kGreyLevels, true},
+      {Effect::kReadNoise, "read-noise", "noise of the sensor's electronics", "none",
+       EffectUnit::kGreyLevels, true},
+      {Effect::kQuantisation, "quantisation", "rounding of stored values", "16 bits",
+       EffectUnit::kGreyLevels, true},
+      {Effect::kTransferCurve, "transfer-curve", "what is stored of linear light",
+       "linear light is stored", EffectUnit::kGreyLevels, false},
+      {Effect::kLampFalloff, "lamp-falloff", "a lamp beside the camera lights far targets less",
+       "a target lit alike at all depths", EffectUnit::kRelative, false},
+      {Effect::kFlicker, "flicker", "the lamp changes from frame to frame", "a steady lamp",
+       EffectUnit::kRelative, true},
+      {Effect::kMagnification, "magnification", "a farther target is smaller in the picture",
+       "the scale of the plane of focus at all depths", EffectUnit::kPx, false},
+      {Effect::kDrift, "drift", "the target moves sideways from frame to frame", "it does not",
+       EffectUnit::kPx, true},
+      {Effect::kTilt, "tilt", "one side of the target is nearer than the other",
+       "a target across the axis", EffectUnit::kMm, false},
+      {Effect::kReadingError, "reading-error", "error of the bench's readings", "true readings",
+       EffectUnit::kMm, true},
+  };
+  return facts;
+}
+
+const EffectFacts& FactsOf(Effect effect) {
+  return AllEffects().at(static_cast<std::size_t>(effect));
+}
+
+std::string EffectName(Effect effect) { return FactsOf(effect).name; }
+
+Effect EffectFromName(const std::string& name) {
+  for (const EffectFacts& facts : AllEffects()) {
+    if (name == facts.name) return facts.effect;
+  }
+  throw Error(fmt::format("effect \"{}\" is unknown: it must be one of {}", name,
+                          JoinedNames(EffectSet::All())));
+}
+
+EffectSet EffectSet::All() {
+  EffectSet all;
+  for (const EffectFacts& facts : AllEffects()) all.Add(facts.effect);
+  return all;
+}
+
+std::vector<Effect> EffectSet::Effects() const {
+  std::vector<Effect> effects;
+  for (const EffectFacts& facts : AllEffects()) {
+    if (Has(facts.effect)) effects.push_back(facts.effect);
+  }
+  return effects;
+}
+
+std::vector<std::string> EffectSet::Names() const {
+  std::vector<std::string> names;
+  for (const Effect effect : Effects()) names.push_back(EffectName(effect));
+  return names;
+}
+
+EffectSet EffectSetFromNames(const std::string& names) {
+  EffectSet effects;
+  std::istringstream stream(names);
+  for (std::string name; std::getline(stream, name, ',');) {
+    const std::size_t first = name.find_first_not_of(' ');
+    const std::size_t last = name.find_last_not_of(' ');
+    effects.Add(
+        EffectFromName(first == std::string::npos ? "" : name.substr(first, last - first + 1)));
+  }
+  return effects;
+}
+
+std::string JoinedNames(const EffectSet& effects) {
+  return effects.empty() ? "none" : fmt::format("{}", fmt::join(effects.Names(), ", "));
+}
+
+}  // namespace thicklens::model

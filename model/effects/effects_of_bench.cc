@@ -1,0 +1,116 @@
+// Effects of a bench that moves a target from frame to frame.
+#include <algorithm>
+#include <cmath>
+
+#include "model/effects/effect_bounds.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Eigen::Vector2d FromAxisPx(const EffectOptics& optics, const EffectPlace& place) {
+  return place.position_px - optics.camera().sensor.principal_point_px;
+}
+
+// What another depth does to the blur at a place.
+double ChangeByDepth(const EffectOptics& optics, const EffectPlace& place, double shift_mm,
+                     const EffectSet& others) {
+  if (!others.Has(Effect::kDefocus) || !std::isfinite(place.depth_mm)) return 0;
+  double largest = 0;
+  const double here_px = optics.DefocusPx(place.depth_mm);
+  for (const double sign : {-1.0, 1.0}) {
+    const double depth_mm = std::max(place.depth_mm + sign * shift_mm, place.depth_mm / 2);
+    const double there_px = optics.DefocusPx(depth_mm);
+    EffectPlace both = place;
+    both.other_depth_mm = depth_mm;
+    const double added_px2 = std::abs(there_px * there_px - here_px * here_px);
+    largest = std::max(largest, BlurChange(both, added_px2, optics.SmoothingBy(others, both)));
+  }
+  return largest;
+}
+
+}  // namespace
+
+// Lamp fall-off. Formula: a lamp at the camera lights a target at z with (zf/z)^2 of what it does
+// in the plane of focus. Bound: the scaling of the brightest. Enters: a factor of each frame.
+EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+                               const EffectSet& /*others*/) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench || !bench->lamp_at_camera || !(optics.inverse_focus() > 0)) return {};
+  const double light = std::pow(1 / (place.depth_mm * optics.inverse_focus()), 2);
+  // Relative to the brighter of the two, as StoredScaling has it.
+  return {std::abs(light - 1), StoredScaling(optics, place, light < 1 ? 1 - light : 1 - 1 / light)};
+}
+
+// Flicker. Formula: a normal factor of each frame, sd relative. Enters: a factor of each frame.
+EffectImpact FlickerImpact(const EffectOptics& optics, const EffectPlace& place,
+                           const EffectSet& /*others*/) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench) return {};
+  return {bench->flicker, StoredScaling(optics, place, bench->flicker)};
+}
+
+// Magnification. Formula: |m| = f1 D/(f2 z), relative to the plane of focus zf/z. Bound: the
+// displacement of the place, ShiftChange. Enters: the scale of each frame.
+EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectPlace& place,
+                                 const EffectSet& others) {
+  if (!optics.conditions().bench || !(optics.inverse_focus() > 0)) return {};
+  const double scale = 1 / (place.depth_mm * optics.inverse_focus());
+  const double shift_px = FromAxisPx(optics, place).norm() * std::abs(scale - 1);
+  return {shift_px, StoredChange(optics, place,
+                                 ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
+}
+
+// Drift. Formula: a normal displacement of the target in each frame, sd per axis in px at zf.
+// Bound: ShiftChange of it, of either axis. Enters: the place of each frame's target.
+EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
+                         const EffectSet& others) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench) return {};
+  const double shift_px = bench->drift_sigma_px;
+  return {shift_px, StoredChange(optics, place,
+                                 ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
+}
+
+// Tilt. Formula: the target's depth where a chief ray meets it is z0/N, N = 1 + (x p/K) tan(tilt),
+// and what is met lies at x/(N cos(tilt)) and y/N of the picture of a target across the axis.
+// Bound: what the depth changes of the blur, of either sign of the tilt, the displacement, and the
+// light of a lamp at the camera, which goes as N^2. Enters: the depth of each column of a frame.
+EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
+                        const EffectSet& others) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench || bench->tilt_deg == 0 || !std::isfinite(place.depth_mm)) return {};
+  const double tilt_rad = std::abs(bench->tilt_deg) * kPi / 180;
+  const Eigen::Vector2d from_axis_px = FromAxisPx(optics, place).cwiseAbs();
+  // No target is seen at more than five times the depth of its middle.
+  const double beside = std::min(0.8, from_axis_px.x() / optics.scale_px() * std::tan(tilt_rad));
+  // `place` may lie anywhere between the middle's depth and the column's.
+  const double shift_mm = place.depth_mm * beside / (1 - beside);
+  double displaced_px = 0;
+  for (const double nearness : {1 - beside, 1 + beside}) {
+    displaced_px = std::max(displaced_px,
+                            std::hypot(from_axis_px.x() * (1 / (nearness * std::cos(tilt_rad)) - 1),
+                                       from_axis_px.y() * (1 / nearness - 1)));
+  }
+  const double change = ChangeByDepth(optics, place, shift_mm, others) +
+                        ShiftChange(place, displaced_px, optics.SmoothingBy(others, place));
+  double grey_levels = StoredChange(optics, place, std::min(change, place.bright - place.dark));
+  if (bench->lamp_at_camera && others.Has(Effect::kLampFalloff)) {
+    grey_levels += StoredScaling(optics, place, 1 - std::pow(1 - beside, 2));
+  }
+  return {place.depth_mm * beside, grey_levels};
+}
+
+// Reading error. Formula: a normal error of what is written, not of where the target stands: no
+// picture changes. Its grey levels are those of the frame at the depth that was read. Enters: the
+// readings.
+EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectPlace& place,
+                                const EffectSet& others) {
+  const auto& bench = optics.conditions().bench;
+  if (!bench) return {};
+  const double sigma_mm = bench->reading_sigma_mm;
+  return {sigma_mm, StoredChange(optics, place, ChangeByDepth(optics, place, sigma_mm, others))};
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,190 @@
+// Effects of the lens and of light on its way through it.
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "model/effects/aperture_irradiance.h"
+#include "model/effects/effect_bounds.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
+  return std::max(std::abs(optics.DefocusPx(place.depth_mm)),
+                  std::abs(optics.DefocusPx(place.other_depth_mm.value_or(place.depth_mm))));
+}
+
+// What weights of the aperture's rays change of a picture, stored: `weights` over the points, less
+// 1, of standard deviation s. It is their covariance with what different rays see, whose own
+// standard deviation is at most sqrt((I - dark)(bright - I)) where they see I in the mean, and at
+// most what their displacement by defocus changes.
+double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aperture aperture,
+                      const std::vector<double>& weights, const EffectSet& others) {
+  double square = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    square += AperturePoints(aperture)[i].weight * std::pow(weights[i] - 1, 2);
+  }
+  const double sd = std::sqrt(square);
+  if (!(sd > 0)) return 0;
+  EffectOptics::Smoothing boxed;
+  boxed.boxed = others.Has(Effect::kPixelBox);
+  const double displaced = ShiftChange(place, SigmaPx(optics, place), boxed);
+  constexpr int kLevels = 16;
+  double most = 0;
+  EffectPlace level = place;
+  for (int i = 0; i < kLevels; ++i) {
+    level.dark = place.dark + (place.bright - place.dark) * i / kLevels;
+    const double seen = std::sqrt((level.dark - place.dark) * (place.bright - level.dark));
+    most = std::max(most, StoredChange(optics, level, sd * std::min(seen, displaced)));
+  }
+  return most;
+}
+
+// What the whole aperture does to the fall-off of a picture through its middle, stored.
+double FalloffOfAperture(const EffectOptics& optics, const EffectPlace& place,
+                         const EffectSet& others, Aperture aperture) {
+  if (!others.Has(Effect::kFalloff)) return 0;
+  const double distance_mm = optics.image_distance_mm();
+  const Irradiance whole = IrradianceAt(optics, place.position_px, distance_mm, aperture);
+  const Irradiance middle =
+      IrradianceAt(optics, place.position_px, distance_mm, Aperture::kPinhole);
+  return StoredScaling(optics, place, whole.mean / middle.mean - 1) +
+         WeighingChange(optics, place, aperture, whole.over_mean, others);
+}
+
+// What another shape of the aperture does to the fall-off: weights that are linear over the
+// aperture, g A, weigh what different rays see by at most g R/2 integral |A_x| |D|, D the
+// difference of both densities, which is 0.587 of the g sigma R/2 of the Gaussian.
+double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
+                      const EffectSet& others) {
+  if (!others.Has(Effect::kFalloff)) return 0;
+  constexpr double kNotShared = 0.587;
+  const double distance_mm = optics.image_distance_mm();
+  const Irradiance disc = IrradianceAt(optics, place.position_px, distance_mm, Aperture::kDisc);
+  const Irradiance gaussian =
+      IrradianceAt(optics, place.position_px, distance_mm, Aperture::kGaussian);
+  return StoredScaling(optics, place, gaussian.mean / disc.mean - 1) +
+         kNotShared *
+             WeighingChange(optics, place, Aperture::kGaussian, gaussian.over_mean, others);
+}
+
+}  // namespace
+
+// Thickness. Formula: (13), (25), (26) depend on the lens through f1 and zf alone, since
+// f1 D/f2 = K = f1 zf/(zf - f1): the thin lens f1 that is focused on the same plane puts every ray
+// in the same place. Its image distance is another, K instead of d1, and with it cos(beta).
+// Bound: the ratio of both irradiances, and of their weights of the rays. Enters: the camera is
+// replaced by its thin counterpart. Amount: the ratio's distance from 1; no ray is displaced.
+EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others) {
+  if (!others.Has(Effect::kFalloff)) return {};
+  const Aperture aperture = ApertureOf(optics, others);
+  const double thin_mm = optics.scale_px() * optics.camera().sensor.pixel_pitch_mm;
+  Irradiance thick =
+      IrradianceAt(optics, place.position_px, optics.camera().image_distance_mm(), aperture);
+  const Irradiance thin = IrradianceAt(optics, place.position_px, thin_mm, aperture);
+  for (std::size_t i = 0; i < thin.over_mean.size(); ++i) {
+    thick.over_mean[i] += 1 - thin.over_mean[i];
+  }
+  const double change = thin.mean / thick.mean - 1;
+  return {std::abs(change), StoredScaling(optics, place, change) +
+                                WeighingChange(optics, place, aperture, thick.over_mean, others)};
+}
+
+// Defocus. Formula: sigma = kappa r |c(z)|/p, (25), (26). Bound: BlurChange of its variance, and
+// what the whole aperture does to the fall-off. Enters: rays go through the whole aperture instead
+// of its middle.
+EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
+                           const EffectSet& others) {
+  const double sigma_px = SigmaPx(optics, place);
+  const double change = BlurChange(place, sigma_px * sigma_px, optics.SmoothingBy(others, place));
+  EffectSet all = others;
+  all.Add(Effect::kDefocus);
+  const double of_falloff = FalloffOfAperture(optics, place, others, ApertureOf(optics, all));
+  return {sigma_px, StoredChange(optics, place, change) + of_falloff, of_falloff};
+}
+
+// Aperture shape. Formula: a disc of radius 2 sigma against a Gaussian of sigma, the same second
+// moments. Bound, derived here, D the difference of both and A(r) that of their light within r,
+// min(r^2/(4 sigma^2), 1) - 1 + exp(-r^2/(2 sigma^2)): with psi' = A/(2 pi r), so that D is the
+// Laplacian of psi, the change D * L is at most
+//   1/2 integral |D| R = 0.289 R                      for any picture of range R
+//   integral |psi'| sup|grad L| = 0.222 sigma slope
+//   integral |psi| sup|laplacian L| = 0.0940 sigma^2 bend
+// and at a straight jump the farthest distance of the edge spreads, 0.0404 of it, at a corner of
+// two at most twice that. Amount: 0.0404 as a displacement of the edge, times sigma sqrt(2 pi).
+// With what the shape does to the fall-off. Enters: where rays go through the aperture.
+EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& place,
+                                 const EffectSet& others) {
+  if (!optics.is_disc() || !others.Has(Effect::kDefocus)) return {};
+  constexpr double kNotShared = 0.2887, kOfSlope = 0.2216, kOfBend = 0.0940, kEdge = 0.0404;
+  const double sigma_px = SigmaPx(optics, place);
+  const double smooth =
+      std::min(kOfSlope * sigma_px * place.slope, kOfBend * sigma_px * sigma_px * place.bend);
+  const double blurred =
+      2 * BlurChange(place, sigma_px * sigma_px,
+                     optics.SmoothingBy(others.Without({Effect::kDefocus}), place));
+  const double change = std::min(
+      {kNotShared * (place.bright - place.dark), smooth + 2 * kEdge * place.jump, blurred});
+  const double of_falloff = FalloffOfShape(optics, place, others);
+  return {kEdge * std::sqrt(2 * kPi) * sigma_px, StoredChange(optics, place, change) + of_falloff,
+          of_falloff};
+}
+
+// Fall-off. Formula: (12), cos(alpha) cos^3(beta), 1 at the principal point by exposure. Bound:
+// its mean over the aperture scales what is seen; its deviations from that mean weigh what
+// different rays see. Enters: a weight of each ray.
+EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
+                           const EffectSet& others) {
+  const Aperture aperture = ApertureOf(optics, others);
+  const Irradiance irradiance =
+      IrradianceAt(optics, place.position_px, optics.image_distance_mm(), aperture);
+  const double loss = 1 - irradiance.mean;
+  return {std::abs(loss),
+          StoredScaling(optics, place, loss) +
+              WeighingChange(optics, place, aperture, irradiance.over_mean, others)};
+}
+
+// Vignetting. Formula: (10), rays of directional samples at u cross the aperture at
+// a = ((zl + d0) u - zl s)/d0: for zl != 0 the bundle of a pixel at s wanders over the aperture by
+// zl s/d0, in standard deviations of its transmission w. Bound: the light of a Gaussian and the
+// same one displaced by w that they do not share is erf(w/(2 sqrt(2))), which weighs what
+// different rays see; the bundle's own weights are normalised. Enters: weights of the views that
+// depend on the pixel.
+EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& place,
+                              const EffectSet& others) {
+  const auto& planes = optics.conditions().planes;
+  if (!planes || planes->uv_depth_mm == 0 || !others.Has(Effect::kDefocus) ||
+      !(optics.aperture_sigma_mm() > 0)) {
+    return {};
+  }
+  const double st_depth_mm = planes->uv_depth_mm + planes->plane_spacing_mm;
+  const double s_mm = (place.position_px - optics.camera().sensor.principal_point_px).norm() *
+                      st_depth_mm / optics.scale_px();
+  const double wander =
+      std::abs(planes->uv_depth_mm * s_mm / planes->plane_spacing_mm) / optics.aperture_sigma_mm();
+  const double lost = std::erf(wander / (2 * std::sqrt(2.0)));
+  return {lost, StoredChange(optics, place, lost * (place.bright - place.dark))};
+}
+
+// Occlusion. Formula: the parallax between both sides of an edge of depth, kappa r |c(z1) -
+// c(z2)|/p for each standard deviation of the aperture. Bound: rays that are carried past the edge
+// see another surface: as at a jump of the height of the range, BlurChange of that parallax.
+// Enters: each ray is traced to what it meets first.
+EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectPlace& place,
+                             const EffectSet& others) {
+  if (!place.other_depth_mm || !others.Has(Effect::kDefocus)) return {};
+  const double parallax_px =
+      std::abs(optics.DefocusPx(place.depth_mm) - optics.DefocusPx(*place.other_depth_mm));
+  EffectPlace edge = place;
+  edge.jump = place.bright - place.dark;
+  edge.slope = edge.bend = 0;
+  EffectOptics::Smoothing boxed;
+  boxed.boxed = others.Has(Effect::kPixelBox);
+  return {parallax_px,
+          StoredChange(optics, place, BlurChange(edge, parallax_px * parallax_px, boxed))};
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,349 @@
+#include "thicklens/model/scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+#include "model/base/random_draws.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/model/stored_levels.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr std::size_t kValuesAtOnce = 1 << 16;
+
+constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
+
+std::size_t CountOf(int width, int height, int channels) {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+         static_cast<std::size_t>(channels);
+}
+
+// `what` names the array in the message: "picture", "depth map".
+void CheckSize(const std::string& what, int width_px, int height_px, int channels,
+               std::size_t count) {
+  if (width_px < 1 || height_px < 1 || channels < 1 ||
+      count != CountOf(width_px, height_px, channels)) {
+    throw Error(
+        fmt::format("{}: {} values for {}x{} px in {} channels: the count must be the "
+                    "product, and not 0",
+                    what, count, width_px, height_px, channels));
+  }
+}
+
+void CheckBits(int bits) {
+  if (bits != 8 && bits != 16) {
+    throw Error(fmt::format("picture: {} bits a value: it must be 8 or 16", bits));
+  }
+}
+
+double FullScale(int bits) {
+  CheckBits(bits);
+  return bits == 8 ? 255.0 : 65535.0;
+}
+
+// The level of a value that is stored as integers up to `full_scale`.
+std::uint16_t RoundedLevel(double stored, double full_scale) {
+  const double level = std::floor(stored * full_scale + 0.5);
+  // Written so that NaN becomes black; a cast of it would be undefined.
+  return static_cast<std::uint16_t>(level > 0 ? std::min(level, full_scale) : 0.0);
+}
+
+// `level_of` gives what is stored for each value.
+template <typename LevelOf>
+StoredPicture StoredBy(const LinearPicture& picture, int bits, const LevelOf& level_of) {
+  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
+            picture.values.size());
+  StoredPicture stored{picture.width_px, picture.height_px, picture.channels, bits, {}};
+  stored.values.resize(picture.values.size());
+  for (std::size_t first = 0; first < picture.values.size(); first += kValuesAtOnce) {
+    ThrowIfCancelled();
+    const std::size_t last = std::min(first + kValuesAtOnce, picture.values.size());
+    std::transform(picture.values.data() + first, picture.values.data() + last,
+                   stored.values.data() + first, level_of);
+  }
+  return stored;
+}
+
+void CheckConvention(const DepthConvention& convention, const std::string& depth_name) {
+  if (convention.kind != DepthKind::kDisparity) {
+    if (!(convention.unit_mm > 0) || !std::isfinite(convention.unit_mm)) {
+      throw Error(fmt::format("{}: the depth unit is {} mm: it must be finite and > 0", depth_name,
+                              convention.unit_mm));
+    }
+    return;
+  }
+  if (!std::isfinite(convention.disparity_scale) || convention.disparity_scale == 0) {
+    throw Error(fmt::format("{}: disparity_scale is {}: it must be finite and not 0", depth_name,
+                            convention.disparity_scale));
+  }
+  if (!std::isfinite(convention.disparity_offset_px)) {
+    throw Error(fmt::format("{}: disparity_offset_px is {}: it must be finite", depth_name,
+                            convention.disparity_offset_px));
+  }
+  if (!(convention.aperture_step_mm > 0) || !std::isfinite(convention.aperture_step_mm)) {
+    throw Error(fmt::format(
+        "{}: aperture_step_mm is {}: a disparity needs the step between views on the aperture, > 0",
+        depth_name, convention.aperture_step_mm));
+  }
+}
+
+// Turns numbers of one map into z, mm from Ap.
+class DepthConverter {
+ public:
+  DepthConverter(const Camera& camera, const DepthConvention& convention)
+      : convention_(convention), principal_point_px_(camera.sensor.principal_point_px) {
+    if (convention.kind == DepthKind::kZ) return;  // the only kind that needs no calibration
+    focal_scale_px_ = camera.focal_scale_px();
+    if (convention.kind == DepthKind::kRange) return;
+    inverse_focus_per_mm_ = 1 / camera.focus_depth_mm();
+    inverse_per_px_ = 1 / (convention.aperture_step_mm * focal_scale_px_);
+  }
+
+  // NaN where the number stands for no depth in front of the camera. Negative for a negative z or
+  // range.
+  double DepthMm(double value, int x, int y, bool integer) const {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    if (!std::isfinite(value)) return kNone;
+    const bool zero_is_hole = integer || convention_.kind != DepthKind::kDisparity;
+    if (value == 0 && zero_is_hole) return kNone;
+    switch (convention_.kind) {
+      case DepthKind::kZ:
+        return value * convention_.unit_mm;
+      case DepthKind::kRange:
+        return value * convention_.unit_mm / RangeOverDepth(x, y);
+      case DepthKind::kDisparity:
+        break;
+    }
+    // 1/z = 1/zf + d p/(da K), from d = da c(z)/p with c = K (1/z - 1/zf).
+    const double disparity_px =
+        convention_.disparity_scale * value + convention_.disparity_offset_px;
+    const double inverse_per_mm = inverse_focus_per_mm_ + disparity_px * inverse_per_px_;
+    return inverse_per_mm > 0 ? 1 / inverse_per_mm : kNone;
+  }
+
+ private:
+  // sqrt(1 + (t p/K)^2): the chief ray of a pixel t px from the principal point has the slope
+  // t p/K in front of the lens.
+  double RangeOverDepth(int x, int y) const {
+    const Eigen::Vector2d slope = (Eigen::Vector2d(x, y) - principal_point_px_) / focal_scale_px_;
+    return std::sqrt(1 + slope.squaredNorm());
+  }
+
+  const DepthConvention convention_;
+  const Eigen::Vector2d principal_point_px_;
+  double focal_scale_px_ = 0;        // K/p
+  double inverse_focus_per_mm_ = 0;  // 1/zf, 0 for a focus at infinity
+  double inverse_per_px_ = 0;        // p/(da K), 1/mm per px of disparity
+};
+
+// The median is the lower of the two middle ones, so that it is a depth that occurs.
+DepthStatistics StatisticsOf(const std::vector<float>& depth_mm) {
+  std::vector<float> valid_mm;
+  valid_mm.reserve(depth_mm.size());
+  std::copy_if(depth_mm.begin(), depth_mm.end(), std::back_inserter(valid_mm),
+               [](float z) { return !std::isnan(z); });
+  DepthStatistics statistics;
+  statistics.valid = valid_mm.size();
+  statistics.holes = depth_mm.size() - valid_mm.size();
+  if (valid_mm.empty()) return statistics;
+  const auto [least, most] = std::minmax_element(valid_mm.begin(), valid_mm.end());
+  statistics.min_mm = *least;
+  statistics.max_mm = *most;
+  const auto middle = valid_mm.begin() + static_cast<std::ptrdiff_t>((valid_mm.size() - 1) / 2);
+  std::nth_element(valid_mm.begin(), middle, valid_mm.end());
+  statistics.median_mm = *middle;
+  return statistics;
+}
+
+// Refuses depths that no picture of this camera has. A unit that is off by 1000 is told by two
+// bounds at once, in lengths of the camera, so that a landscape taken with a near focus, or a close
+// object with a far one, still passes:
+//   too large by 1000: every depth beyond 1000 f1 (none was nearer than f1), and the median beyond
+//     100 zf (it was beyond zf/10);
+//   too small by 1000: every depth within 10 f1 (none was beyond 10^4 f1), and the median within
+//     zf/100 (it was within 10 zf).
+// Many of the second sort are nearer than f1 already.
+void CheckPlausible(const Camera& camera, const DepthStatistics& depth,
+                    const std::string& depth_name, const std::string& doubt) {
+  const std::string found = fmt::format("{}: depths from {:.6g} to {:.6g} mm, median {:.6g} mm",
+                                        depth_name, depth.min_mm, depth.max_mm, depth.median_mm);
+  const double front_focal_length_mm = camera.lens.front_focal_length_mm;
+  if (!(depth.min_mm > front_focal_length_mm)) {
+    throw Error(
+        fmt::format("{}: they must be beyond the camera's front focal point at {:.6g} mm; {}",
+                    found, front_focal_length_mm, doubt));
+  }
+  if (!camera.calibration || !camera.calibration->image_distance_mm) return;
+  const double focus_depth_mm = camera.focus_depth_mm();
+  if (std::isinf(focus_depth_mm)) return;
+  const bool too_large =
+      depth.min_mm > 1000 * front_focal_length_mm && depth.median_mm > 100 * focus_depth_mm;
+  const bool too_small =
+      depth.max_mm < 10 * front_focal_length_mm && depth.median_mm < focus_depth_mm / 100;
+  if (too_large || too_small) {
+    throw Error(fmt::format(
+        "{}: too {} for a camera focused at {:.6g} mm, as if the unit were off by a factor of "
+        "1000; {}",
+        found, too_large ? "far" : "near", focus_depth_mm, doubt));
+  }
+}
+
+}  // namespace
+
+StoredLevels::StoredLevels(const TransferCurve& transfer, int bits) : bits_(bits) {
+  const double full_scale = FullScale(bits);
+  const auto level_of = [&](float light) {
+    return RoundedLevel(transfer.Encode(light), full_scale);
+  };
+  least_light_.push_back(0);
+  for (int level = 1; level <= static_cast<int>(full_scale); ++level) {
+    // Decode and Encode are inverse to each other up to their rounding, which may cross a float.
+    auto least = static_cast<float>(transfer.Decode((level - 0.5) / full_scale));
+    while (level_of(least) >= level) least = std::nextafter(least, 0.0F);
+    while (level_of(least) < level) least = std::nextafter(least, 2.0F);
+    least_light_.push_back(least);
+  }
+  lowest_level_.resize(CellOf(1) + 1);
+  for (std::size_t level = 1; level < least_light_.size(); ++level) {
+    // From the cell after the one that the level begins in.
+    const std::size_t cell = CellOf(least_light_[level]) + 1;
+    if (cell < lowest_level_.size()) lowest_level_[cell] = static_cast<std::uint16_t>(level);
+  }
+  for (std::size_t cell = 1; cell < lowest_level_.size(); ++cell) {
+    lowest_level_[cell] = std::max(lowest_level_[cell], lowest_level_[cell - 1]);
+  }
+}
+
+LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transfer) {
+  CheckBits(picture.bits);
+  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
+            picture.values.size());
+  // One entry a possible value: a power function for each pixel would cost far more.
+  std::vector<float> light_of(static_cast<std::size_t>(picture.full_scale()) + 1);
+  for (std::size_t value = 0; value < light_of.size(); ++value) {
+    light_of[value] =
+        static_cast<float>(transfer.Decode(static_cast<double>(value) / picture.full_scale()));
+  }
+  LinearPicture linear{picture.width_px, picture.height_px, picture.channels, {}};
+  linear.values.reserve(picture.values.size());
+  for (const std::uint16_t value : picture.values) {
+    if (linear.values.size() % kValuesAtOnce == 0) ThrowIfCancelled();
+    if (value >= light_of.size()) {
+      throw Error(fmt::format("picture: a value is {}: at {} bits it must be at most {}", value,
+                              picture.bits, picture.full_scale()));
+    }
+    linear.values.push_back(light_of[value]);
+  }
+  return linear;
+}
+
+StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits) {
+  const double full_scale = FullScale(bits);
+  return StoredBy(picture, bits,
+                  [&](float light) { return RoundedLevel(transfer.Encode(light), full_scale); });
+}
+
+StoredPicture ToStored(const LinearPicture& picture, const StoredLevels& levels) {
+  return StoredBy(picture, levels.bits(), [&](float light) { return levels.LevelOf(light); });
+}
+
+StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurve& transfer,
+                                int bits, double sigma, std::uint64_t seed) {
+  if (!(sigma >= 0) || !std::isfinite(sigma)) {
+    throw Error(
+        fmt::format("picture: the noise is {} full scales: it must be finite and >= 0", sigma));
+  }
+  if (sigma == 0) return ToStored(picture, transfer, bits);
+  const double full_scale = FullScale(bits);
+  RandomDraws draws(seed, RandomDraws::Purpose::kStoredNoise, 0);
+  return StoredBy(picture, bits, [&](float light) {
+    return RoundedLevel(transfer.Encode(light) + sigma * draws.Normal(), full_scale);
+  });
+}
+
+LinearPicture ToGrey(const LinearPicture& picture) {
+  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
+            picture.values.size());
+  if (picture.channels == 1) return picture;
+  if (picture.channels != 3 && picture.channels != 4) {
+    throw Error(
+        fmt::format("picture: {} channels: it must have 1 (grey), 3 (RGB) or 4 (RGB and alpha)",
+                    picture.channels));
+  }
+  LinearPicture grey{picture.width_px, picture.height_px, 1, {}};
+  const auto step = static_cast<std::size_t>(picture.channels);
+  grey.values.reserve(picture.values.size() / step);
+  for (std::size_t i = 0; i < picture.values.size(); i += step) {
+    grey.values.push_back(0.2126F * picture.values[i] + 0.7152F * picture.values[i + 1] +
+                          0.0722F * picture.values[i + 2]);
+  }
+  return grey;
+}
+
+DepthKind DepthKindFromName(const std::string& name) {
+  if (name == "z") return DepthKind::kZ;
+  if (name == "range") return DepthKind::kRange;
+  if (name == "disparity") return DepthKind::kDisparity;
+  throw Error(fmt::format("depth kind \"{}\" is unknown: it must be z, range or disparity", name));
+}
+
+double DepthUnitMm(const std::string& name) {
+  if (name == "mm") return 1;
+  if (name == "cm") return 10;
+  if (name == "m") return 1000;
+  if (name == "tum5000") return 0.2;
+  throw Error(fmt::format("depth unit \"{}\" is unknown: it must be mm, cm, m or tum5000", name));
+}
+
+Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& map,
+                const DepthConvention& convention, const std::string& depth_name) {
+  CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
+            picture.values.size());
+  CheckSize(depth_name, map.width_px, map.height_px, 1, map.values.size());
+  if (map.width_px != picture.width_px || map.height_px != picture.height_px) {
+    throw Error(fmt::format("{}: it is {}x{} px, the picture {}x{} px: the sizes must be equal",
+                            depth_name, map.width_px, map.height_px, picture.width_px,
+                            picture.height_px));
+  }
+  CheckConvention(convention, depth_name);
+
+  const DepthConverter converter(camera, convention);
+  Scene scene;
+  scene.depth_mm.reserve(map.values.size());
+  for (int y = 0; y < map.height_px; ++y) {
+    ThrowIfCancelled();
+    for (int x = 0; x < map.width_px; ++x) {
+      const float value = map.values[scene.depth_mm.size()];
+      const double depth_mm = converter.DepthMm(value, x, y, map.integer);
+      if (depth_mm < 0) {
+        throw Error(
+            fmt::format("{}: the value at pixel ({}, {}) is {}: a depth must not be "
+                        "negative",
+                        depth_name, x, y, value));
+      }
+      // A depth beyond what float holds is one at infinity.
+      const bool is_depth = depth_mm <= std::numeric_limits<float>::max();
+      scene.depth_mm.push_back(is_depth ? static_cast<float>(depth_mm) : kHole);
+    }
+  }
+  scene.depth = StatisticsOf(scene.depth_mm);
+  if (scene.depth.valid == 0) {
+    throw Error(fmt::format("{}: none of its {} values is a depth: all are holes", depth_name,
+                            map.values.size()));
+  }
+  CheckPlausible(camera, scene.depth, depth_name,
+                 convention.kind == DepthKind::kDisparity
+                     ? "are scale and offset of the disparity right, or is the map a depth?"
+                     : "is the unit right?");
+  scene.picture = std::move(picture);
+  return scene;
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,117 @@
+#include "thicklens/model/camera.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "thicklens/base/error.h"
+
+namespace thicklens::model {
+namespace {
+
+bool Fail(std::string* why, const std::string& message) {
+  if (why != nullptr) *why = message;
+  return false;
+}
+
+}  // namespace
+
+std::string PsfName(Psf psf) { return psf == Psf::kGaussian ? "gaussian" : "disc"; }
+
+bool Sensor::IsValid(std::string* why) const {
+  if (!(width_px > 0)) return Fail(why, fmt::format("width_px must be > 0, found {}", width_px));
+  if (!(height_px > 0)) return Fail(why, fmt::format("height_px must be > 0, found {}", height_px));
+  if (!(pixel_pitch_mm > 0) || !std::isfinite(pixel_pitch_mm)) {
+    return Fail(why, fmt::format("pixel_pitch_mm must be > 0, found {}", pixel_pitch_mm));
+  }
+  if (!principal_point_px.allFinite()) {
+    return Fail(why, fmt::format("principal_point_px must be finite, found ({}, {})",
+                                 principal_point_px.x(), principal_point_px.y()));
+  }
+  return true;
+}
+
+bool Camera::IsValid(std::string* why) const {
+  std::string inner;
+  if (!lens.IsValid(&inner)) return Fail(why, "lens: " + inner);
+  if (!sensor.IsValid(&inner)) return Fail(why, "sensor: " + inner);
+  if (!calibration) return true;
+  const CameraCalibration& found = *calibration;
+  const auto sigma_ok = [&](const std::optional<Estimate>& estimate, const char* field) {
+    if (!estimate || (std::isfinite(estimate->value) && estimate->sigma >= 0)) return true;
+    return Fail(why,
+                fmt::format("calibration: {}: value must be finite and sigma >= 0, found {} +- {}",
+                            field, estimate->value, estimate->sigma));
+  };
+  if (!sigma_ok(found.image_distance_mm, "image_distance_mm") ||
+      !sigma_ok(found.blur_ratio, "blur_ratio") ||
+      !sigma_ok(found.blur_floor_px, "blur_floor_px") ||
+      !sigma_ok(found.bench_offset_mm, "bench_offset_mm")) {
+    return false;
+  }
+  if (found.image_distance_mm) {
+    const double nearest_mm = lens.lens_thickness_mm + lens.rear_focal_length_mm;
+    if (!(found.image_distance_mm->value >= nearest_mm)) {
+      return Fail(
+          why, fmt::format("calibration: image_distance_mm must be >= lens_thickness_mm + "
+                           "rear_focal_length_mm = {} (D >= f2: there the focus is at infinity), "
+                           "found {}",
+                           nearest_mm, found.image_distance_mm->value));
+    }
+  }
+  if (found.blur_ratio && !(found.blur_ratio->value >= 0)) {
+    return Fail(why, fmt::format("calibration: blur_ratio must be >= 0, found {}",
+                                 found.blur_ratio->value));
+  }
+  if (found.blur_floor_px && !(found.blur_floor_px->value >= 0)) {
+    return Fail(why, fmt::format("calibration: blur_floor_px must be >= 0, found {}",
+                                 found.blur_floor_px->value));
+  }
+  return true;
+}
+
+double Camera::image_distance_mm() const {
+  if (!calibration || !calibration->image_distance_mm) {
+    throw Error(fmt::format(
+        "camera '{}': calibration.image_distance_mm is missing; run thicklens calibrate "
+        "or write an assumed value",
+        name));
+  }
+  return calibration->image_distance_mm->value;
+}
+
+double Camera::focus_depth_mm() const { return FocusDepthMm(lens, image_distance_mm()); }
+
+double Camera::blur_ratio() const {
+  if (!calibration || !calibration->blur_ratio) {
+    throw Error(
+        fmt::format("camera '{}': calibration.blur_ratio is missing; run thicklens calibrate or "
+                    "write an assumed value",
+                    name));
+  }
+  return calibration->blur_ratio->value;
+}
+
+double Camera::focal_scale_px() const {
+  return DefocusScaleMm(lens, image_distance_mm()) / sensor.pixel_pitch_mm;
+}
+
+std::vector<std::string> AssumedFields(const Camera& camera) {
+  std::vector<std::string> fields;
+  for (const auto& [field, statement] : camera.statements) {
+    if (statement.assumed) fields.push_back(field);
+  }
+  if (camera.calibration && camera.calibration->evidence.method == "assumed")
+    fields.emplace_back("calibration");
+  return fields;
+}
+
+Camera ThinTwin(const Camera& camera) {
+  Camera thin = camera;
+  thin.lens = ThinCounterpart(camera.lens);
+  thin.calibration->image_distance_mm->value =
+      camera.focal_scale_px() * camera.sensor.pixel_pitch_mm;
+  return thin;
+}
+
+}  // namespace thicklens::model

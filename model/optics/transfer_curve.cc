@@ -1,0 +1,55 @@
+#include "thicklens/model/transfer_curve.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "thicklens/base/error.h"
+
+namespace thicklens::model {
+namespace {
+
+// IEC 61966-2-1: a straight piece near black, where a power alone would have an infinite slope.
+double EncodeSrgb(double light) {
+  return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+}
+
+double DecodeSrgb(double stored) {
+  return stored <= 0.04045 ? stored / 12.92 : std::pow((stored + 0.055) / 1.055, 2.4);
+}
+
+}  // namespace
+
+TransferCurve TransferCurve::FromName(const std::string& name) {
+  if (name == "linear") return Linear();
+  if (name == "srgb") return Srgb();
+  if (name == "gamma-2.2") return Gamma(2.2);
+  throw Error(
+      fmt::format("transfer curve \"{}\" is unknown: it must be linear, srgb or gamma-2.2", name));
+}
+
+std::string TransferCurve::Name() const {
+  switch (kind_) {
+    case Kind::kLinear:
+      return "linear";
+    case Kind::kSrgb:
+      return "srgb";
+    case Kind::kGamma:
+      break;
+  }
+  return fmt::format("gamma-{}", gamma_);
+}
+
+double TransferCurve::Encode(double light) const {
+  if (kind_ == Kind::kLinear) return light;
+  const double size = std::abs(light);
+  return std::copysign(kind_ == Kind::kSrgb ? EncodeSrgb(size) : std::pow(size, 1 / gamma_), light);
+}
+
+double TransferCurve::Decode(double stored) const {
+  if (kind_ == Kind::kLinear) return stored;
+  const double size = std::abs(stored);
+  return std::copysign(kind_ == Kind::kSrgb ? DecodeSrgb(size) : std::pow(size, gamma_), stored);
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,293 @@
+#include "thicklens/model/camera_file.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/schema/former_blur_ratio.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
+#include "thicklens/base/yaml_reader.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr char kSchema[] = "thicklens/camera/2";
+// Its blur ratio was another (former_blur_ratio.h).
+constexpr char kFormerSchema[] = "thicklens/camera/1";
+constexpr int kMaxImageSizePx = 100000;
+
+// A number, or {value: .., tolerance: .., assumed: ..}; what is stated about it goes into the
+// camera.
+YamlNode ValueNode(const YamlNode& node, Camera* camera) {
+  if (!node.IsMap()) return node;
+  node.RequireKeys({"value", "tolerance", "assumed"});
+  Statement statement;
+  if (const auto tolerance = node.Find("tolerance"))
+    statement.tolerance = tolerance->NonNegativeNumber();
+  if (const auto assumed = node.Find("assumed")) statement.assumed = assumed->Boolean();
+  if (statement.assumed || statement.tolerance > 0) camera->statements[node.path()] = statement;
+  return node.At("value");
+}
+
+void ReadLens(const YamlNode& node, Camera* camera) {
+  node.RequireKeys(
+      {"front_focal_length_mm", "rear_focal_length_mm", "lens_thickness_mm", "aperture_radius_mm"});
+  ThickLens& lens = camera->lens;
+  lens.front_focal_length_mm = ValueNode(node.At("front_focal_length_mm"), camera).PositiveNumber();
+  lens.rear_focal_length_mm = ValueNode(node.At("rear_focal_length_mm"), camera).PositiveNumber();
+  lens.lens_thickness_mm = ValueNode(node.At("lens_thickness_mm"), camera).Number();
+  lens.aperture_radius_mm = ValueNode(node.At("aperture_radius_mm"), camera).PositiveNumber();
+}
+
+void ReadSensor(const YamlNode& node, Camera* camera) {
+  node.RequireKeys({"width_px", "height_px", "pixel_pitch_mm", "principal_point_px", "transfer"});
+  Sensor& sensor = camera->sensor;
+  sensor.width_px = ValueNode(node.At("width_px"), camera).Integer(1, kMaxImageSizePx);
+  sensor.height_px = ValueNode(node.At("height_px"), camera).Integer(1, kMaxImageSizePx);
+  sensor.pixel_pitch_mm = ValueNode(node.At("pixel_pitch_mm"), camera).PositiveNumber();
+  const auto point = node.At("principal_point_px").ElementsExactly(2);
+  sensor.principal_point_px = {ValueNode(point[0], camera).Number(),
+                               ValueNode(point[1], camera).Number()};
+  const YamlNode transfer = node.At("transfer");
+  try {
+    sensor.transfer = TransferCurve::FromName(transfer.Text());
+  } catch (const Error& e) {
+    throw transfer.ErrorHere(e.what());
+  }
+}
+
+using NumberOf = double (YamlNode::*)() const;
+
+// `number` is the check on the value: any, positive or not negative.
+std::optional<Estimate> ReadEstimate(const YamlNode& parent, const std::string& key,
+                                     NumberOf number) {
+  const auto node = parent.Find(key);
+  if (!node) return std::nullopt;
+  if (!node->IsMap()) return Estimate{((*node).*number)(), 0};
+  node->RequireKeys({"value", "sigma"});
+  Estimate estimate;
+  estimate.value = (node->At("value").*number)();
+  if (const auto sigma = node->Find("sigma")) estimate.sigma = sigma->NonNegativeNumber();
+  return estimate;
+}
+
+Evidence ReadEvidence(const YamlNode& node) {
+  node.RequireKeys({"method", "frames_used", "frames_rejected", "chi2_per_dof", "focus_depth_mm",
+                    "blur_family", "blur_band", "data_sha256", "version", "date"});
+  Evidence evidence;
+  evidence.method = node.At("method").Text();
+  if (const auto used = node.Find("frames_used")) evidence.frames_used = used->Integer(0, 1000000);
+  if (const auto rejected = node.Find("frames_rejected")) {
+    for (const YamlNode& frame : rejected->Elements()) {
+      frame.RequireKeys({"image", "reason"});
+      evidence.frames_rejected.push_back({frame.At("image").Text(), frame.At("reason").Text()});
+    }
+  }
+  if (const auto chi2 = node.Find("chi2_per_dof"))
+    evidence.chi2_per_dof = chi2->NonNegativeNumber();
+  evidence.focus_depth_mm = ReadEstimate(node, "focus_depth_mm", &YamlNode::PositiveNumber);
+  if (const auto family = node.Find("blur_family"))
+    evidence.blur_family = family->OneOf({"gaussian", "disc"});
+  if (const auto band = node.Find("blur_band")) evidence.blur_band = band->PositiveNumber();
+  if (const auto hash = node.Find("data_sha256")) evidence.data_sha256 = hash->Text();
+  if (const auto version = node.Find("version")) evidence.version = version->Text();
+  if (const auto date = node.Find("date")) evidence.date = date->Text();
+  return evidence;
+}
+
+void ReadCovariance(const YamlNode& node, CameraCalibration* calibration) {
+  node.RequireKeys({"order", "rows"});
+  for (const YamlNode& name : node.At("order").Elements()) {
+    std::vector<std::string>& order = calibration->covariance_order;
+    const std::string parameter =
+        name.OneOf({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"});
+    if (std::find(order.begin(), order.end(), parameter) != order.end())
+      throw name.ErrorHere(fmt::format("'{}' stands in this list twice", parameter));
+    order.push_back(parameter);
+  }
+  const std::size_t n = calibration->covariance_order.size();
+  const auto rows = node.At("rows").ElementsExactly(n);
+  calibration->covariance.resize(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto row = rows[i].ElementsExactly(n);
+    for (std::size_t j = 0; j < n; ++j) {
+      calibration->covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          row[j].Number();
+    }
+  }
+  const Eigen::MatrixXd& c = calibration->covariance;
+  if (n > 0 && !((c - c.transpose()).cwiseAbs().maxCoeff() <= 1e-9 * c.cwiseAbs().maxCoeff())) {
+    throw node.ErrorHere("a covariance must be symmetric");
+  }
+}
+
+CameraCalibration ReadCalibration(const YamlNode& node) {
+  node.RequireKeys({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm",
+                    "covariance", "evidence"});
+  CameraCalibration calibration;
+  calibration.image_distance_mm = ReadEstimate(node, "image_distance_mm", &YamlNode::Number);
+  calibration.blur_ratio = ReadEstimate(node, "blur_ratio", &YamlNode::NonNegativeNumber);
+  calibration.blur_floor_px = ReadEstimate(node, "blur_floor_px", &YamlNode::NonNegativeNumber);
+  calibration.bench_offset_mm = ReadEstimate(node, "bench_offset_mm", &YamlNode::Number);
+  if (const auto covariance = node.Find("covariance")) ReadCovariance(*covariance, &calibration);
+  calibration.evidence = ReadEvidence(node.At("evidence"));
+  return calibration;
+}
+
+// YAML::Emitter quotes texts where needed; numbers are handed to it as text in their shortest form.
+class Writer {
+ public:
+  explicit Writer(const Camera& camera) : camera_(camera) {}
+
+  std::string Write() {
+    out_ << YAML::BeginMap;
+    Text("schema", kSchema);
+    Text("name", camera_.name);
+    out_ << YAML::Key << "lens" << YAML::Value << YAML::BeginMap;
+    Stated("lens.", "front_focal_length_mm", camera_.lens.front_focal_length_mm);
+    Stated("lens.", "rear_focal_length_mm", camera_.lens.rear_focal_length_mm);
+    Stated("lens.", "lens_thickness_mm", camera_.lens.lens_thickness_mm);
+    Stated("lens.", "aperture_radius_mm", camera_.lens.aperture_radius_mm);
+    out_ << YAML::EndMap;
+    WriteSensor();
+    Text("psf", PsfName(camera_.psf));
+    if (camera_.calibration) WriteCalibration(*camera_.calibration);
+    out_ << YAML::EndMap;
+    return std::string(out_.c_str()) + "\n";
+  }
+
+ private:
+  void Text(const char* key, const std::string& value) {
+    out_ << YAML::Key << key << YAML::Value << value;
+  }
+  void Number(const char* key, double value) { Text(key, YamlNumber(value)); }
+
+  void StatedValue(const std::string& field, double value) {
+    const auto statement = camera_.statements.find(field);
+    if (statement == camera_.statements.end()) {
+      out_ << YamlNumber(value);
+      return;
+    }
+    out_ << YAML::Flow << YAML::BeginMap;
+    Number("value", value);
+    if (statement->second.tolerance != 0) Number("tolerance", statement->second.tolerance);
+    if (statement->second.assumed) Text("assumed", "true");
+    out_ << YAML::EndMap;
+  }
+
+  void Stated(const std::string& section, const std::string& key, double value) {
+    out_ << YAML::Key << key << YAML::Value;
+    StatedValue(section + key, value);
+  }
+
+  void WriteSensor() {
+    const Sensor& sensor = camera_.sensor;
+    out_ << YAML::Key << "sensor" << YAML::Value << YAML::BeginMap;
+    Stated("sensor.", "width_px", sensor.width_px);
+    Stated("sensor.", "height_px", sensor.height_px);
+    Stated("sensor.", "pixel_pitch_mm", sensor.pixel_pitch_mm);
+    out_ << YAML::Key << "principal_point_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    StatedValue("sensor.principal_point_px[0]", sensor.principal_point_px.x());
+    StatedValue("sensor.principal_point_px[1]", sensor.principal_point_px.y());
+    out_ << YAML::EndSeq;
+    Text("transfer", sensor.transfer.Name());
+    out_ << YAML::EndMap;
+  }
+
+  void Measured(const char* key, const std::optional<Estimate>& estimate) {
+    if (!estimate) return;
+    out_ << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap;
+    Number("value", estimate->value);
+    Number("sigma", estimate->sigma);
+    out_ << YAML::EndMap;
+  }
+
+  void WriteCalibration(const CameraCalibration& calibration) {
+    out_ << YAML::Key << "calibration" << YAML::Value << YAML::BeginMap;
+    Measured("image_distance_mm", calibration.image_distance_mm);
+    Measured("blur_ratio", calibration.blur_ratio);
+    Measured("blur_floor_px", calibration.blur_floor_px);
+    Measured("bench_offset_mm", calibration.bench_offset_mm);
+    if (!calibration.covariance_order.empty()) WriteCovariance(calibration);
+    WriteEvidence(calibration.evidence);
+    out_ << YAML::EndMap;
+  }
+
+  void WriteCovariance(const CameraCalibration& calibration) {
+    out_ << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap;
+    out_ << YAML::Key << "order" << YAML::Value << YAML::Flow << calibration.covariance_order;
+    out_ << YAML::Key << "rows" << YAML::Value << YAML::BeginSeq;
+    for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
+      out_ << YAML::Flow << YAML::BeginSeq;
+      for (Eigen::Index j = 0; j < calibration.covariance.cols(); ++j) {
+        out_ << YamlNumber(calibration.covariance(i, j));
+      }
+      out_ << YAML::EndSeq;
+    }
+    out_ << YAML::EndSeq << YAML::EndMap;
+  }
+
+  void WriteEvidence(const Evidence& evidence) {
+    out_ << YAML::Key << "evidence" << YAML::Value << YAML::BeginMap;
+    Text("method", evidence.method);
+    Text("frames_used", std::to_string(evidence.frames_used));
+    if (!evidence.frames_rejected.empty()) {
+      out_ << YAML::Key << "frames_rejected" << YAML::Value << YAML::BeginSeq;
+      for (const RejectedFrame& frame : evidence.frames_rejected) {
+        out_ << YAML::Flow << YAML::BeginMap;
+        Text("image", frame.image);
+        Text("reason", frame.reason);
+        out_ << YAML::EndMap;
+      }
+      out_ << YAML::EndSeq;
+    }
+    if (evidence.chi2_per_dof) Number("chi2_per_dof", *evidence.chi2_per_dof);
+    Measured("focus_depth_mm", evidence.focus_depth_mm);
+    if (!evidence.blur_family.empty()) Text("blur_family", evidence.blur_family);
+    if (evidence.blur_band) Number("blur_band", *evidence.blur_band);
+    if (!evidence.data_sha256.empty()) Text("data_sha256", evidence.data_sha256);
+    if (!evidence.version.empty()) Text("version", evidence.version);
+    if (!evidence.date.empty()) Text("date", evidence.date);
+    out_ << YAML::EndMap;
+  }
+
+  const Camera& camera_;
+  YAML::Emitter out_;
+};
+
+}  // namespace
+
+Camera ParseCamera(const std::string& text, const std::string& source_name) {
+  const YamlNode root = YamlNode::Parse(text, source_name);
+  const bool is_former = root.HasSchema(kFormerSchema);
+  if (!is_former) root.RequireSchema(kSchema);
+  root.RequireKeys({"schema", "name", "lens", "sensor", "psf", "calibration"});
+  Camera camera;
+  camera.name = root.At("name").Text();
+  ReadLens(root.At("lens"), &camera);
+  ReadSensor(root.At("sensor"), &camera);
+  if (const auto psf = root.Find("psf")) {
+    camera.psf = psf->OneOf({"gaussian", "disc"}) == "disc" ? Psf::kDisc : Psf::kGaussian;
+  }
+  if (const auto calibration = root.Find("calibration"))
+    camera.calibration = ReadCalibration(*calibration);
+  // Each number was checked where it stands. What is left is how the image distance goes with the
+  // lens, so an error belongs to the calibration if there is one.
+  std::string why;
+  if (!camera.IsValid(&why)) {
+    const auto place = camera.calibration ? root.At("calibration").Find("image_distance_mm")
+                                          : std::optional<YamlNode>();
+    throw place.value_or(root).ErrorHere(why);
+  }
+  if (is_former) ConvertFormerBlurRatio(&camera);
+  return camera;
+}
+
+Camera ReadCamera(const std::string& path) { return ParseCamera(ReadTextFile(path), path); }
+
+std::string CameraToYaml(const Camera& camera) { return Writer(camera).Write(); }
+
+}  // namespace thicklens::model

@@ -1,0 +1,50 @@
+#include "model/schema/effect_yaml.h"
+
+#include <string>
+
+#include "thicklens/base/error.h"
+
+namespace thicklens::model {
+
+void ReadEffectChoice(const YamlNode& root, EffectChoice* choice) {
+  const auto names = [](const YamlNode& node) {
+    EffectSet effects;
+    for (const YamlNode& name : node.Elements()) {
+      const std::string text = name.Text();
+      try {
+        effects.Add(EffectFromName(text));
+      } catch (const Error& error) {
+        throw name.ErrorHere(error.what());
+      }
+    }
+    return effects;
+  };
+  if (const auto effects = root.Find("effects")) {
+    if (effects->IsSequence()) {
+      choice->base = EffectChoice::Base::kGiven;
+      choice->given = names(*effects);
+    } else {
+      *choice = EffectChoiceFromText(effects->OneOf({"auto", "all", "none"}), "", "");
+    }
+  }
+  if (const auto without = root.Find("without")) choice->without = names(*without);
+  if (const auto tolerance = root.Find("tolerance")) {
+    const std::string text = tolerance->Text();
+    try {
+      choice->tolerance = EffectToleranceFromText(text);
+    } catch (const Error& error) {
+      throw tolerance->ErrorHere(error.what());
+    }
+  }
+}
+
+void EmitEffects(const EffectRecord& record, YAML::Emitter* out) {
+  *out << YAML::Key << "effects" << YAML::Value << YAML::Flow << record.on;
+  *out << YAML::Key << "left_out_grey_levels" << YAML::Value << YAML::Flow << YAML::BeginMap;
+  for (const auto& [name, grey_levels] : record.left_out_grey_levels) {
+    *out << YAML::Key << name << YAML::Value << YamlNumber(grey_levels);
+  }
+  *out << YAML::EndMap;
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,323 @@
+#include "thicklens/model/light_field_file.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
+#include "thicklens/base/yaml_reader.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr char kSchema[] = "thicklens/light-field/1";
+constexpr char kConfidenceFormat[] = "png";
+constexpr char kDisparityIs[] = "px per view step, near positive";
+constexpr int kMaxImageSizePx = 100000;
+constexpr int kMaxViews = 1000;  // along u, and along v
+constexpr int kMaxIterations = 1000000000;
+constexpr double kWeightSumTolerance = 1e-6;
+
+Eigen::Vector2d ReadPoint(const YamlNode& node) {
+  const auto elements = node.ElementsExactly(2);
+  return {elements[0].Number(), elements[1].Number()};
+}
+
+void ReadSizes(const YamlNode& root, LightField* light_field) {
+  const auto views = root.At("views").ElementsExactly(2);
+  light_field->u_count = views[0].Integer(1, kMaxViews);
+  light_field->v_count = views[1].Integer(1, kMaxViews);
+  const auto size = root.At("size").ElementsExactly(2);
+  light_field->s_count = size[0].Integer(1, kMaxImageSizePx);
+  light_field->t_count = size[1].Integer(1, kMaxImageSizePx);
+  const YamlNode channels = root.At("channels");
+  light_field->channels = channels.Integer(1, 3);
+  if (light_field->channels == 2) throw channels.ErrorHere("must be 1 (grey) or 3 (RGB), found 2");
+}
+
+void ReadWeights(const YamlNode& node, LightField* light_field) {
+  const auto rows = node.ElementsExactly(static_cast<std::size_t>(light_field->v_count));
+  light_field->weights.resize(light_field->v_count, light_field->u_count);
+  for (int l = 0; l < light_field->v_count; ++l) {
+    const auto row = rows[static_cast<std::size_t>(l)].ElementsExactly(
+        static_cast<std::size_t>(light_field->u_count));
+    for (int k = 0; k < light_field->u_count; ++k)
+      light_field->weights(l, k) = row[static_cast<std::size_t>(k)].NonNegativeNumber();
+  }
+  if (!(std::abs(light_field->weights.sum() - 1) <= kWeightSumTolerance)) {
+    throw node.ErrorHere(
+        fmt::format("the weights must have the sum 1, found {}", light_field->weights.sum()));
+  }
+}
+
+void ReadMissingViews(const YamlNode& node, LightField* light_field) {
+  const int views = light_field->u_count * light_field->v_count;
+  light_field->present.assign(static_cast<std::size_t>(views), true);
+  int missing = 0;
+  for (const YamlNode& view : node.Elements()) {
+    const auto place = view.ElementsExactly(2);
+    const int k = place[0].Integer(0, light_field->u_count - 1);
+    const int l = place[1].Integer(0, light_field->v_count - 1);
+    const auto index = static_cast<std::size_t>(l * light_field->u_count + k);
+    if (!light_field->present[index])
+      throw view.ErrorHere(fmt::format("view ({}, {}) stands in this list twice", k, l));
+    light_field->present[index] = false;
+    ++missing;
+  }
+  if (missing == 0) light_field->present.clear();
+  if (missing == views) throw node.ErrorHere("all views are missing: one at least is needed");
+}
+
+void ReadGrid(const YamlNode& root, LightField* light_field) {
+  LightFieldGrid grid;
+  grid.s_count = light_field->s_count;
+  grid.t_count = light_field->t_count;
+  grid.u_count = light_field->u_count;
+  grid.v_count = light_field->v_count;
+  const YamlNode planes = root.At("planes");
+  planes.RequireKeys({"uv_depth_mm", "plane_spacing_mm"});
+  grid.planes.uv_depth_mm = planes.At("uv_depth_mm").Number();
+  grid.planes.plane_spacing_mm = planes.At("plane_spacing_mm").Number();
+  const YamlNode steps = root.At("steps");
+  steps.RequireKeys({"s_step_mm", "t_step_mm", "u_step_mm", "v_step_mm"});
+  grid.s_step_mm = steps.At("s_step_mm").PositiveNumber();
+  grid.t_step_mm = steps.At("t_step_mm").PositiveNumber();
+  grid.u_step_mm = steps.At("u_step_mm").Number();
+  grid.v_step_mm = steps.At("v_step_mm").Number();
+  grid.st_origin_index = ReadPoint(root.At("st_origin_index"));
+  std::string why;
+  if (!grid.IsValid(&why)) throw planes.ErrorHere(why);
+  light_field->grid = grid;
+}
+
+// The camera and what says how the samples lie in front of it: all or nothing.
+void ReadCameraAndGrid(const YamlNode& root, LightFieldDescription* description) {
+  if (const auto camera = root.Find("camera")) {
+    description->camera_file = camera->Text();
+    // What a light field from elsewhere names must come with it: no other file is opened.
+    const std::filesystem::path file = description->camera_file;
+    const bool leads_out =
+        file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end();
+    if (leads_out) {
+      throw camera->ErrorHere(fmt::format(
+          "a file in the folder of the light field is expected, found '{}'", file.string()));
+    }
+    ReadGrid(root, &description->light_field);
+    return;
+  }
+  for (const char* key : {"planes", "steps", "st_origin_index"}) {
+    if (const auto node = root.Find(key))
+      throw node->ErrorHere("means nothing without a camera: 'camera' is missing");
+  }
+}
+
+std::string TextOrNothing(const YamlNode& node, const char* key) {
+  const auto text = node.Find(key);
+  return text ? text->Text() : std::string();
+}
+
+std::optional<double> NonNegativeOrNothing(const YamlNode& node, const char* key) {
+  const auto number = node.Find(key);
+  return number ? std::optional<double>(number->NonNegativeNumber()) : std::nullopt;
+}
+
+LightFieldOrigin ReadOrigin(const YamlNode& node) {
+  node.RequireKeys({"method", "prior", "strength", "noise_sigma", "block_solver", "stencil",
+                    "splat", "device", "block_px", "gamma", "ridge", "seconds", "iterations",
+                    "relative_residual", "rcond_min", "effects", "version", "date"});
+  LightFieldOrigin origin;
+  origin.method = TextOrNothing(node, "method");
+  origin.prior = TextOrNothing(node, "prior");
+  origin.strength = NonNegativeOrNothing(node, "strength");
+  origin.noise_sigma = NonNegativeOrNothing(node, "noise_sigma");
+  origin.block_solver = TextOrNothing(node, "block_solver");
+  origin.stencil = TextOrNothing(node, "stencil");
+  origin.splat = TextOrNothing(node, "splat");
+  origin.device = TextOrNothing(node, "device");
+  if (const auto block = node.Find("block_px"))
+    origin.block_px = block->Integer(1, kMaxImageSizePx);
+  origin.gamma = NonNegativeOrNothing(node, "gamma");
+  origin.ridge = NonNegativeOrNothing(node, "ridge");
+  origin.seconds = NonNegativeOrNothing(node, "seconds");
+  if (const auto iterations = node.Find("iterations"))
+    origin.iterations = iterations->Integer(0, kMaxIterations);
+  origin.relative_residual = NonNegativeOrNothing(node, "relative_residual");
+  origin.rcond_min = NonNegativeOrNothing(node, "rcond_min");
+  if (const auto effects = node.Find("effects")) {
+    for (const YamlNode& effect : effects->Elements()) origin.effects.push_back(effect.Text());
+  }
+  origin.version = TextOrNothing(node, "version");
+  origin.date = TextOrNothing(node, "date");
+  return origin;
+}
+
+// YAML::Emitter quotes texts where needed; numbers are handed to it as text in their shortest form.
+class Writer {
+ public:
+  explicit Writer(const LightFieldDescription& description)
+      : description_(description), light_field_(description.light_field) {}
+
+  std::string Write() {
+    out_ << YAML::BeginMap;
+    Text("schema", kSchema);
+    List("views", {std::to_string(light_field_.u_count), std::to_string(light_field_.v_count)});
+    List("size", {std::to_string(light_field_.s_count), std::to_string(light_field_.t_count)});
+    Text("channels", std::to_string(light_field_.channels));
+    Text("view_format", description_.view_format);
+    if (description_.has_confidence) Text("confidence_format", kConfidenceFormat);
+    Text("transfer", light_field_.transfer.Name());
+    Text("disparity", kDisparityIs);
+    Point("landing_step_px", light_field_.landing_step_px);
+    WriteWeights();
+    WriteMissingViews();
+    if (!description_.camera_file.empty()) Text("camera", description_.camera_file);
+    if (light_field_.grid) WriteGrid(*light_field_.grid);
+    WriteOrigin();
+    out_ << YAML::EndMap;
+    return std::string(out_.c_str()) + "\n";
+  }
+
+ private:
+  // A number that the reader would refuse is not written.
+  static std::string NumberText(const char* key, double value) {
+    if (!std::isfinite(value))
+      throw Error(fmt::format("light field: {} is {}: it must be finite", key, value));
+    return YamlNumber(value);
+  }
+
+  void Text(const char* key, const std::string& value) {
+    out_ << YAML::Key << key << YAML::Value << value;
+  }
+  void TextIfAny(const char* key, const std::string& value) {
+    if (!value.empty()) Text(key, value);
+  }
+  void Number(const char* key, double value) { Text(key, NumberText(key, value)); }
+  void NumberIfAny(const char* key, const std::optional<double>& value) {
+    if (value) Number(key, *value);
+  }
+  void List(const char* key, const std::vector<std::string>& values) {
+    out_ << YAML::Key << key << YAML::Value << YAML::Flow << values;
+  }
+  void Point(const char* key, const Eigen::Vector2d& point) {
+    List(key, {NumberText(key, point.x()), NumberText(key, point.y())});
+  }
+
+  void WriteWeights() {
+    out_ << YAML::Key << "weights" << YAML::Value << YAML::BeginSeq;
+    for (Eigen::Index l = 0; l < light_field_.weights.rows(); ++l) {
+      out_ << YAML::Flow << YAML::BeginSeq;
+      for (Eigen::Index k = 0; k < light_field_.weights.cols(); ++k)
+        out_ << NumberText("weights", light_field_.weights(l, k));
+      out_ << YAML::EndSeq;
+    }
+    out_ << YAML::EndSeq;
+  }
+
+  void WriteMissingViews() {
+    const auto& present = light_field_.present;
+    if (std::all_of(present.begin(), present.end(), [](bool there) { return there; })) return;
+    out_ << YAML::Key << "missing_views" << YAML::Value << YAML::BeginSeq;
+    for (int l = 0; l < light_field_.v_count; ++l) {
+      for (int k = 0; k < light_field_.u_count; ++k) {
+        if (light_field_.IsPresent(k, l)) continue;
+        out_ << YAML::Flow << std::vector<std::string>{std::to_string(k), std::to_string(l)};
+      }
+    }
+    out_ << YAML::EndSeq;
+  }
+
+  void WriteGrid(const LightFieldGrid& grid) {
+    out_ << YAML::Key << "planes" << YAML::Value << YAML::BeginMap;
+    Number("uv_depth_mm", grid.planes.uv_depth_mm);
+    Number("plane_spacing_mm", grid.planes.plane_spacing_mm);
+    out_ << YAML::EndMap << YAML::Key << "steps" << YAML::Value << YAML::BeginMap;
+    Number("s_step_mm", grid.s_step_mm);
+    Number("t_step_mm", grid.t_step_mm);
+    Number("u_step_mm", grid.u_step_mm);
+    Number("v_step_mm", grid.v_step_mm);
+    out_ << YAML::EndMap;
+    Point("st_origin_index", grid.st_origin_index);
+  }
+
+  void WriteOrigin() {
+    const LightFieldOrigin& origin = light_field_.origin;
+    out_ << YAML::Key << "origin" << YAML::Value << YAML::BeginMap;
+    TextIfAny("method", origin.method);
+    TextIfAny("prior", origin.prior);
+    NumberIfAny("strength", origin.strength);
+    NumberIfAny("noise_sigma", origin.noise_sigma);
+    TextIfAny("block_solver", origin.block_solver);
+    TextIfAny("stencil", origin.stencil);
+    TextIfAny("splat", origin.splat);
+    TextIfAny("device", origin.device);
+    if (origin.block_px) Text("block_px", std::to_string(*origin.block_px));
+    NumberIfAny("gamma", origin.gamma);
+    NumberIfAny("ridge", origin.ridge);
+    NumberIfAny("seconds", origin.seconds);
+    if (origin.iterations) Text("iterations", std::to_string(*origin.iterations));
+    NumberIfAny("relative_residual", origin.relative_residual);
+    NumberIfAny("rcond_min", origin.rcond_min);
+    if (!origin.effects.empty()) List("effects", origin.effects);
+    TextIfAny("version", origin.version);
+    TextIfAny("date", origin.date);
+    out_ << YAML::EndMap;
+  }
+
+  const LightFieldDescription& description_;
+  const LightField& light_field_;
+  YAML::Emitter out_;
+};
+
+}  // namespace
+
+std::string ViewFileStem(int k, int l) { return fmt::format("view_{:02}_{:02}", l, k); }
+
+LightFieldDescription ParseLightFieldDescription(const std::string& text,
+                                                 const std::string& source_name) {
+  const YamlNode root = YamlNode::Parse(text, source_name);
+  root.RequireSchema(kSchema);
+  root.RequireKeys({"schema", "views", "size", "channels", "view_format", "confidence_format",
+                    "transfer", "disparity", "landing_step_px", "weights", "missing_views",
+                    "camera", "planes", "steps", "st_origin_index", "origin"});
+  LightFieldDescription description;
+  LightField& light_field = description.light_field;
+  ReadSizes(root, &light_field);
+  description.view_format = root.At("view_format").OneOf({"png", "tiff"});
+  if (const auto format = root.Find("confidence_format")) {
+    format->OneOf({kConfidenceFormat});
+    description.has_confidence = true;
+  }
+  const YamlNode transfer = root.At("transfer");
+  try {
+    light_field.transfer = TransferCurve::FromName(transfer.Text());
+  } catch (const Error& e) {
+    throw transfer.ErrorHere(e.what());
+  }
+  const YamlNode disparity = root.At("disparity");
+  if (disparity.Text() != kDisparityIs) {
+    throw disparity.ErrorHere(
+        fmt::format("'{}' is expected, found '{}'", kDisparityIs, disparity.Text()));
+  }
+  if (const auto step = root.Find("landing_step_px"))
+    light_field.landing_step_px = ReadPoint(*step);
+  ReadWeights(root.At("weights"), &light_field);
+  if (const auto missing = root.Find("missing_views")) ReadMissingViews(*missing, &light_field);
+  ReadCameraAndGrid(root, &description);
+  if (const auto origin = root.Find("origin")) light_field.origin = ReadOrigin(*origin);
+  return description;
+}
+
+LightFieldDescription ReadLightFieldDescription(const std::string& path) {
+  return ParseLightFieldDescription(ReadTextFile(path), path);
+}
+
+std::string LightFieldDescriptionToYaml(const LightFieldDescription& description) {
+  return Writer(description).Write();
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,221 @@
+#include "thicklens/model/sweep_file.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <set>
+
+#include "model/schema/sweep_frames.h"
+#include "thicklens/base/yaml_reader.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr char kSchema[] = "thicklens/sweep/1";
+
+double MillimetresPer(const std::string& unit) {
+  if (unit == "um") return 1e-3;
+  if (unit == "cm") return 10;
+  if (unit == "m") return 1000;
+  if (unit == "in") return 25.4;
+  return 1;
+}
+
+bool IsUnknown(const YamlNode& node) { return node.IsScalar() && node.Text() == "unknown"; }
+
+void ReadOffset(const YamlNode& root, SweepFile* sweep) {
+  const auto node = root.Find("offset_mm");
+  if (!node) return;
+  if (node->IsMap()) {
+    node->RequireKeys({"value", "sigma"});
+    Estimate offset{node->At("value").Number(), 0};
+    if (const auto sigma = node->Find("sigma")) offset.sigma = sigma->NonNegativeNumber();
+    sweep->offset_mm = offset;
+  } else if (!IsUnknown(*node)) {
+    sweep->offset_mm = Estimate{node->Number(), 0};
+  }
+}
+
+void ReadFloor(const YamlNode& root, SweepFile* sweep) {
+  const auto node = root.Find("blur_floor_px");
+  if (!node) return;
+  if (!node->IsMap()) {
+    if (!IsUnknown(*node)) sweep->floor.given_px = Estimate{node->NonNegativeNumber(), 0};
+    return;
+  }
+  node->RequireKeys({"value", "sigma", "from", "to", "from_calibration"});
+  const bool is_interval = node->Has("from") || node->Has("to");
+  const bool is_value = node->Has("value") || node->Has("sigma");
+  const auto file = node->Find("from_calibration");
+  if (is_interval + is_value + file.has_value() != 1) {
+    throw node->ErrorHere(
+        "one of {value, sigma}, {from, to} and {from_calibration} is expected, not a mixture");
+  }
+  if (file) {
+    const std::string place = file->ErrorHere("").what();
+    TakeFloorOfCalibration(file->ResolvePath(file->Text()), place, sweep);
+  } else if (is_interval) {
+    sweep->floor.from_px = node->At("from").NonNegativeNumber();
+    sweep->floor.to_px = node->At("to").NonNegativeNumber();
+    if (!(*sweep->floor.from_px <= *sweep->floor.to_px)) {
+      throw node->ErrorHere(fmt::format("'from' must be <= 'to', found {} and {}",
+                                        *sweep->floor.from_px, *sweep->floor.to_px));
+    }
+  } else {
+    Estimate floor{node->At("value").NonNegativeNumber(), 0};
+    if (const auto sigma = node->Find("sigma")) floor.sigma = sigma->NonNegativeNumber();
+    sweep->floor.given_px = floor;
+  }
+}
+
+void NoteOrderAndRepeats(const SweepFile& sweep, std::vector<std::string>* notices) {
+  if (notices == nullptr) return;
+  std::vector<double> readings;
+  for (const SweepFrame& frame : sweep.frames) readings.push_back(frame.reading_mm);
+  const bool sorted = std::is_sorted(readings.begin(), readings.end()) ||
+                      std::is_sorted(readings.rbegin(), readings.rend());
+  if (!sorted) notices->push_back("the readings are not in order; they are used as they are");
+  const std::set<double> distinct(readings.begin(), readings.end());
+  if (distinct.size() < readings.size()) {
+    notices->push_back(fmt::format("{} frames share their reading with another",
+                                   readings.size() - distinct.size()));
+  }
+  if (!sweep.reading_sigma_stated) {
+    notices->push_back(
+        "reading_sigma_mm is not stated: the scatter about the law of image scale stands for it, "
+        "or 0 where "
+        "there is none");
+  }
+}
+
+}  // namespace
+
+std::string BenchDirectionName(BenchDirection direction) {
+  return direction == BenchDirection::kAway ? "away" : "toward";
+}
+
+double DirectionSign(BenchDirection direction) {
+  return direction == BenchDirection::kAway ? 1 : -1;
+}
+
+std::string SweepTargetName(SweepTarget target) {
+  switch (target) {
+    case SweepTarget::kTexture:
+      return "texture";
+    case SweepTarget::kPrintedEdge:
+      return "printed-edge";
+    case SweepTarget::kKnifeEdge:
+      return "knife-edge";
+    default:
+      return "auto";
+  }
+}
+
+SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices) {
+  const YamlNode root = YamlNode::LoadFile(path);
+  root.RequireSchema(kSchema);
+  root.RequireKeys({"schema", "camera", "readings_unit", "reading_sigma_mm", "offset_mm",
+                    "direction", "target", "target_period_mm", "blur_floor_px", "roi_px", "frames",
+                    "frames_csv", "frames_dir", "frames_glob"});
+  SweepFile sweep;
+  sweep.source = path;
+  const YamlNode camera = root.At("camera");
+  sweep.camera_path = camera.ResolvePath(camera.Text());
+  double mm_per_unit = 1;
+  if (const auto unit = root.Find("readings_unit")) {
+    mm_per_unit = MillimetresPer(unit->OneOf({"mm", "um", "cm", "m", "in"}));
+    if (mm_per_unit != 1 && root.Has("frames")) {
+      throw unit->ErrorHere("'frames' states reading_mm; another unit goes with 'frames_csv'");
+    }
+  }
+  if (const auto sigma = root.Find("reading_sigma_mm")) {
+    sweep.reading_sigma_mm = sigma->NonNegativeNumber();
+    sweep.reading_sigma_stated = true;
+  }
+  ReadOffset(root, &sweep);
+  if (const auto direction = root.Find("direction")) {
+    sweep.direction = direction->OneOf({"away", "toward"}) == "away" ? BenchDirection::kAway
+                                                                     : BenchDirection::kToward;
+  }
+  if (const auto target = root.Find("target")) {
+    const std::string name = target->OneOf({"auto", "texture", "printed-edge", "knife-edge"});
+    for (const SweepTarget kind :
+         {SweepTarget::kTexture, SweepTarget::kPrintedEdge, SweepTarget::kKnifeEdge}) {
+      if (name == SweepTargetName(kind)) sweep.target = kind;
+    }
+  }
+  if (const auto period = root.Find("target_period_mm"))
+    sweep.target_period_mm = period->PositiveNumber();
+  ReadFloor(root, &sweep);
+  if (const auto roi = root.Find("roi_px")) {
+    const auto numbers = roi->ElementsExactly(4);
+    constexpr int kMax = 100000;
+    sweep.roi = {numbers[0].Integer(0, kMax), numbers[1].Integer(0, kMax),
+                 numbers[2].Integer(1, kMax), numbers[3].Integer(1, kMax)};
+  }
+  sweep.frames = ReadSweepFrames(root, mm_per_unit);
+  NoteOrderAndRepeats(sweep, notices);
+  return sweep;
+}
+
+SweepFile SweepFromFolder(const std::string& folder, const std::string& readings_csv,
+                          const std::string& camera_path, std::vector<std::string>* notices) {
+  SweepFile sweep;
+  sweep.source = folder;
+  sweep.camera_path = camera_path;
+  sweep.frames = FramesOfFolder(folder, readings_csv);
+  NoteOrderAndRepeats(sweep, notices);
+  return sweep;
+}
+
+std::string SweepToYaml(const SweepFile& sweep) {
+  YAML::Emitter out;
+  const auto text = [&](const char* key, const std::string& value) {
+    out << YAML::Key << key << YAML::Value << value;
+  };
+  const auto number = [&](const char* key, double value) { text(key, YamlNumber(value)); };
+  const auto estimate = [&](const char* key, const Estimate& value) {
+    out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap;
+    number("value", value.value);
+    number("sigma", value.sigma);
+    out << YAML::EndMap;
+  };
+  out << YAML::BeginMap;
+  text("schema", kSchema);
+  text("camera", sweep.camera_path);
+  if (sweep.reading_sigma_stated) number("reading_sigma_mm", sweep.reading_sigma_mm);
+  if (sweep.offset_mm) {
+    estimate("offset_mm", *sweep.offset_mm);
+  } else {
+    text("offset_mm", "unknown");
+  }
+  text("direction", BenchDirectionName(sweep.direction));
+  text("target", SweepTargetName(sweep.target));
+  if (sweep.target_period_mm) number("target_period_mm", *sweep.target_period_mm);
+  if (sweep.floor.given_px) {
+    estimate("blur_floor_px", *sweep.floor.given_px);
+  } else if (sweep.floor.from_px) {
+    out << YAML::Key << "blur_floor_px" << YAML::Value << YAML::Flow << YAML::BeginMap;
+    number("from", *sweep.floor.from_px);
+    number("to", *sweep.floor.to_px);
+    out << YAML::EndMap;
+  } else {
+    text("blur_floor_px", "unknown");
+  }
+  if (sweep.roi.width > 0) {
+    out << YAML::Key << "roi_px" << YAML::Value << YAML::Flow
+        << std::vector<int>{sweep.roi.x, sweep.roi.y, sweep.roi.width, sweep.roi.height};
+  }
+  out << YAML::Key << "frames" << YAML::Value << YAML::BeginSeq;
+  for (const SweepFrame& frame : sweep.frames) {
+    out << YAML::Flow << YAML::BeginMap;
+    text("image", frame.image);
+    number("reading_mm", frame.reading_mm);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,58 @@
+#ifndef THICKLENS_MODEL_SIMULATE_SWEEP_EDGE_SPREAD_H_
+#define THICKLENS_MODEL_SIMULATE_SWEEP_EDGE_SPREAD_H_
+
+#include <vector>
+
+#include "thicklens/model/pupil_law.h"
+
+namespace thicklens::model {
+
+// How a straight step from 0 to 1 looks across itself, seen through a Gaussian, a uniform disc and
+// the pixel box, as a function of the signed distance from the edge along its normal.
+//
+// The pixel box, projected on the normal, is a trapezoid: the convolution of two boxes of the
+// widths a = |cos(angle)| and b = |sin(angle)|. So the edge spread is a second difference of the
+// second antiderivative F of the step blurred by the rest (derived here):
+//   E(d) = [F(d + (a+b)/2) - F(d + (a-b)/2) - F(d - (a-b)/2) + F(d - (a+b)/2)]/(a b),
+// with F in closed form for a Gaussian alone and for a disc alone. Both together have none: there
+// E is the Fourier series of a periodic edge, tabulated, and read by cubic interpolation.
+// Error: below 1e-8 for angles that keep b above 1e-5, and 1e-6 at the kinks of an edge that
+// nothing but the pixel blurs. With a disc, a Gaussian below 0.004 px but not 0 costs up to 2e-5.
+class EdgeSpread {
+ public:
+  // `angle_rad` is that of the normal from the pixel grid's x axis. Without the pixel box E is the
+  // blurred step itself; of no blur at all, 1/2 on the edge.
+  EdgeSpread(double angle_rad, double gaussian_sigma_px, double disc_radius_px,
+             bool pixel_box = true);
+  // Seen through a Gaussian and a defocus blur of the profile's shape (not owned), tabulated. The
+  // light of a disc without a Gaussian is a sum of rings, each with its F in closed form: error
+  // below 1e-5.
+  EdgeSpread(double angle_rad, double gaussian_sigma_px, const PupilProfile& profile,
+             double defocus_sigma_px, bool pixel_box);
+
+  double At(double distance_px) const;
+  // Beyond this distance E is 0 or 1 to rounding.
+  double reach_px() const { return reach_px_; }
+
+ private:
+  double SecondAntiderivative(double x) const;
+  double BlurredStep(double x) const;
+  void SetBoxes(double angle_rad);
+  double DefocusTransferAt(double fx, double fy) const;
+  void Tabulate(double angle_rad);
+
+  double sigma_px_;
+  double radius_px_ = 0;
+  const PupilProfile* profile_ = nullptr;
+  double defocus_sigma_px_ = 0;
+  bool pixel_box_;
+  double wide_box_px_ = 1;
+  double narrow_box_px_ = 0;
+  double reach_px_ = 0;
+  double table_step_px_ = 0;
+  std::vector<double> table_;  // E from -reach - 2 steps on; empty where F has a closed form
+};
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SIMULATE_SWEEP_EDGE_SPREAD_H_

@@ -1,0 +1,145 @@
+// What a simulated sweep may be.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "model/simulate/simulated_camera.h"
+#include "model/simulate/sweep/tilted_target.h"
+#include "thicklens/base/error.h"
+#include "thicklens/model/sweep_simulator.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+bool Fail(std::string* why, const std::string& message) {
+  if (why != nullptr) *why = message;
+  return false;
+}
+
+bool IsValidTarget(const TargetOptions& target, std::string* why) {
+  if (!(target.contrast > 0 && target.contrast <= 1)) {
+    return Fail(why, fmt::format("target.contrast is {}: it must be above 0 and at most 1",
+                                 target.contrast));
+  }
+  if (!(target.feature_size_mm >= 0) || !std::isfinite(target.feature_size_mm)) {
+    return Fail(why, fmt::format("target.feature_size_mm is {}: it must be > 0, or 0 to have it "
+                                 "chosen",
+                                 target.feature_size_mm));
+  }
+  if (!(std::abs(target.edge_angle_deg) <= 90)) {
+    return Fail(why, fmt::format("target.edge_angle_deg is {}: it must be between -90 and 90",
+                                 target.edge_angle_deg));
+  }
+  if (!(target.ink_sigma_mm >= 0) || !std::isfinite(target.ink_sigma_mm)) {
+    return Fail(why,
+                fmt::format("target.ink_sigma_mm is {}: it must be >= 0", target.ink_sigma_mm));
+  }
+  if (!(std::abs(target.tilt_deg) <= 80)) {
+    return Fail(
+        why, fmt::format("target.tilt_deg is {}: it must be between -80 and 80", target.tilt_deg));
+  }
+  return true;
+}
+
+// Every ray must meet the target, and not too far away.
+bool IsSeenWhole(const Camera& camera, double tilt_deg, std::string* why) {
+  constexpr double kLeastNearness = 0.2;
+  const Sensor& sensor = camera.sensor;
+  const double axis_px = sensor.principal_point_px.x();
+  const TiltedTarget target(tilt_deg * kPi / 180, 1, camera.focal_scale_px());
+  const double least =
+      std::min(target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px));
+  if (least >= kLeastNearness) return true;
+  return Fail(why, fmt::format("target.tilt_deg is {}: a side of the picture would look past the "
+                               "target, or at more than five times its depth",
+                               tilt_deg));
+}
+
+}  // namespace
+
+std::string TargetKindName(TargetKind kind) {
+  switch (kind) {
+    case TargetKind::kDeadLeaves:
+      return "dead-leaves";
+    case TargetKind::kPinkNoise:
+      return "pink-noise";
+    case TargetKind::kWhiteNoise:
+      return "white-noise";
+    case TargetKind::kCheckerboard:
+      return "checkerboard";
+    case TargetKind::kSiemensStar:
+      return "siemens-star";
+    case TargetKind::kPicture:
+      return "picture";
+    case TargetKind::kPrintedEdge:
+      return "printed-edge";
+    case TargetKind::kKnifeEdge:
+      return "knife-edge";
+  }
+  throw Error("no such kind of target");
+}
+
+EffectSet SweepEffects() {
+  return {Effect::kThickness,     Effect::kDefocus,     Effect::kApertureShape,
+          Effect::kFalloff,       Effect::kPixelBox,    Effect::kLensFloor,
+          Effect::kShotNoise,     Effect::kReadNoise,   Effect::kQuantisation,
+          Effect::kTransferCurve, Effect::kLampFalloff, Effect::kFlicker,
+          Effect::kMagnification, Effect::kDrift,       Effect::kTilt,
+          Effect::kReadingError};
+}
+
+bool SweepSimulationOptions::IsValid(std::string* why) const {
+  if (!IsSimulatable(camera, why) || !IsValidTarget(target, why)) return false;
+  if (!camera.calibration->blur_floor_px) {
+    return Fail(why, fmt::format("camera '{}': blur_floor_px is missing: a simulation needs it as "
+                                 "the truth",
+                                 camera.name));
+  }
+  if (!IsSeenWhole(camera, target.tilt_deg, why)) return false;
+  if (!(frame_count >= 1 && frame_count <= 100000)) {
+    return Fail(why, fmt::format("bench.frames is {}: it must be from 1 to 100000", frame_count));
+  }
+  const double last_depth_mm = first_depth_mm + (frame_count - 1) * step_mm;
+  const auto possible = [](double depth_mm) { return depth_mm > 0 && std::isfinite(depth_mm); };
+  if (!possible(first_depth_mm) || !possible(last_depth_mm)) {
+    return Fail(why, fmt::format("bench: the depths run from {} to {} mm: they must be finite and "
+                                 "> 0",
+                                 first_depth_mm, last_depth_mm));
+  }
+  if (!std::isfinite(bench_offset_mm)) {
+    return Fail(why, fmt::format("bench.offset_mm is {}: it must be finite", bench_offset_mm));
+  }
+  const std::pair<const char*, double> amounts[] = {
+      {"bench.reading_sigma_mm", reading_sigma_mm},
+      {"drift_sigma_px", drift_sigma_px},
+      {"noise.full_well_electrons", full_well_electrons},
+      {"noise.read_noise_electrons", read_noise_electrons}};
+  for (const auto& [field, value] : amounts) {
+    if (!(value >= 0) || !std::isfinite(value)) {
+      return Fail(why, fmt::format("{} is {}: it must be finite and >= 0", field, value));
+    }
+  }
+  if (read_noise_electrons > 0 && !(full_well_electrons > 0)) {
+    return Fail(why, fmt::format("noise.read_noise_electrons is {}: noise in electrons needs "
+                                 "noise.full_well_electrons > 0",
+                                 read_noise_electrons));
+  }
+  if (!(light_level > 0 && light_level <= 1)) {
+    return Fail(why,
+                fmt::format("light.level is {}: it must be above 0 and at most 1", light_level));
+  }
+  if (!(flicker >= 0 && flicker <= 0.5)) {
+    return Fail(why, fmt::format("light.flicker is {}: it must be from 0 to 0.5", flicker));
+  }
+  if (bits != 8 && bits != 16) {
+    return Fail(why, fmt::format("bits is {}: it must be 8 or 16", bits));
+  }
+  return true;
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,157 @@
+#include <Eigen/Core>
+#include <limits>
+
+#include "model/schema/effect_yaml.h"
+#include "thicklens/base/yaml_reader.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/sweep_simulator.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr char kSchema[] = "thicklens/simulate-sweep/1";
+
+// What is missing keeps the default that `field` came with.
+void ReadNumber(const YamlNode& node, const char* key, double* field) {
+  if (const auto found = node.Find(key)) *field = found->Number();
+}
+
+// The truth of the simulation: the camera's calibration, in which `truth` replaces what it names.
+void ReadTruth(const YamlNode& node, Camera* camera) {
+  node.RequireKeys({"focus_depth_mm", "image_distance_mm", "blur_ratio", "blur_floor_px"});
+  if (!camera->calibration) {
+    camera->calibration.emplace();
+    camera->calibration->evidence.method = "assumed";
+  }
+  CameraCalibration& calibration = *camera->calibration;
+  const auto focus = node.Find("focus_depth_mm");
+  const auto distance = node.Find("image_distance_mm");
+  if (focus && distance) {
+    throw distance->ErrorHere("focus_depth_mm says the same: give one of them");
+  }
+  if (focus) {
+    const double focus_depth_mm = focus->PositiveNumber();
+    if (!(focus_depth_mm > camera->lens.front_focal_length_mm)) {
+      throw focus->ErrorHere("must be above the lens's front_focal_length_mm " +
+                             YamlNumber(camera->lens.front_focal_length_mm) + ", found " +
+                             YamlNumber(focus_depth_mm));
+    }
+    calibration.image_distance_mm = Estimate{ImageDistanceMm(camera->lens, focus_depth_mm), 0};
+  }
+  if (distance) calibration.image_distance_mm = Estimate{distance->PositiveNumber(), 0};
+  if (const auto ratio = node.Find("blur_ratio")) {
+    calibration.blur_ratio = Estimate{ratio->NonNegativeNumber(), 0};
+  }
+  if (const auto floor = node.Find("blur_floor_px")) {
+    calibration.blur_floor_px = Estimate{floor->NonNegativeNumber(), 0};
+  }
+}
+
+// A centred part of the sensor: the axis stays where it is on the chip. An odd difference leaves
+// the extra row or column below or on the right.
+void CropSensor(const YamlNode& node, Sensor* sensor) {
+  const auto sides = node.ElementsExactly(2);
+  const int width_px = sides[0].Integer(1, sensor->width_px);
+  const int height_px = sides[1].Integer(1, sensor->height_px);
+  const Eigen::Vector2i corner((sensor->width_px - width_px) / 2,
+                               (sensor->height_px - height_px) / 2);
+  sensor->principal_point_px -= corner.cast<double>();
+  sensor->width_px = width_px;
+  sensor->height_px = height_px;
+}
+
+TargetKind ReadKind(const YamlNode& node) {
+  const TargetKind kinds[] = {TargetKind::kDeadLeaves,  TargetKind::kPinkNoise,
+                              TargetKind::kWhiteNoise,  TargetKind::kCheckerboard,
+                              TargetKind::kSiemensStar, TargetKind::kPicture,
+                              TargetKind::kPrintedEdge, TargetKind::kKnifeEdge};
+  std::vector<std::string> names;
+  for (const TargetKind kind : kinds) names.push_back(TargetKindName(kind));
+  const std::string name = node.OneOf(names);
+  std::size_t i = 0;
+  while (names[i] != name) ++i;
+  return kinds[i];
+}
+
+TargetOptions ReadTarget(const YamlNode& node) {
+  node.RequireKeys({"kind", "contrast", "feature_size_mm", "edge_angle_deg", "ink_sigma_mm",
+                    "tilt_deg", "picture"});
+  TargetOptions target;
+  const YamlNode kind = node.At("kind");
+  target.kind = ReadKind(kind);
+  ReadNumber(node, "contrast", &target.contrast);
+  ReadNumber(node, "feature_size_mm", &target.feature_size_mm);
+  ReadNumber(node, "edge_angle_deg", &target.edge_angle_deg);
+  ReadNumber(node, "ink_sigma_mm", &target.ink_sigma_mm);
+  ReadNumber(node, "tilt_deg", &target.tilt_deg);
+  if (const auto picture = node.Find("picture")) {
+    if (target.kind != TargetKind::kPicture) {
+      throw picture->ErrorHere("only a target of the kind 'picture' has one, found kind '" +
+                               TargetKindName(target.kind) + "'");
+    }
+    target.picture_path = node.ResolvePath(picture->Text());
+  } else if (target.kind == TargetKind::kPicture) {
+    throw kind.ErrorHere("the kind 'picture' needs the picture's path in target.picture");
+  }
+  return target;
+}
+
+void ReadBench(const YamlNode& node, SweepSimulationOptions* options) {
+  node.RequireKeys(
+      {"first_depth_mm", "step_mm", "frames", "offset_mm", "direction", "reading_sigma_mm"});
+  options->first_depth_mm = node.At("first_depth_mm").PositiveNumber();
+  options->step_mm = node.At("step_mm").Number();
+  options->frame_count = node.At("frames").Integer(1, 100000);
+  ReadNumber(node, "offset_mm", &options->bench_offset_mm);
+  ReadNumber(node, "reading_sigma_mm", &options->reading_sigma_mm);
+  if (const auto direction = node.Find("direction")) {
+    options->direction = direction->OneOf({"away", "toward"}) == "away" ? BenchDirection::kAway
+                                                                        : BenchDirection::kToward;
+  }
+}
+
+void ReadLight(const YamlNode& node, SweepSimulationOptions* options) {
+  node.RequireKeys({"level", "lamp_falloff", "flicker"});
+  ReadNumber(node, "level", &options->light_level);
+  ReadNumber(node, "flicker", &options->flicker);
+  if (const auto falloff = node.Find("lamp_falloff")) options->lamp_falloff = falloff->Boolean();
+}
+
+void ReadNoise(const YamlNode& node, SweepSimulationOptions* options) {
+  node.RequireKeys({"full_well_electrons", "read_noise_electrons"});
+  ReadNumber(node, "full_well_electrons", &options->full_well_electrons);
+  ReadNumber(node, "read_noise_electrons", &options->read_noise_electrons);
+}
+
+}  // namespace
+
+SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
+  const YamlNode root = YamlNode::LoadFile(path);
+  root.RequireSchema(kSchema);
+  root.RequireKeys({"schema", "camera", "truth", "size_px", "target", "bench", "light",
+                    "drift_sigma_px", "noise", "bits", "pupil_law", "effects", "without", "seed"});
+  SweepSimulationOptions options;
+  options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
+  if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
+  if (const auto size = root.Find("size_px")) CropSensor(*size, &options.camera.sensor);
+  options.target = ReadTarget(root.At("target"));
+  ReadBench(root.At("bench"), &options);
+  if (const auto light = root.Find("light")) ReadLight(*light, &options);
+  ReadNumber(root, "drift_sigma_px", &options.drift_sigma_px);
+  if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
+  if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
+  if (const auto law = root.Find("pupil_law")) {
+    std::vector<std::string> names;
+    for (const PupilLaw each : AllPupilLaws()) names.push_back(PupilLawName(each));
+    options.pupil_law = PupilLawFromName(law->OneOf(names));
+  }
+  ReadEffectChoice(root, &options.effects);
+  if (const auto seed = root.Find("seed")) {
+    options.seed = static_cast<std::uint64_t>(seed->Integer(0, std::numeric_limits<int>::max()));
+  }
+  std::string why;
+  if (!options.IsValid(&why)) throw root.ErrorHere(why);
+  return options;
+}
+
+}  // namespace thicklens::model

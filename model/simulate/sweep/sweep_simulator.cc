@@ -1,0 +1,504 @@
+#include "thicklens/model/sweep_simulator.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "model/base/random_draws.h"
+#include "model/effects/aperture_irradiance.h"
+#include "model/simulate/sensor_noise.h"
+#include "model/simulate/sweep/edge_spread.h"
+#include "model/simulate/sweep/periodic_picture.h"
+#include "model/simulate/sweep/sweep_target.h"
+#include "model/simulate/sweep/tilted_target.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+// Of a tilted target whose field is still drawn: what is five times as far away as its middle.
+constexpr double kLeastNearness = 0.2;
+// Sigma, px, beyond which a profile's transfer function is not tabulated up to one cycle per px: a
+// disc's has sunk below 1e-3 by then and is summed anew.
+constexpr double kSharpestTail = 12;
+
+bool IsEdge(TargetKind kind) {
+  return kind == TargetKind::kPrintedEdge || kind == TargetKind::kKnifeEdge;
+}
+
+// What distinguishes one frame from another.
+struct FrameState {
+  double depth_mm = 0;
+  double reading_mm = 0;
+  double lamp = 1;                 // irradiance, 1 = the mean of full scale
+  Eigen::Vector2d drift_mm{0, 0};  // of the target, X right, Y down
+  double pixel_mm = 0;             // one px on the target: p/|m|
+  double defocus_sigma_px = 0;     // kappa r_defocus
+};
+
+}  // namespace
+
+struct SweepSimulator::Impl {
+  Impl(const SweepSimulationOptions& given, const LinearPicture& picture) : options(given) {
+    std::string why;
+    if (!options.IsValid(&why)) throw Error(why);
+    Decide();
+    frames = FramesWith(decision.on);
+    MakePupil();
+    MakeTruth();
+    MakeFalloff();
+    if (!IsEdge(options.target.kind)) MakeTile(picture);
+  }
+
+  EffectConditions Conditions() const {
+    EffectConditions conditions;
+    conditions.camera = options.camera;
+    conditions.bits = options.bits;
+    conditions.full_well_electrons = options.full_well_electrons;
+    conditions.read_noise_electrons = options.read_noise_electrons;
+    conditions.bench =
+        BenchConditions{options.lamp_falloff, options.flicker, options.drift_sigma_px,
+                        options.reading_sigma_mm, options.target.tilt_deg};
+    return conditions;
+  }
+
+  void Decide() {
+    EffectChoice choice = options.effects;
+    // All costs nothing where frames are sums of waves.
+    choice.kept = choice.kept.With(SweepEffects());
+    const double last_depth_mm =
+        options.first_depth_mm + (options.frame_count - 1) * options.step_mm;
+    const auto [near, far] = std::minmax(options.first_depth_mm, last_depth_mm);
+    // The sides of a tilted target lie nearer and farther than its middle.
+    const auto [least, most] = Nearnesses(options.target.tilt_deg * kPi / 180);
+    decision = DecideEffects(choice, Conditions(),
+                             PlacesBetween(options.camera, near / std::max(1.0, most),
+                                           far / std::min(1.0, least), false),
+                             SweepEffects());
+    stored_camera = options.camera;
+    if (!On(Effect::kTransferCurve)) stored_camera.sensor.transfer = TransferCurve::Linear();
+    if (!On(Effect::kApertureShape)) stored_camera.psf = Psf::kGaussian;
+  }
+
+  bool On(Effect effect) const { return decision.on.Has(effect); }
+
+  // Of the picture's sides (TiltedTarget), the lesser first.
+  std::pair<double, double> Nearnesses(double tilt_rad) const {
+    const Sensor& sensor = options.camera.sensor;
+    const TiltedTarget target(tilt_rad, 1, options.camera.focal_scale_px());
+    const double axis_px = sensor.principal_point_px.x();
+    return std::minmax(
+        {target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px)});
+  }
+
+  // p/|m|, mm on the target, of one px at a depth.
+  double PixelMm(double depth_mm, const EffectSet& on) const {
+    if (!on.Has(Effect::kMagnification)) depth_mm = options.camera.focus_depth_mm();
+    return options.camera.sensor.pixel_pitch_mm /
+           std::abs(ChiefRayMagnification(options.camera.lens, options.camera.image_distance_mm(),
+                                          depth_mm));
+  }
+
+  // The pixel in the middle of the sensor, from the principal point.
+  Eigen::Vector2d CentrePx() const {
+    const Sensor& sensor = options.camera.sensor;
+    return Eigen::Vector2d(sensor.width_px - 1, sensor.height_px - 1) / 2 -
+           sensor.principal_point_px;
+  }
+
+  // sigma = kappa r_defocus, here in px.
+  double DefocusPx(double depth_mm) const {
+    const Camera& camera = options.camera;
+    return camera.blur_ratio() * BlurRadiusMm(camera.lens, camera.image_distance_mm(), depth_mm) /
+           camera.sensor.pixel_pitch_mm;
+  }
+
+  // The target of a frame; its scale is the frame's, whatever the depth.
+  TiltedTarget TargetOf(double depth_mm, double pixel_mm, const EffectSet& on) const {
+    const double scale_px = options.camera.focal_scale_px();
+    return {on.Has(Effect::kTilt) ? options.target.tilt_deg * kPi / 180 : 0, depth_mm, scale_px,
+            pixel_mm * scale_px / depth_mm};
+  }
+  // The same as seen by the columns about one, px from the axis.
+  TiltedTarget SeenTarget(const FrameState& frame, double x_px) const {
+    const double depth_mm = TargetOf(frame.depth_mm, frame.pixel_mm, decision.on).DepthMm(x_px);
+    return TargetOf(frame.depth_mm, frame.pixel_mm * SeenScale(depth_mm), decision.on);
+  }
+  bool IsTilted() const { return On(Effect::kTilt) && options.target.tilt_deg != 0; }
+
+  std::vector<FrameState> FramesWith(const EffectSet& on) const {
+    const Camera& camera = options.camera;
+    const double focus_depth_mm = camera.focus_depth_mm();
+    const double focus_pixel_mm = PixelMm(focus_depth_mm, on);
+    std::vector<FrameState> states;
+    for (int i = 0; i < options.frame_count; ++i) {
+      using Purpose = RandomDraws::Purpose;
+      const auto item = static_cast<std::uint32_t>(i);
+      RandomDraws bench(options.seed, Purpose::kBench, item);
+      RandomDraws lamp(options.seed, Purpose::kLamp, item);
+      RandomDraws drift(options.seed, Purpose::kDrift, item);
+      FrameState frame;
+      frame.depth_mm = options.first_depth_mm + i * options.step_mm;
+      frame.reading_mm =
+          DirectionSign(options.direction) * (frame.depth_mm - options.bench_offset_mm) +
+          (on.Has(Effect::kReadingError) ? options.reading_sigma_mm * bench.Normal() : 0);
+      // The lamp stands at the camera: irradiance of the target (zf/z)^2, 1 in the plane of focus.
+      const double falloff = options.lamp_falloff && on.Has(Effect::kLampFalloff)
+                                 ? std::pow(focus_depth_mm / frame.depth_mm, 2)
+                                 : 1.0;
+      const double flicker = on.Has(Effect::kFlicker) ? options.flicker : 0;
+      frame.lamp = options.light_level * falloff * std::max(0.0, 1 + flicker * lamp.Normal());
+      const double drift_sigma_mm =
+          on.Has(Effect::kDrift) ? options.drift_sigma_px * focus_pixel_mm : 0;
+      frame.drift_mm.x() = drift_sigma_mm * drift.Normal();
+      frame.drift_mm.y() = drift_sigma_mm * drift.Normal();
+      frame.pixel_mm = PixelMm(frame.depth_mm, on);
+      if (on.Has(Effect::kDefocus)) frame.defocus_sigma_px = DefocusPx(frame.depth_mm);
+      states.push_back(frame);
+    }
+    return states;
+  }
+
+  // How the light of a point spreads over the pupil. Its second moment is (kappa r)^2 under any
+  // law; the mean of the rays that a pixel off the axis gets lies a little aside.
+  void MakePupil() {
+    law = options.pupil_law.value_or(On(Effect::kFalloff) ? PupilLaw::kPaper : PupilLaw::kUniform);
+    if (law == PupilLaw::kUniform || !On(Effect::kDefocus) || options.camera.blur_ratio() == 0)
+      return;
+    const Camera& camera = options.camera;
+    const double scale_mm = DefocusScaleMm(camera.lens, camera.image_distance_mm());
+    const double distance_mm = On(Effect::kThickness) ? camera.image_distance_mm() : scale_mm;
+    double most_px = 0;
+    for (const FrameState& frame : frames) most_px = std::max(most_px, frame.defocus_sigma_px);
+    // No frequency of a frame is above one cycle per px of either axis.
+    profile.emplace(
+        law,
+        PupilOptics{stored_camera.psf, camera.blur_ratio() * camera.lens.aperture_radius_mm,
+                    camera.focus_depth_mm(), distance_mm, scale_mm},
+        2 * kPi * std::sqrt(2.0) * std::min(most_px, kSharpestTail));
+    mean_per_landing = profile->mean_per_landing();
+  }
+  // How much larger what a pixel sees at a depth lies, for the mean of the rays that bring it.
+  double SeenScale(double depth_mm) const {
+    const Camera& camera = options.camera;
+    return 1 +
+           mean_per_landing * DefocusPerAperture(camera.lens, camera.image_distance_mm(), depth_mm);
+  }
+
+  void MakeTruth() {
+    const Camera& camera = options.camera;
+    if (On(Effect::kLensFloor)) floor_px = camera.calibration->blur_floor_px->value;
+    truth.effects = RecordOf(decision);
+    truth.image_distance_mm = camera.image_distance_mm();
+    truth.focus_depth_mm = camera.focus_depth_mm();
+    truth.blur_ratio = camera.blur_ratio();
+    truth.blur_floor_px = floor_px;
+    truth.bench_offset_mm = options.bench_offset_mm;
+    truth.pupil_law = PupilLawName(law);
+    if (On(Effect::kTilt)) truth.tilt_deg = options.target.tilt_deg;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      truth.frames.push_back({fmt::format("frames/frame_{:03d}.png", i), frames[i].depth_mm,
+                              frames[i].reading_mm,
+                              std::hypot(floor_px, frames[i].defocus_sigma_px)});
+    }
+  }
+
+  // What each pixel gets of a uniform target's light, 1 at the principal point: by symmetry a
+  // function of the distance from there, and of no depth, since (12) knows the ray alone.
+  void MakeFalloff() {
+    if (!On(Effect::kFalloff)) return;
+    const Sensor& sensor = options.camera.sensor;
+    const EffectConditions conditions = Conditions();
+    const EffectOptics optics(conditions, decision.on);
+    const Aperture aperture = ApertureOf(optics, decision.on);
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const Eigen::Vector2d far_px(std::max(axis_px.x(), sensor.width_px - 1 - axis_px.x()),
+                                 std::max(axis_px.y(), sensor.height_px - 1 - axis_px.y()));
+    constexpr int kSteps = 1024;
+    const double step_px = std::max(far_px.norm(), 1.0) / kSteps;
+    std::vector<double> at_step;
+    for (int i = 0; i <= kSteps + 1; ++i) {
+      at_step.push_back(IrradianceAt(optics, axis_px + Eigen::Vector2d(i * step_px, 0),
+                                     optics.image_distance_mm(), aperture)
+                            .mean);
+    }
+    light_of_pixel.reserve(static_cast<std::size_t>(sensor.width_px) *
+                           static_cast<std::size_t>(sensor.height_px));
+    for (int y = 0; y < sensor.height_px; ++y) {
+      ThrowIfCancelled();
+      for (int x = 0; x < sensor.width_px; ++x) {
+        const double place = (Eigen::Vector2d(x, y) - axis_px).norm() / step_px;
+        const auto below = std::min(static_cast<std::size_t>(place), std::size_t{kSteps});
+        const double rest = place - static_cast<double>(below);
+        light_of_pixel.push_back(
+            static_cast<float>(at_step[below] + rest * (at_step[below + 1] - at_step[below])));
+      }
+    }
+  }
+
+  // The depth of the sweep at which the target is seen best; zf itself if the sweep passes it.
+  double ReferenceDepthMm() const {
+    const auto [near, far] = std::minmax(frames.front().depth_mm, frames.back().depth_mm);
+    return std::clamp(truth.focus_depth_mm, near, far);
+  }
+
+  // Where the target's centre lies, mm: in the middle of the picture at the reference depth, which
+  // is not on the axis where the principal point is not the middle.
+  Eigen::Vector2d TargetCentreMm(const EffectSet& on) const {
+    const double depth_mm = ReferenceDepthMm();
+    return TargetOf(depth_mm, PixelMm(depth_mm, on), on).At(CentrePx());
+  }
+
+  // The tile must hold the field of every frame with its drift and blur (of a large blur a part:
+  // beyond the tile the target repeats itself, it does not end), and its highest frequency
+  // is one cycle per px in the nearest frame: what lies above is taken by the pixel box, whose
+  // first zero is there, and what lies between that and half of it is the aliasing that a real
+  // sensor has. Effects that are left out change nothing of what the target shows.
+  void MakeTile(const LinearPicture& picture) {
+    const Sensor& sensor = options.camera.sensor;
+    const EffectSet all = SweepEffects();
+    const std::vector<FrameState> with_all = FramesWith(all);
+    const double most_floor_px = options.camera.calibration->blur_floor_px->value;
+    TileRequest request;
+    request.centre_mm = TargetCentreMm(all);
+    request.pixel_mm = PixelMm(ReferenceDepthMm(), all);
+    request.field_mm = std::min(sensor.width_px, sensor.height_px) * request.pixel_mm;
+    double nearest_pixel_mm = with_all.front().pixel_mm;
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    for (const FrameState& frame : with_all) {
+      const double margin_px = std::min(3 * std::hypot(most_floor_px, frame.defocus_sigma_px),
+                                        std::min(sensor.width_px, sensor.height_px) / 4.0) +
+                               1;
+      const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, all);
+      for (double x_px : {-0.5 - margin_px, sensor.width_px - 0.5 + margin_px}) {
+        // Beyond a side that is that far away the target repeats itself.
+        if (target.Nearness(x_px - axis_px.x()) < kLeastNearness) {
+          x_px = std::clamp(x_px, -0.5, sensor.width_px - 0.5);
+        }
+        nearest_pixel_mm = std::min({nearest_pixel_mm, target.PixelAcrossMm(x_px - axis_px.x()),
+                                     target.PixelDownMm(x_px - axis_px.x())});
+        for (const double y_px : {-0.5 - margin_px, sensor.height_px - 0.5 + margin_px}) {
+          const Eigen::Vector2d reach_mm = (target.At(Eigen::Vector2d(x_px, y_px) - axis_px) -
+                                            frame.drift_mm - request.centre_mm)
+                                               .cwiseAbs();
+          request.width_mm = std::max(request.width_mm, 2 * reach_mm.x());
+          request.height_mm = std::max(request.height_mm, 2 * reach_mm.y());
+        }
+      }
+    }
+    request.spacing_mm = nearest_pixel_mm / 2;
+    RandomDraws draws(options.seed, RandomDraws::Purpose::kTexture, 0);
+    TargetTile tile = DrawTargetTile(options.target, request, picture, &draws);
+    tile_texture.emplace(tile.samples);
+    tile.samples.release();
+    tile_frame = tile;
+  }
+
+  LinearPicture Render(int frame_index) const {
+    if (!(frame_index >= 0 && frame_index < options.frame_count)) {
+      throw Error(fmt::format("frame {} does not exist: the sweep has {}", frame_index,
+                              options.frame_count));
+    }
+    const FrameState& frame = frames[static_cast<std::size_t>(frame_index)];
+    LinearPicture picture = tile_texture ? RenderTile(frame) : RenderEdge(frame);
+    for (std::size_t i = 0; i < light_of_pixel.size(); ++i) picture.values[i] *= light_of_pixel[i];
+    return picture;
+  }
+
+  // The most by which blur, or the place of what is shown in the outermost rows, changes from one
+  // column to the next: d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|; a row
+  // y shows Y = (y p/K) z, and dz/z = -tan(tilt)/(N K/p) dx.
+  double ChangePerColumnPx(const FrameState& frame) const {
+    if (!IsTilted()) return 0;
+    const Camera& camera = options.camera;
+    const double tilt_rad = std::abs(options.target.tilt_deg) * kPi / 180;
+    const double far_px =
+        std::max(camera.sensor.principal_point_px.y(),
+                 camera.sensor.height_px - 1 - camera.sensor.principal_point_px.y());
+    const double least = Nearnesses(options.target.tilt_deg * kPi / 180).first;
+    return std::tan(tilt_rad) *
+           std::max(camera.blur_ratio() * camera.lens.aperture_radius_mm / frame.depth_mm,
+                    std::max(far_px, 1.0) / (camera.focal_scale_px() * least));
+  }
+
+  // Sigma of defocus and light of a column that lies at a depth.
+  double SeenDefocusPx(const FrameState& frame, double depth_mm) const {
+    return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm) : frame.defocus_sigma_px;
+  }
+  double LampAt(const FrameState& frame, double depth_mm) const {
+    const bool falls = options.lamp_falloff && On(Effect::kLampFalloff);
+    return frame.lamp * (falls ? std::pow(frame.depth_mm / depth_mm, 2) : 1);
+  }
+
+  // Columns `first` .. `last` of a frame with the blur and the scale of one of them. Pixel (x, y)
+  // looks at what its chief ray meets: the picture shows the target upright.
+  cv::Mat TileColumns(const FrameState& frame, int first, int last, double node_px) const {
+    const Sensor& sensor = options.camera.sensor;
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const Eigen::Vector2d beside_mm = -frame.drift_mm - tile_frame.origin_mm;
+    const TiltedTarget target = SeenTarget(frame, node_px - axis_px.x());
+    const double across_mm = target.PixelAcrossMm(node_px - axis_px.x());
+    const double down_mm = target.PixelDownMm(node_px - axis_px.x());
+    const auto periods_at = [&](const TiltedTarget& seen, double column_px) {
+      return (seen.At({column_px - axis_px.x(), 0}).x() + beside_mm.x()) / tile_frame.width_mm;
+    };
+    AxisSampling x{periods_at(target, first), across_mm / tile_frame.width_mm, last - first + 1};
+    if (IsTilted()) {
+      for (int column = first; column <= last; ++column) {
+        x.at.push_back(periods_at(SeenTarget(frame, column - axis_px.x()), column));
+      }
+    }
+    const AxisSampling y{(-axis_px.y() * down_mm + beside_mm.y()) / tile_frame.height_mm,
+                         down_mm / tile_frame.height_mm, sensor.height_px};
+    const double defocus_px = SeenDefocusPx(frame, target.DepthMm(node_px - axis_px.x()));
+    return tile_texture->Evaluate(x, y,
+                                  {floor_px, stored_camera.psf, defocus_px, On(Effect::kPixelBox),
+                                   profile ? &*profile : nullptr});
+  }
+
+  LinearPicture RenderTile(const FrameState& frame) const {
+    const Sensor& sensor = options.camera.sensor;
+    LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
+    picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
+                          static_cast<std::size_t>(sensor.height_px));
+    const auto add = [&](const cv::Mat& light, int first, const auto& factor) {
+      for (int i = 0; i < light.rows; ++i) {
+        ThrowIfCancelled();
+        const double* row = light.ptr<double>(i);
+        float* to =
+            picture.values.data() + static_cast<std::ptrdiff_t>(i) * sensor.width_px + first;
+        for (int j = 0; j < light.cols; ++j)
+          to[j] += static_cast<float>(factor(first + j) * row[j]);
+      }
+    };
+    if (!IsTilted()) {
+      add(TileColumns(frame, 0, sensor.width_px - 1, sensor.principal_point_px.x()), 0,
+          [&](int) { return frame.lamp; });
+      return picture;
+    }
+    const std::vector<int> nodes = NodesOf(sensor.width_px, ChangePerColumnPx(frame));
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      const int node = nodes[n];
+      const int before = n > 0 ? nodes[n - 1] : node - 1;
+      const int after = n + 1 < nodes.size() ? nodes[n + 1] : node + 1;
+      add(TileColumns(frame, before + 1, after - 1, node), before + 1, [&](int column) {
+        const double share = column < node ? static_cast<double>(column - before) / (node - before)
+                                           : static_cast<double>(after - column) / (after - node);
+        const double x_px = column - sensor.principal_point_px.x();
+        return share * LampAt(frame, SeenTarget(frame, x_px).DepthMm(x_px));
+      });
+    }
+    return picture;
+  }
+
+  // Dark left, bright right of an edge through the target's centre; a positive angle leans its
+  // upper end to the right.
+  LinearPicture RenderEdge(const FrameState& frame) const {
+    const Sensor& sensor = options.camera.sensor;
+    LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
+    picture.values.resize(static_cast<std::size_t>(sensor.width_px) *
+                          static_cast<std::size_t>(sensor.height_px));
+    for (const ColumnStrip& strip : StripsOf(sensor.width_px, ChangePerColumnPx(frame))) {
+      ThrowIfCancelled();
+      RenderEdge(frame, strip, &picture);
+    }
+    return picture;
+  }
+
+  // An edge on the target is a line g = 0, g the distance on it in mm, whose gradient in the
+  // picture says how far, in px and which way, a pixel is from the line.
+  void RenderEdge(const FrameState& frame, const ColumnStrip& strip, LinearPicture* picture) const {
+    const Sensor& sensor = options.camera.sensor;
+    const TargetOptions& options_of = options.target;
+    const Eigen::Vector2d& axis_px = sensor.principal_point_px;
+    const TiltedTarget target = SeenTarget(frame, strip.middle_px() - axis_px.x());
+    const Eigen::Vector2d on_edge_mm = TargetCentreMm(decision.on) + frame.drift_mm;
+    const double angle_rad = options_of.edge_angle_deg * kPi / 180;
+    const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad));
+    const auto distance_mm = [&](const Eigen::Vector2d& from_axis_px) {
+      return normal.dot(target.At(from_axis_px) - on_edge_mm);
+    };
+
+    // Where the edge crosses the middle of the strip, or at the end of it that is nearest to that.
+    Eigen::Vector2d middle_px(strip.middle_px() - axis_px.x(), 0);
+    const double down_mm = target.PixelDownMm(middle_px.x());
+    const double row_px = -distance_mm(middle_px) / (normal.y() * down_mm);
+    middle_px.y() = std::clamp(std::isnan(row_px) ? 0 : row_px, -axis_px.y(),
+                               sensor.height_px - 1 - axis_px.y());
+    const Eigen::Vector2d gradient(normal.x() * target.PixelAcrossMm(middle_px.x()) +
+                                       normal.y() * target.DownPerColumnMm(middle_px),
+                                   normal.y() * down_mm);
+    const double pixel_mm = gradient.norm();
+
+    const double depth_mm = target.DepthMm(middle_px.x());
+    const double defocus_px = SeenDefocusPx(frame, depth_mm);
+    const double ink_px =
+        options_of.kind == TargetKind::kPrintedEdge ? options_of.ink_sigma_mm / pixel_mm : 0;
+    const bool disc = stored_camera.psf == Psf::kDisc;
+    const double angle_of_normal_rad = std::atan2(gradient.y(), gradient.x());
+    const double still_px = std::hypot(floor_px, ink_px);
+    const EdgeSpread edge =
+        profile && defocus_px > 0
+            ? EdgeSpread(angle_of_normal_rad, still_px, *profile, defocus_px, On(Effect::kPixelBox))
+            : EdgeSpread(angle_of_normal_rad, std::hypot(still_px, disc ? 0 : defocus_px),
+                         disc ? 2 * defocus_px : 0, On(Effect::kPixelBox));
+    const double lamp = LampAt(frame, depth_mm);
+    const double dark = lamp * (1 - options_of.contrast);
+    const double step = 2 * lamp * options_of.contrast;
+    for (int y = 0; y < sensor.height_px; ++y) {
+      ThrowIfCancelled();
+      for (int x = strip.first; x < strip.first + strip.count; ++x) {
+        const double distance_px = distance_mm(Eigen::Vector2d(x, y) - axis_px) / pixel_mm;
+        picture->values[static_cast<std::size_t>(y * sensor.width_px + x)] =
+            static_cast<float>(dark + step * edge.At(distance_px));
+      }
+    }
+  }
+
+  SweepSimulationOptions options;
+  EffectDecision decision;
+  Camera stored_camera;
+  double floor_px = 0;
+  PupilLaw law = PupilLaw::kUniform;
+  std::optional<PupilProfile> profile;  // none of the uniform law, whose blur is that of the PSF
+  double mean_per_landing = 0;
+  std::vector<float> light_of_pixel;  // none without fall-off
+  std::vector<FrameState> frames;
+  SweepTruth truth;
+  std::optional<PeriodicPicture> tile_texture;  // none for an edge
+  TargetTile tile_frame;                        // its place; the samples are in tile_texture
+};
+
+SweepSimulator::SweepSimulator(const SweepSimulationOptions& options,
+                               const LinearPicture& target_picture)
+    : impl_(std::make_unique<Impl>(options, target_picture)) {}
+
+SweepSimulator::~SweepSimulator() = default;
+
+LinearPicture SweepSimulator::RenderNoiseless(int frame_index) const {
+  return impl_->Render(frame_index);
+}
+
+StoredPicture SweepSimulator::RenderFrame(int frame_index) const {
+  LinearPicture picture = impl_->Render(frame_index);
+  const SweepSimulationOptions& options = impl_->options;
+  AddSensorNoise({options.full_well_electrons, options.read_noise_electrons}, impl_->decision.on,
+                 options.seed, static_cast<std::uint32_t>(frame_index), &picture);
+  return ToStored(picture, impl_->stored_camera.sensor.transfer,
+                  impl_->On(Effect::kQuantisation) ? options.bits : 16);
+}
+
+const SweepTruth& SweepSimulator::truth() const { return impl_->truth; }
+
+const EffectDecision& SweepSimulator::effects() const { return impl_->decision; }
+
+const Camera& SweepSimulator::camera() const { return impl_->stored_camera; }
+
+}  // namespace thicklens::model

@@ -1,0 +1,281 @@
+#include "model/simulate/sweep/sweep_target.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <opencv2/imgproc.hpp>
+
+#include "model/simulate/square_wave.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+
+namespace thicklens::model {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Sizes drawn where none is given, in px near the plane of focus.
+constexpr double kLeafRadiusPx = 2;
+constexpr double kNoisePeriodPx = 2;
+constexpr double kSquarePx = 24;
+constexpr int kStarCycles = 36;
+// The largest leaf, as a part of the field.
+constexpr double kLargestLeaf = 1.0 / 6;
+
+// Beyond it memory and time would grow past what a sweep is worth (a tile of 4096 x 4096 holds
+// 128 MiB). The samples of a sweep that asks for more, because its field is large or its nearest
+// and farthest depth differ much, lie further apart: the near frames then lack the finest detail.
+constexpr int kMaxSamples = 4096;
+
+double FeatureSizeMm(const TargetOptions& options, double chosen_mm, double smallest_mm,
+                     double largest_mm) {
+  if (!(options.feature_size_mm > 0)) return std::max(chosen_mm, smallest_mm);
+  const double size_mm = options.feature_size_mm;
+  if (!(size_mm >= smallest_mm && size_mm <= largest_mm)) {
+    throw Error(fmt::format(
+        "target.feature_size_mm is {}: in this field it must be between {:.4g} and {:.4g}, or 0 "
+        "to have it chosen",
+        size_mm, smallest_mm, largest_mm));
+  }
+  return size_mm;
+}
+
+// The frame of the drawing: positions of the samples.
+class Canvas {
+ public:
+  // `unit_mm`: the period's sides are whole multiples of it; 0: any length.
+  Canvas(const TileRequest& request, double unit_mm) {
+    const auto rounded_up = [unit_mm](double length_mm) {
+      return unit_mm > 0 ? unit_mm * std::ceil(length_mm / unit_mm) : length_mm;
+    };
+    tile_.width_mm = rounded_up(request.width_mm);
+    tile_.height_mm = rounded_up(request.height_mm);
+    const double spacing_mm =
+        std::max(request.spacing_mm, std::max(tile_.width_mm, tile_.height_mm) / kMaxSamples);
+    const auto count = [spacing_mm](double length_mm) {
+      const int needed = static_cast<int>(std::ceil(length_mm / spacing_mm * (1 - 1e-12)));
+      return std::min(cv::getOptimalDFTSize(std::max(needed, 4)), kMaxSamples);
+    };
+    const int columns = count(tile_.width_mm);
+    const int rows = count(tile_.height_mm);
+    if (!(unit_mm > 0)) {  // the samples that make the count a quick one may widen the tile
+      tile_.width_mm = columns * spacing_mm;
+      tile_.height_mm = rows * spacing_mm;
+    }
+    tile_.origin_mm = request.centre_mm - Eigen::Vector2d(tile_.width_mm, tile_.height_mm) / 2;
+    tile_.samples = cv::Mat(rows, columns, CV_64F, cv::Scalar(1));
+    spacing_x_mm_ = tile_.width_mm / columns;
+    spacing_y_mm_ = tile_.height_mm / rows;
+  }
+
+  // Sets every sample to draw(X, Y), mm from the tile's centre.
+  template <typename Draw>
+  void Fill(const Draw& draw) {
+    for (int i = 0; i < tile_.samples.rows; ++i) {
+      double* row = tile_.samples.ptr<double>(i);
+      for (int j = 0; j < tile_.samples.cols; ++j) {
+        row[j] =
+            draw(j * spacing_x_mm_ - tile_.width_mm / 2, i * spacing_y_mm_ - tile_.height_mm / 2);
+      }
+    }
+  }
+
+  cv::Mat& samples() { return tile_.samples; }
+  double spacing_x_mm() const { return spacing_x_mm_; }
+  double spacing_y_mm() const { return spacing_y_mm_; }
+  double width_mm() const { return tile_.width_mm; }
+  double height_mm() const { return tile_.height_mm; }
+
+  TargetTile Finish() {
+    tile_.samples /= cv::mean(tile_.samples)[0];
+    return tile_;
+  }
+
+ private:
+  TargetTile tile_;
+  double spacing_x_mm_;
+  double spacing_y_mm_;
+};
+
+// Discs that hide each other, radii distributed as r^-3 between the smallest and the largest: the
+// statistics of natural pictures, without a preferred size. Drawn from the front backward until
+// nothing shines through, so that each sample is settled by the first leaves that meet it.
+TargetTile DrawDeadLeaves(const TargetOptions& options, const TileRequest& request,
+                          RandomDraws* draws) {
+  Canvas canvas(request, 0);
+  const double spacing_mm = canvas.spacing_x_mm();  // the same in y: the sides are free
+  const double smallest_mm =
+      FeatureSizeMm(options, kLeafRadiusPx * request.pixel_mm, 2 * spacing_mm, request.field_mm);
+  const double largest_mm = std::max(kLargestLeaf * request.field_mm, 2 * smallest_mm);
+  const double small_term = 1 / (smallest_mm * smallest_mm);
+  const double large_term = 1 / (largest_mm * largest_mm);
+
+  cv::Mat& samples = canvas.samples();
+  samples.setTo(0);
+  cv::Mat open(samples.size(), CV_64F, cv::Scalar(1));  // what still shines through
+  const int columns = samples.cols;
+  const int rows = samples.rows;
+  const double total = static_cast<double>(columns) * rows;
+  double remaining = total;
+  while (remaining > 1e-4 * total) {
+    ThrowIfCancelled();
+    const double radius =
+        1 / std::sqrt(small_term - draws->Uniform() * (small_term - large_term)) / spacing_mm;
+    const double x = draws->Uniform() * columns;
+    const double y = draws->Uniform() * rows;
+    const double grey = 1 + options.contrast * (2 * draws->Uniform() - 1);
+    const int reach = static_cast<int>(std::ceil(radius + 1));
+    const int centre_y = static_cast<int>(y);
+    for (int i = centre_y - reach; i <= centre_y + reach; ++i) {
+      const int row = (i % rows + rows) % rows;
+      double* light = samples.ptr<double>(row);
+      double* through = open.ptr<double>(row);
+      const double dy = i - y;
+      const double half_chord_square = (radius + 0.5) * (radius + 0.5) - dy * dy;
+      if (!(half_chord_square > 0)) continue;
+      const double half_chord = std::sqrt(half_chord_square);
+      const int last = static_cast<int>(std::floor(x + half_chord));
+      for (int j = static_cast<int>(std::ceil(x - half_chord)); j <= last; ++j) {
+        const int column = (j % columns + columns) % columns;
+        if (through[column] == 0) continue;
+        // The part of the sample's cell that the leaf covers, its border taken as straight.
+        const double inside = radius + 0.5 - std::hypot(j - x, dy);
+        const double hidden = through[column] * std::clamp(inside, 0.0, 1.0);
+        light[column] += hidden * grey;
+        through[column] -= hidden;
+        remaining -= hidden;
+      }
+    }
+  }
+  samples += open;
+  return canvas.Finish();
+}
+
+// Gaussian noise whose amplitude falls as 1/f (pink, from one cycle per field on) or not at all
+// (white), up to the shortest period. A tanh keeps it between no light and twice the mean.
+TargetTile DrawNoise(const TargetOptions& options, const TileRequest& request, RandomDraws* draws) {
+  Canvas canvas(request, 0);
+  const double spacing_mm = canvas.spacing_x_mm();
+  const double period_mm =
+      FeatureSizeMm(options, kNoisePeriodPx * request.pixel_mm, 2 * spacing_mm, request.field_mm);
+  cv::Mat& samples = canvas.samples();
+  canvas.Fill([draws](double, double) { return draws->Normal(); });
+  cv::Mat spectrum;
+  cv::dft(samples, spectrum, cv::DFT_COMPLEX_OUTPUT);
+  for (int i = 0; i < spectrum.rows; ++i) {
+    ThrowIfCancelled();
+    auto* row = spectrum.ptr<std::complex<double>>(i);
+    const double fy = std::min(i, spectrum.rows - i) / canvas.height_mm();
+    for (int j = 0; j < spectrum.cols; ++j) {
+      const double fx = std::min(j, spectrum.cols - j) / canvas.width_mm();
+      const double f = std::hypot(fx, fy);
+      double amplitude = f > 0 && f * period_mm <= 1 ? 1 : 0;
+      if (options.kind == TargetKind::kPinkNoise) amplitude /= std::max(f, 1 / request.field_mm);
+      row[j] *= amplitude;
+    }
+  }
+  cv::dft(spectrum, samples, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+  const double rms =
+      std::sqrt(samples.dot(samples) / (static_cast<double>(samples.rows) * samples.cols));
+  for (int i = 0; i < samples.rows; ++i) {
+    ThrowIfCancelled();
+    double* row = samples.ptr<double>(i);
+    for (int j = 0; j < samples.cols; ++j) {
+      row[j] = 1 + std::tanh(options.contrast / 2 * row[j] / rms);
+    }
+  }
+  return canvas.Finish();
+}
+
+TargetTile DrawCheckerboard(const TargetOptions& options, const TileRequest& request) {
+  const double square_mm =
+      FeatureSizeMm(options, kSquarePx * request.pixel_mm, request.pixel_mm, request.field_mm);
+  Canvas canvas(request, 2 * square_mm);
+  canvas.Fill([&](double x, double y) {
+    return 1 + options.contrast * SquareWaveMean(x, 2 * square_mm, canvas.spacing_x_mm()) *
+                   SquareWaveMean(y, 2 * square_mm, canvas.spacing_y_mm());
+  });
+  return canvas.Finish();
+}
+
+// Bright and dark sectors around the field's centre. The feature size is a sector's width at half
+// the field's shorter side from the centre. Each sample is the mean along its circle over its cell.
+TargetTile DrawSiemensStar(const TargetOptions& options, const TileRequest& request) {
+  const double rim_mm = request.field_mm / 2;
+  const double sector_mm =
+      FeatureSizeMm(options, kPi * rim_mm / kStarCycles, request.pixel_mm, rim_mm);
+  const double cycles = std::max(1.0, std::round(kPi * rim_mm / sector_mm));
+  Canvas canvas(request, 0);
+  canvas.Fill([&](double x, double y) {
+    return 1 + options.contrast * StarMean(x, y, cycles, canvas.spacing_x_mm());
+  });
+  return canvas.Finish();
+}
+
+// The user's picture, upright and centred, mirrored at its sides where the tile is larger. Its
+// width is the feature size, or such that it covers all that the frames see. The contrast is its
+// own.
+TargetTile DrawPicture(const TargetOptions& options, const TileRequest& request,
+                       const LinearPicture& picture) {
+  if (picture.width_px < 1 || picture.height_px < 1) {
+    throw Error(fmt::format("target.picture '{}' is empty", options.picture_path));
+  }
+  const LinearPicture grey = ToGrey(picture);
+  cv::Mat source(grey.height_px, grey.width_px, CV_32F);
+  std::copy(grey.values.begin(), grey.values.end(), source.ptr<float>());
+
+  Canvas canvas(request, 0);
+  const double shape = static_cast<double>(grey.height_px) / grey.width_px;
+  const double width_mm =
+      FeatureSizeMm(options, std::max(canvas.width_mm(), canvas.height_mm() / shape),
+                    16 * request.pixel_mm, 4 * canvas.width_mm());
+  const cv::Size size(
+      std::max(1, static_cast<int>(std::lround(width_mm / canvas.spacing_x_mm()))),
+      std::max(1, static_cast<int>(std::lround(width_mm * shape / canvas.spacing_y_mm()))));
+  cv::Mat resized;
+  cv::resize(source, resized, size, 0, 0,
+             size.width < source.cols ? cv::INTER_AREA : cv::INTER_CUBIC);
+  cv::Mat& samples = canvas.samples();
+  for (int i = 0; i < samples.rows; ++i) {
+    ThrowIfCancelled();
+    const int row = cv::borderInterpolate(i - samples.rows / 2 + size.height / 2, size.height,
+                                          cv::BORDER_REFLECT);
+    for (int j = 0; j < samples.cols; ++j) {
+      const int column = cv::borderInterpolate(j - samples.cols / 2 + size.width / 2, size.width,
+                                               cv::BORDER_REFLECT);
+      samples.at<double>(i, j) = std::max(0.0f, resized.at<float>(row, column));
+    }
+  }
+  if (!(cv::mean(samples)[0] > 0)) {
+    throw Error(
+        fmt::format("target.picture '{}' is black: it must show something", options.picture_path));
+  }
+  return canvas.Finish();
+}
+
+}  // namespace
+
+TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& request,
+                          const LinearPicture& picture, RandomDraws* draws) {
+  switch (options.kind) {
+    case TargetKind::kDeadLeaves:
+      return DrawDeadLeaves(options, request, draws);
+    case TargetKind::kPinkNoise:
+    case TargetKind::kWhiteNoise:
+      return DrawNoise(options, request, draws);
+    case TargetKind::kCheckerboard:
+      return DrawCheckerboard(options, request);
+    case TargetKind::kSiemensStar:
+      return DrawSiemensStar(options, request);
+    case TargetKind::kPicture:
+      return DrawPicture(options, request, picture);
+    case TargetKind::kPrintedEdge:
+    case TargetKind::kKnifeEdge:
+      break;
+  }
+  throw Error("an edge is drawn in closed form, not as a tile");
+}
+
+}  // namespace thicklens::model

@@ -1,0 +1,401 @@
+#include "thicklens/model/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "support/matrix_lens.h"
+#include "thicklens/base/error.h"
+#include "thicklens/model/thick_lens.h"
+
+namespace thicklens::model {
+namespace {
+
+using ::thicklens::testing::MatrixLens;
+using ::thicklens::testing::MatrixLenses;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+constexpr int kWidth = 9;
+constexpr int kHeight = 7;
+constexpr std::size_t kCount = std::size_t{kWidth} * kHeight;
+
+std::size_t IndexOf(int x, int y) {
+  return static_cast<std::size_t>(y) * kWidth + static_cast<std::size_t>(x);
+}
+
+// A coarse sensor with the axis off its centre, so that range and z differ much and every sign
+// shows.
+Camera CameraFor(const ThickLens& lens, double focus_depth_mm) {
+  Camera camera;
+  camera.name = "test-camera";
+  camera.lens = lens;
+  camera.sensor.width_px = kWidth;
+  camera.sensor.height_px = kHeight;
+  camera.sensor.pixel_pitch_mm = 0.9;
+  camera.sensor.principal_point_px = {3.25, 4.5};
+  camera.calibration.emplace();
+  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(lens, focus_depth_mm), 0};
+  return camera;
+}
+
+Camera BenchCamera(double focus_depth_mm = 640) {
+  return CameraFor({12.5, 12.8, 3.0, 4.46}, focus_depth_mm);
+}
+
+LinearPicture GreyPicture(int width = kWidth, int height = kHeight) {
+  return {
+      width, height, 1,
+      std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0.5F)};
+}
+
+RawDepthMap MapOf(float value) { return {kWidth, kHeight, std::vector<float>(kCount, value)}; }
+
+DepthConvention Convention(DepthKind kind, double unit_mm = 1) {
+  DepthConvention convention;
+  convention.kind = kind;
+  convention.unit_mm = unit_mm;
+  convention.aperture_step_mm = 0.7;
+  return convention;
+}
+
+std::string MessageOf(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+void ExpectSays(const std::string& message, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts) {
+    EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
+  }
+}
+
+// Where the chief ray through a pixel meets depth z: the traced lens says where a chief ray from
+// height 1 there lands, and a paraxial landing is proportional to the height.
+Eigen::Vector2d ScenePointMm(const MatrixLens& oracle, const Camera& camera, int x, int y,
+                             double depth_mm) {
+  const double landing_of_one_mm = oracle.Landing(1, depth_mm, 0, camera.image_distance_mm());
+  const Eigen::Vector2d landing_mm =
+      (camera.sensor.principal_point_px - Eigen::Vector2d(x, y)) * camera.sensor.pixel_pitch_mm;
+  return landing_mm / landing_of_one_mm;
+}
+
+TEST(MakeScene, RangeIsTheLengthOfTheChiefRay) {
+  for (const MatrixLens& oracle : MatrixLenses()) {
+    SCOPED_TRACE(oracle.name());
+    const Camera camera = CameraFor(oracle.AsThickLens(4), 640);
+    RawDepthMap map = MapOf(0);
+    std::vector<double> depth_mm(kCount);
+    double largest_ratio = 0;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const std::size_t index = IndexOf(x, y);
+        depth_mm[index] = 300 + 17 * x + 40 * y;
+        const Eigen::Vector2d point_mm = ScenePointMm(oracle, camera, x, y, depth_mm[index]);
+        const double range_mm =
+            std::sqrt(point_mm.squaredNorm() + depth_mm[index] * depth_mm[index]);
+        largest_ratio = std::max(largest_ratio, range_mm / depth_mm[index]);
+        map.values[index] = static_cast<float>(range_mm / 1000);
+      }
+    }
+    ASSERT_GT(largest_ratio, 1.02);
+    const Scene scene =
+        MakeScene(camera, GreyPicture(), map, Convention(DepthKind::kRange, 1000), "range.pfm");
+    for (std::size_t i = 0; i < kCount; ++i) {
+      EXPECT_NEAR(scene.depth_mm[i], depth_mm[i], 1e-6 * depth_mm[i]);
+    }
+  }
+}
+
+TEST(MakeScene, DisparityIsTheShiftBetweenTracedViews) {
+  for (const MatrixLens& oracle : MatrixLenses()) {
+    SCOPED_TRACE(oracle.name());
+    for (const double focus_mm : {640.0, std::numeric_limits<double>::infinity()}) {
+      const Camera camera = CameraFor(oracle.AsThickLens(4), focus_mm);
+      DepthConvention convention = Convention(DepthKind::kDisparity);
+      convention.disparity_scale = -2.5;
+      convention.disparity_offset_px = 0.125;
+      RawDepthMap map = MapOf(0);
+      std::vector<double> depth_mm(kCount);
+      for (std::size_t i = 0; i < kCount; ++i) {
+        depth_mm[i] = 150 + 60 * static_cast<double>(i);
+        // Shift to the left, in px, as the view moves one step to the right.
+        const double centre_mm = oracle.Landing(5, depth_mm[i], 0, camera.image_distance_mm());
+        const double right_mm =
+            oracle.Landing(5, depth_mm[i], convention.aperture_step_mm, camera.image_distance_mm());
+        const double disparity_px = (right_mm - centre_mm) / camera.sensor.pixel_pitch_mm;
+        map.values[i] = static_cast<float>((disparity_px - 0.125) / -2.5);
+      }
+      const Scene scene = MakeScene(camera, GreyPicture(), map, convention, "disparity.pfm");
+      // A float near .05 has steps of 4e-9, which is 1e-4 of the smallest disparity used.
+      for (std::size_t i = 0; i < kCount; ++i) {
+        EXPECT_NEAR(scene.depth_mm[i], depth_mm[i], 3e-4 * depth_mm[i]);
+      }
+    }
+  }
+}
+
+TEST(MakeScene, DisparityZeroIsThePlaneOfFocusInFloatMapsAndAHoleInIntegerOnes) {
+  const Camera camera = BenchCamera();
+  RawDepthMap map = MapOf(0);
+  map.values[5] = 0.002F;
+  const DepthConvention convention = Convention(DepthKind::kDisparity);
+  const Scene as_float = MakeScene(camera, GreyPicture(), map, convention, "d.pfm");
+  EXPECT_NEAR(as_float.depth_mm[0], 640, 1e-3);
+  EXPECT_LT(as_float.depth_mm[5], 640);
+  EXPECT_EQ(as_float.depth.holes, 0U);
+  map.integer = true;
+  const Scene as_integer = MakeScene(camera, GreyPicture(), map, convention, "d.png");
+  EXPECT_TRUE(std::isnan(as_integer.depth_mm[0]));
+  EXPECT_EQ(as_integer.depth.valid, 1U);
+  EXPECT_EQ(as_integer.depth_mm[5], as_float.depth_mm[5]);
+}
+
+TEST(MakeScene, DisparityAtOrBehindInfinityIsAHole) {
+  // 1/zf + d p/(da K) = 0 at d = -da K/(p zf).
+  const Camera camera = BenchCamera();
+  const DepthConvention convention = Convention(DepthKind::kDisparity);
+  const double scale_mm = DefocusScaleMm(camera.lens, camera.image_distance_mm());
+  const double at_infinity_px = -convention.aperture_step_mm * scale_mm / (0.9 * 640);
+  RawDepthMap map = MapOf(0);
+  map.values[0] = static_cast<float>(at_infinity_px * 1.001);
+  map.values[1] = -3;
+  map.values[2] = static_cast<float>(at_infinity_px * 0.99);
+  const Scene scene = MakeScene(camera, GreyPicture(), map, convention, "d.pfm");
+  EXPECT_TRUE(std::isnan(scene.depth_mm[0]));
+  EXPECT_TRUE(std::isnan(scene.depth_mm[1]));
+  EXPECT_NEAR(scene.depth_mm[2], 64000, 100);
+  EXPECT_EQ(scene.depth.holes, 2U);
+  // Focused at infinity, d = 0 is infinity itself.
+  RawDepthMap near = MapOf(0.01F);
+  near.values[0] = 0;
+  const Scene far_focus = MakeScene(BenchCamera(std::numeric_limits<double>::infinity()),
+                                    GreyPicture(), near, convention, "d.pfm");
+  EXPECT_TRUE(std::isnan(far_focus.depth_mm[0]));
+  EXPECT_EQ(far_focus.depth.holes, 1U);
+}
+
+TEST(MakeScene, HolesOfZAndRangeAndTheStatistics) {
+  for (const DepthKind kind : {DepthKind::kZ, DepthKind::kRange}) {
+    for (const bool integer : {false, true}) {
+      RawDepthMap map = MapOf(0);
+      map.integer = integer;
+      map.values[0] = kNan;
+      map.values[1] = kInfinity;
+      map.values[2] = -kInfinity;
+      map.values[10] = 5000;
+      map.values[20] = 2500;
+      map.values[30] = 7500;
+      const Scene scene = MakeScene(BenchCamera(), GreyPicture(), map,
+                                    Convention(kind, DepthUnitMm("tum5000")), "depth.png");
+      EXPECT_EQ(scene.depth.valid, 3U);
+      EXPECT_EQ(scene.depth.holes, kCount - 3);
+      for (const std::size_t hole : {0, 1, 2, 3, 62}) {
+        EXPECT_TRUE(std::isnan(scene.depth_mm[hole])) << hole;
+      }
+      if (kind == DepthKind::kZ) {
+        EXPECT_EQ(scene.depth.min_mm, 500);
+        EXPECT_EQ(scene.depth.median_mm, 1000);
+        EXPECT_EQ(scene.depth.max_mm, 1500);
+        EXPECT_EQ(scene.depth_mm[20], 500);
+      }
+    }
+  }
+}
+
+TEST(MakeScene, KeepsThePicture) {
+  LinearPicture picture = GreyPicture();
+  picture.values[17] = 0.25F;
+  const Scene scene =
+      MakeScene(BenchCamera(), picture, MapOf(600), Convention(DepthKind::kZ), "z.pfm");
+  EXPECT_EQ(scene.picture.values, picture.values);
+  EXPECT_EQ(scene.picture.at(8, 1, 0), 0.25F);
+}
+
+TEST(MakeScene, ZNeedsNoCalibration) {
+  Camera camera = BenchCamera();
+  camera.calibration.reset();
+  EXPECT_NO_THROW(MakeScene(camera, GreyPicture(), MapOf(600), Convention(DepthKind::kZ), "z.pfm"));
+  EXPECT_THROW(MakeScene(camera, GreyPicture(), MapOf(600), Convention(DepthKind::kRange), "z.pfm"),
+               Error);
+}
+
+TEST(MakeScene, SizeMismatchNamesBothSizes) {
+  const std::string message = MessageOf([] {
+    MakeScene(BenchCamera(), GreyPicture(8, 7), MapOf(600), Convention(DepthKind::kZ), "depth.png");
+  });
+  ExpectSays(message, {"depth.png", "9x7", "8x7"});
+  RawDepthMap broken = MapOf(600);
+  broken.values.pop_back();
+  EXPECT_THROW(
+      MakeScene(BenchCamera(), GreyPicture(), broken, Convention(DepthKind::kZ), "depth.png"),
+      Error);
+}
+
+TEST(MakeScene, NegativeDepthNamesThePixel) {
+  for (const DepthKind kind : {DepthKind::kZ, DepthKind::kRange}) {
+    RawDepthMap map = MapOf(600);
+    map.values[IndexOf(4, 2)] = -3.5F;
+    ExpectSays(MessageOf([&] {
+                 MakeScene(BenchCamera(), GreyPicture(), map, Convention(kind), "depth.pfm");
+               }),
+               {"depth.pfm", "(4, 2)", "-3.5"});
+  }
+}
+
+TEST(MakeScene, AllHolesIsAnError) {
+  for (const float value : {0.0F, kNan, kInfinity}) {
+    ExpectSays(MessageOf([&] {
+                 MakeScene(BenchCamera(), GreyPicture(), MapOf(value), Convention(DepthKind::kZ),
+                           "empty.png");
+               }),
+               {"empty.png", "holes"});
+  }
+}
+
+TEST(MakeScene, WrongUnitStopsWithTheNumbers) {
+  RawDepthMap millimetres = MapOf(600);
+  millimetres.values[0] = 400;
+  millimetres.values[1] = 1500;
+  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyPicture(), millimetres,
+                            Convention(DepthKind::kZ, DepthUnitMm("mm")), "z.png"));
+  // Millimetres taken for metres.
+  ExpectSays(MessageOf([&] {
+               MakeScene(BenchCamera(), GreyPicture(), millimetres,
+                         Convention(DepthKind::kZ, DepthUnitMm("m")), "z.png");
+             }),
+             {"z.png", "400000", "600000", "1.5e+06", "median", "mm", "unit"});
+  RawDepthMap metres = MapOf(0.6F);
+  metres.values[0] = 0.4F;
+  metres.values[1] = 1.5F;
+  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyPicture(), metres,
+                            Convention(DepthKind::kZ, DepthUnitMm("m")), "z.png"));
+  // Metres taken for millimetres: nearer than the front focal point.
+  ExpectSays(MessageOf([&] {
+               MakeScene(BenchCamera(), GreyPicture(), metres,
+                         Convention(DepthKind::kZ, DepthUnitMm("mm")), "z.png");
+             }),
+             {"z.png", "0.4 to 1.5 mm", "median 0.6 mm", "front focal point at 12.5 mm"});
+  // The same with a room seen by a phone's lens, where the wrong depths are beyond f1 = 4 mm.
+  const Camera phone = CameraFor({4, 4, 0, 1}, 3000);
+  ExpectSays(MessageOf([&] {
+               MakeScene(phone, GreyPicture(), MapOf(4.5F),
+                         Convention(DepthKind::kZ, DepthUnitMm("mm")), "room.pfm");
+             }),
+             {"room.pfm", "4.5", "3000", "1000"});
+}
+
+TEST(MakeScene, FarAndNearScenesPass) {
+  // A landscape with a foreground, by a camera focused on the bench; one without, focused far; a
+  // macro scene by a camera focused at infinity.
+  RawDepthMap landscape = MapOf(3e5F);
+  landscape.values[7] = 5000;
+  const DepthConvention z = Convention(DepthKind::kZ);
+  EXPECT_NO_THROW(MakeScene(BenchCamera(), GreyPicture(), landscape, z, "z.pfm"));
+  EXPECT_NO_THROW(MakeScene(BenchCamera(5000), GreyPicture(), MapOf(3e5F), z, "z.pfm"));
+  const Camera at_infinity = BenchCamera(std::numeric_limits<double>::infinity());
+  EXPECT_NO_THROW(MakeScene(at_infinity, GreyPicture(), MapOf(100), z, "z.pfm"));
+  EXPECT_NO_THROW(MakeScene(at_infinity, GreyPicture(), MapOf(3e6F), z, "z.pfm"));
+}
+
+TEST(MakeScene, RefusesImpossibleConventions) {
+  const auto expect_refusal = [](const std::string& named, const DepthConvention& convention) {
+    ExpectSays(MessageOf([&] {
+                 MakeScene(BenchCamera(), GreyPicture(), MapOf(1), convention, "map.pfm");
+               }),
+               {"map.pfm", named});
+  };
+  expect_refusal("unit", Convention(DepthKind::kZ, 0));
+  expect_refusal("unit", Convention(DepthKind::kRange, std::nan("")));
+  DepthConvention disparity = Convention(DepthKind::kDisparity);
+  disparity.aperture_step_mm = 0;
+  expect_refusal("aperture_step_mm", disparity);
+  disparity = Convention(DepthKind::kDisparity);
+  disparity.disparity_scale = 0;
+  expect_refusal("disparity_scale", disparity);
+  disparity = Convention(DepthKind::kDisparity);
+  disparity.disparity_offset_px = std::nan("");
+  expect_refusal("disparity_offset_px", disparity);
+}
+
+TEST(Depth, NamesAndUnits) {
+  EXPECT_EQ(DepthKindFromName("z"), DepthKind::kZ);
+  EXPECT_EQ(DepthKindFromName("range"), DepthKind::kRange);
+  EXPECT_EQ(DepthKindFromName("disparity"), DepthKind::kDisparity);
+  ExpectSays(MessageOf([] { DepthKindFromName("depth"); }), {"depth", "z", "range", "disparity"});
+  EXPECT_EQ(DepthUnitMm("mm"), 1);
+  EXPECT_EQ(DepthUnitMm("cm"), 10);
+  EXPECT_EQ(DepthUnitMm("m"), 1000);
+  EXPECT_EQ(DepthUnitMm("tum5000") * 5000, 1000);
+  ExpectSays(MessageOf([] { DepthUnitMm("inch"); }), {"inch", "mm", "cm", "m", "tum5000"});
+}
+
+TEST(Picture, EveryStoredValueSurvivesLinearLightAndBack) {
+  for (const TransferCurve& curve :
+       {TransferCurve::Srgb(), TransferCurve::Gamma(2.2), TransferCurve::Linear()}) {
+    SCOPED_TRACE(curve.Name());
+    for (const int bits : {8, 16}) {
+      StoredPicture picture{256, bits == 8 ? 1 : 256, 1, bits, {}};
+      const int count = bits == 8 ? 256 : 65536;
+      for (int value = 0; value < count; ++value) {
+        picture.values.push_back(static_cast<std::uint16_t>(value));
+      }
+      const LinearPicture linear = ToLinear(picture, curve);
+      EXPECT_EQ(linear.values.front(), 0);
+      EXPECT_EQ(linear.values.back(), 1);
+      EXPECT_EQ(ToStored(linear, curve, bits).values, picture.values);
+    }
+  }
+}
+
+TEST(Picture, StoringClipsAndRounds) {
+  const LinearPicture picture{6, 1, 1, {-0.2F, 1.7F, kNan, 0.5F / 255, 0.49F / 255, kInfinity}};
+  const StoredPicture stored = ToStored(picture, TransferCurve::Linear(), 8);
+  EXPECT_EQ(stored.values, (std::vector<std::uint16_t>{0, 255, 0, 1, 0, 255}));
+  EXPECT_EQ(stored.bits, 8);
+  EXPECT_THROW(ToStored(picture, TransferCurve::Linear(), 12), Error);
+}
+
+TEST(Picture, RefusesWrongSizesAndValues) {
+  StoredPicture picture{2, 1, 1, 8, {3, 256}};
+  EXPECT_THROW(ToLinear(picture, TransferCurve::Srgb()), Error);
+  picture.values = {3};
+  EXPECT_THROW(ToLinear(picture, TransferCurve::Srgb()), Error);
+  picture.values = {3, 4};
+  EXPECT_NO_THROW(ToLinear(picture, TransferCurve::Srgb()));
+  picture.bits = 10;
+  EXPECT_THROW(ToLinear(picture, TransferCurve::Srgb()), Error);
+}
+
+TEST(Picture, GreyIsTakenInLinearLight) {
+  const StoredPicture stored{1, 1, 3, 8, {255, 128, 0}};
+  const LinearPicture grey = ToGrey(ToLinear(stored, TransferCurve::Srgb()));
+  EXPECT_EQ(grey.channels, 1);
+  EXPECT_EQ(grey.width_px, 1);
+  ASSERT_EQ(grey.values.size(), 1U);
+  EXPECT_NEAR(grey.values[0], 0.2126 + 0.7152 * 0.2158605, 1e-6);
+}
+
+TEST(Picture, GreyDropsAlpha) {
+  const LinearPicture rgba{2, 1, 4, {0.1F, 0.2F, 0.3F, 0.9F, 0.4F, 0.5F, 0.6F, 0.0F}};
+  const LinearPicture rgb{2, 1, 3, {0.1F, 0.2F, 0.3F, 0.4F, 0.5F, 0.6F}};
+  EXPECT_EQ(ToGrey(rgba).values, ToGrey(rgb).values);
+  const LinearPicture grey{2, 1, 1, {0.1F, 0.7F}};
+  EXPECT_EQ(ToGrey(grey).values, grey.values);
+  const LinearPicture two{1, 1, 2, {0.1F, 0.7F}};
+  EXPECT_THROW(ToGrey(two), Error);
+}
+
+}  // namespace
+}  // namespace thicklens::model

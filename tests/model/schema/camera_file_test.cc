@@ -1,0 +1,386 @@
+#include "thicklens/model/camera_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "support/error_message.h"
+#include "thicklens/base/error.h"
+#include "thicklens/model/sweep_simulator.h"
+
+namespace thicklens::model {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+using ::thicklens::testing::ErrorOf;
+
+constexpr char kLens[] =
+    "lens: {front_focal_length_mm: 12.5, rear_focal_length_mm: 12.8, lens_thickness_mm: 3.0, "
+    "aperture_radius_mm: 4.46}\n";
+constexpr char kSensor[] =
+    "sensor: {width_px: 640, height_px: 480, pixel_pitch_mm: 0.006, "
+    "principal_point_px: [319.5, 239.5], transfer: srgb}\n";
+
+std::string Text(const std::string& rest, const std::string& lens = kLens,
+                 const std::string& sensor = kSensor) {
+  return "schema: thicklens/camera/2\nname: bench\n" + lens + sensor + rest;
+}
+
+std::string ErrorOfText(const std::string& text) {
+  return ErrorOf([&] { ParseCamera(text, "c.yaml"); });
+}
+
+std::string Replaced(std::string text, const std::string& what, const std::string& by) {
+  const std::size_t place = text.find(what);
+  if (place == std::string::npos) throw std::logic_error("not in the text: " + what);
+  return text.replace(place, what.size(), by);
+}
+
+std::string ErrorWith(const std::string& what, const std::string& by) {
+  return ErrorOfText(Replaced(Text("psf: gaussian\n"), what, by));
+}
+
+bool SameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+TEST(CameraFile, ReadsWhatIsThere) {
+  const Camera camera = ParseCamera(Text("psf: disc\n"), "c.yaml");
+  EXPECT_EQ(camera.name, "bench");
+  EXPECT_EQ(camera.lens.front_focal_length_mm, 12.5);
+  EXPECT_EQ(camera.lens.rear_focal_length_mm, 12.8);
+  EXPECT_EQ(camera.lens.lens_thickness_mm, 3.0);
+  EXPECT_EQ(camera.lens.aperture_radius_mm, 4.46);
+  EXPECT_EQ(camera.sensor.width_px, 640);
+  EXPECT_EQ(camera.sensor.height_px, 480);
+  EXPECT_EQ(camera.sensor.pixel_pitch_mm, 0.006);
+  EXPECT_EQ(camera.sensor.principal_point_px, Eigen::Vector2d(319.5, 239.5));
+  EXPECT_EQ(camera.sensor.transfer.Name(), "srgb");
+  EXPECT_EQ(camera.psf, Psf::kDisc);
+  EXPECT_FALSE(camera.calibration.has_value());
+  EXPECT_THAT(camera.statements, IsEmpty());
+  EXPECT_EQ(ParseCamera(Text(""), "c.yaml").psf, Psf::kGaussian);
+}
+
+TEST(CameraFile, EveryErrorNamesItsPlace) {
+  EXPECT_EQ(ErrorWith("aperture_radius_mm", "aperture_raduis_mm"),
+            "c.yaml:3:89: lens: unknown key 'aperture_raduis_mm'; did you mean "
+            "'aperture_radius_mm'?");
+  EXPECT_THAT(
+      ErrorWith("pixel_pitch_mm", "pixel_pitch_um"),
+      AllOf(StartsWith("c.yaml:4:"), HasSubstr("wrong unit: this field is 'pixel_pitch_mm'")));
+  EXPECT_THAT(ErrorWith("0.006", "6 um"), AllOf(StartsWith("c.yaml:4:"), HasSubstr("'6 um'")));
+  EXPECT_THAT(ErrorWith("12.5", "nan"), AllOf(StartsWith("c.yaml:3:"), HasSubstr("finite")));
+  EXPECT_THAT(ErrorWith("4.46", "-4.46"),
+              AllOf(StartsWith("c.yaml:3:"),
+                    HasSubstr("lens.aperture_radius_mm: must be > 0, found -4.46")));
+  EXPECT_THAT(ErrorWith("4.46", "0"), HasSubstr("must be > 0, found 0"));
+  EXPECT_THAT(ErrorWith("12.8", "0"), HasSubstr("lens.rear_focal_length_mm: must be > 0"));
+  EXPECT_THAT(ErrorWith("640", "640.5"), HasSubstr("sensor.width_px: a whole number"));
+  EXPECT_THAT(ErrorWith("640", "0"), HasSubstr("sensor.width_px"));
+  EXPECT_THAT(ErrorWith("[319.5, 239.5]", "[319.5]"),
+              HasSubstr("sensor.principal_point_px: a list of 2 is expected, found 1"));
+  EXPECT_THAT(ErrorWith("239.5", "mid"), HasSubstr("sensor.principal_point_px[1]"));
+  EXPECT_THAT(ErrorWith("srgb", "bt709"),
+              AllOf(StartsWith("c.yaml:4:"), HasSubstr("sensor.transfer"), HasSubstr("gamma-2.2")));
+  EXPECT_THAT(ErrorWith("gaussian", "square"),
+              AllOf(StartsWith("c.yaml:5:6: psf"), HasSubstr("disc")));
+  EXPECT_THAT(ErrorWith("lens: {", "lens: ["), StartsWith("c.yaml:3:"));
+  EXPECT_THAT(ErrorWith("psf: gaussian", "psf: gaussian\npsf: disc"),
+              StartsWith("c.yaml:6:1: key 'psf' stands here twice"));
+  EXPECT_THAT(ErrorWith("name: bench\n", ""), HasSubstr("'name' is missing"));
+  EXPECT_THAT(ErrorWith("schema: thicklens/camera/2\n", ""), HasSubstr("schema"));
+  EXPECT_THAT(ErrorWith("camera/2", "camera/3"), HasSubstr("found 'thicklens/camera/3'"));
+}
+
+TEST(CameraFile, SensorInFrontOfEveryImageIsRefusedWithTheNumber) {
+  const auto error = [](const std::string& d1) {
+    return ErrorOfText(
+        Text("calibration:\n  image_distance_mm: " + d1 + "\n  evidence: {method: assumed}\n"));
+  };
+  EXPECT_EQ(error("15.9"), "(no error)");
+  // D = f2 is a focus at infinity.
+  EXPECT_EQ(error("15.8"), "(no error)");
+  EXPECT_THAT(error("15.7"), AllOf(StartsWith("c.yaml:6:22: calibration.image_distance_mm"),
+                                   HasSubstr("15.7"), HasSubstr("= 15.8")));
+  EXPECT_THAT(error("{value: 15.7, sigma: 0.1}"), HasSubstr("15.7"));
+}
+
+TEST(CameraFile, CalibrationIsChecked) {
+  const auto error = [](const std::string& line) {
+    return ErrorOfText(Text("calibration:\n  " + line + "\n  evidence: {method: assumed}\n"));
+  };
+  EXPECT_THAT(error("blur_ratio: -0.1"),
+              StartsWith("c.yaml:6:15: calibration.blur_ratio: must be >= 0"));
+  EXPECT_THAT(error("blur_floor_px: {value: -1}"),
+              HasSubstr("calibration.blur_floor_px.value: must be >= 0"));
+  EXPECT_THAT(error("blur_ratio: {value: 1, sigma: -1}"), HasSubstr("blur_ratio.sigma"));
+  EXPECT_THAT(error("blur_ratio: {sigma: 1}"), HasSubstr("'value' is missing"));
+  EXPECT_THAT(error("blur_ratio: [1, 2]"), HasSubstr("a number is expected, found a list"));
+  EXPECT_THAT(error("covariance: {order: [blur_ratio], rows: [[1, 2]]}"), HasSubstr("a list of 1"));
+  EXPECT_THAT(error("covariance: {order: [blur_ratio, blur_floor_px], rows: [[1, 2], [3, 1]]}"),
+              HasSubstr("symmetric"));
+  EXPECT_THAT(error("covariance: {order: [kappa], rows: [[1]]}"),
+              AllOf(HasSubstr("covariance.order[0]"), HasSubstr("'kappa'")));
+  EXPECT_THAT(error("covariance: {order: [blur_ratio, blur_ratio], rows: [[1, 0], [0, 1]]}"),
+              HasSubstr("twice"));
+  EXPECT_THAT(ErrorOfText(Text("calibration: {blur_ratio: 0.5}\n")),
+              HasSubstr("'evidence' is missing"));
+}
+
+TEST(CameraFile, StatementsAreKeptByPath) {
+  const Camera camera =
+      ParseCamera(Text("", Replaced(kLens, "12.8", "{value: 12.8, tolerance: 0.1, assumed: true}"),
+                       Replaced(Replaced(kSensor, "319.5", "{value: 319.5, tolerance: 2}"), "640",
+                                "{value: 640, assumed: false}")),
+                  "c.yaml");
+  EXPECT_EQ(camera.lens.rear_focal_length_mm, 12.8);
+  EXPECT_EQ(camera.sensor.principal_point_px.x(), 319.5);
+  // About the width nothing is stated.
+  ASSERT_EQ(camera.statements.size(), 2U);
+  EXPECT_EQ(camera.statements.at("lens.rear_focal_length_mm").tolerance, 0.1);
+  EXPECT_TRUE(camera.statements.at("lens.rear_focal_length_mm").assumed);
+  EXPECT_EQ(camera.statements.at("sensor.principal_point_px[0]").tolerance, 2);
+  EXPECT_FALSE(camera.statements.at("sensor.principal_point_px[0]").assumed);
+  EXPECT_THAT(AssumedFields(camera), ElementsAre("lens.rear_focal_length_mm"));
+
+  EXPECT_THAT(ErrorWith("12.8", "{value: 12.8, tolerance: -1}"),
+              HasSubstr("rear_focal_length_mm.tolerance"));
+  EXPECT_THAT(ErrorWith("12.8", "{value: 12.8, sigma: 1}"), HasSubstr("unknown key 'sigma'"));
+  EXPECT_THAT(ErrorWith("12.8", "{assumed: true}"), HasSubstr("'value' is missing"));
+  EXPECT_THAT(ErrorWith("12.8", "{value: 12.8, assumed: perhaps}"), HasSubstr("'perhaps'"));
+}
+
+Camera FullCamera() {
+  Camera camera = ParseCamera(Text(""), "c.yaml");
+  camera.calibration.emplace();
+  CameraCalibration& calibration = *camera.calibration;
+  calibration.image_distance_mm = Estimate{47.0 / 3, 1e-300};
+  calibration.image_distance_mm->value += 1;
+  calibration.blur_ratio = Estimate{1.0 / 3, 0.1};
+  calibration.blur_floor_px = Estimate{5e-324, 0};
+  calibration.bench_offset_mm = Estimate{-0.0, 1e29};
+  calibration.covariance_order = {"image_distance_mm", "blur_ratio"};
+  calibration.covariance.resize(2, 2);
+  calibration.covariance << 1.0 / 3, -1e-17, -1e-17, 0.1;
+  Evidence& evidence = calibration.evidence;
+  evidence.method = "joint";
+  evidence.frames_used = 41;
+  evidence.frames_rejected = {{"frames/a, b: c.png", "clipped: 3.5 %, \"white\""},
+                              {"[x]{y} #1.jpg", "- no"},
+                              {"Z-1@1#1.jpg", "it's dark\nand dim"}};
+  evidence.chi2_per_dof = 1.0 / 7;
+  evidence.focus_depth_mm = Estimate{1155.0 / 7, 0.1};
+  evidence.data_sha256 = "0123456789012345678901234567890123456789012345678901234567890123";
+  evidence.version = "1.0";
+  evidence.date = "2020-01-02T03:04:05Z";
+  return camera;
+}
+
+void ExpectSame(const std::optional<Estimate>& a, const std::optional<Estimate>& b) {
+  ASSERT_EQ(a.has_value(), b.has_value());
+  if (!a) return;
+  EXPECT_TRUE(SameBits(a->value, b->value)) << a->value << " " << b->value;
+  EXPECT_TRUE(SameBits(a->sigma, b->sigma)) << a->sigma << " " << b->sigma;
+}
+
+TEST(CameraToYaml, CalibrationComesBackWhole) {
+  const Camera camera = FullCamera();
+  const Camera back = ParseCamera(CameraToYaml(camera), "c.yaml");
+  const CameraCalibration& a = *camera.calibration;
+  const CameraCalibration& b = back.calibration.value();
+  ExpectSame(a.image_distance_mm, b.image_distance_mm);
+  ExpectSame(a.blur_ratio, b.blur_ratio);
+  ExpectSame(a.blur_floor_px, b.blur_floor_px);
+  ExpectSame(a.bench_offset_mm, b.bench_offset_mm);
+  EXPECT_EQ(a.covariance_order, b.covariance_order);
+  EXPECT_EQ(a.covariance, b.covariance);
+  EXPECT_EQ(b.evidence.method, "joint");
+  EXPECT_EQ(b.evidence.frames_used, 41);
+  ASSERT_EQ(b.evidence.frames_rejected.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(a.evidence.frames_rejected[i].image, b.evidence.frames_rejected[i].image);
+    EXPECT_EQ(a.evidence.frames_rejected[i].reason, b.evidence.frames_rejected[i].reason);
+  }
+  EXPECT_TRUE(SameBits(*a.evidence.chi2_per_dof, b.evidence.chi2_per_dof.value()));
+  ExpectSame(a.evidence.focus_depth_mm, b.evidence.focus_depth_mm);
+  EXPECT_EQ(a.evidence.data_sha256, b.evidence.data_sha256);
+  EXPECT_EQ(b.evidence.version, "1.0");
+  EXPECT_EQ(b.evidence.date, "2020-01-02T03:04:05Z");
+  // Written again, nothing changes any more.
+  EXPECT_EQ(CameraToYaml(back), CameraToYaml(camera));
+}
+
+TEST(CameraToYaml, WhatDidNotConvergeIsNotWritten) {
+  Camera camera = FullCamera();
+  camera.calibration->blur_floor_px.reset();
+  camera.calibration->covariance_order.clear();
+  camera.calibration->covariance.resize(0, 0);
+  const std::string text = CameraToYaml(camera);
+  EXPECT_EQ(text.find("blur_floor_px"), std::string::npos) << text;
+  EXPECT_EQ(text.find("covariance"), std::string::npos) << text;
+  EXPECT_FALSE(ParseCamera(text, "c.yaml").calibration->blur_floor_px.has_value());
+}
+
+TEST(CameraToYaml, NumbersKeepTheirBits) {
+  for (const double value : {1.0 / 3, 1e29, 1.2345678901234567e-29, 0.1, 4.4643}) {
+    Camera camera = ParseCamera(Text(""), "c.yaml");
+    camera.lens.front_focal_length_mm = value;
+    camera.lens.lens_thickness_mm = -value;
+    camera.sensor.pixel_pitch_mm = value;
+    camera.sensor.principal_point_px = {-0.0, -value};
+    camera.statements["sensor.principal_point_px[1]"] = {value, true};
+    const Camera back = ParseCamera(CameraToYaml(camera), "c.yaml");
+    EXPECT_TRUE(SameBits(back.lens.front_focal_length_mm, value)) << value;
+    EXPECT_TRUE(SameBits(back.lens.lens_thickness_mm, -value)) << value;
+    EXPECT_TRUE(SameBits(back.sensor.pixel_pitch_mm, value)) << value;
+    EXPECT_TRUE(SameBits(back.sensor.principal_point_px.x(), -0.0)) << value;
+    EXPECT_TRUE(SameBits(back.sensor.principal_point_px.y(), -value)) << value;
+    EXPECT_TRUE(SameBits(back.statements.at("sensor.principal_point_px[1]").tolerance, value));
+  }
+}
+
+TEST(CameraToYaml, AnyNameComesBack) {
+  for (const char* name : {"true",
+                           "12",
+                           "1e3",
+                           "null",
+                           "~",
+                           "a: b",
+                           "a #b",
+                           "# a",
+                           "\"quoted\"",
+                           "it's",
+                           "'",
+                           "\"",
+                           "- a",
+                           "-",
+                           "? a",
+                           "?",
+                           ": a",
+                           ":",
+                           "[a",
+                           "{a",
+                           "a]",
+                           "a,b",
+                           "&a",
+                           "*a",
+                           "!a",
+                           "|",
+                           ">",
+                           "%a",
+                           "@a",
+                           "`a",
+                           "---",
+                           "...",
+                           "<<",
+                           "=",
+                           " leading",
+                           "trailing ",
+                           "a\tb",
+                           "a\nb",
+                           "a\\b",
+                           "a\rb",
+                           "K\xC3\xA4mera \xE2\x82\xAC \xF0\x9F\x93\xB7",
+                           "\xC2\x85",
+                           "\xEF\xBB\xBF"
+                           "a",
+                           "schema: thicklens/sweep/1"}) {
+    Camera camera = FullCamera();
+    camera.name = name;
+    camera.calibration->evidence.method = name;
+    camera.calibration->evidence.frames_rejected = {{name, name}};
+    const std::string text = CameraToYaml(camera);
+    Camera back;
+    ASSERT_NO_THROW(back = ParseCamera(text, "c.yaml")) << text;
+    EXPECT_EQ(back.name, name) << text;
+    EXPECT_EQ(back.calibration->evidence.method, name) << text;
+    EXPECT_EQ(back.calibration->evidence.frames_rejected.at(0).image, name) << text;
+    EXPECT_EQ(back.calibration->evidence.frames_rejected.at(0).reason, name) << text;
+  }
+}
+
+TEST(Camera, MissingCalibrationIsNamed) {
+  const Camera camera = ParseCamera(Text(""), "c.yaml");
+  EXPECT_THAT(ErrorOf([&] { camera.image_distance_mm(); }),
+              AllOf(HasSubstr("'bench'"), HasSubstr("calibration.image_distance_mm")));
+  EXPECT_THAT(ErrorOf([&] { camera.blur_ratio(); }), HasSubstr("calibration.blur_ratio"));
+}
+
+TEST(Camera, IsValidNamesTheField) {
+  const auto why = [](const auto& change) {
+    Camera camera = FullCamera();
+    change(&camera);
+    std::string reason;
+    return camera.IsValid(&reason) ? "valid" : reason;
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(why([](Camera*) {}), "valid");
+  EXPECT_THAT(why([&](Camera* c) { c->lens.aperture_radius_mm = nan; }),
+              HasSubstr("aperture_radius_mm"));
+  EXPECT_THAT(why([&](Camera* c) { c->sensor.pixel_pitch_mm = nan; }), HasSubstr("pixel_pitch_mm"));
+  EXPECT_THAT(why([&](Camera* c) { c->sensor.width_px = 0; }), HasSubstr("width_px"));
+  EXPECT_THAT(why([&](Camera* c) { c->sensor.principal_point_px.y() = nan; }),
+              HasSubstr("principal_point_px"));
+  EXPECT_THAT(why([&](Camera* c) { c->calibration->blur_ratio->value = nan; }),
+              HasSubstr("blur_ratio"));
+  EXPECT_THAT(why([&](Camera* c) { c->calibration->blur_ratio->sigma = nan; }),
+              HasSubstr("blur_ratio"));
+  EXPECT_THAT(why([&](Camera* c) { c->calibration->image_distance_mm->value = 15.79; }),
+              HasSubstr("15.79"));
+}
+
+std::vector<std::string> Shipped(const std::string& kind) {
+  std::vector<std::string> files;
+  const std::string folder = std::string(THICKLENS_SOURCE_DIR) + "/configs/" + kind;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().extension() == ".yaml") files.push_back(entry.path().string());
+  return files;
+}
+
+TEST(ShippedCameras, AreReadAndFocusWhereTheySay) {
+  const std::vector<std::string> files = Shipped("cameras");
+  EXPECT_GE(files.size(), 9U);
+  for (const std::string& file : files) {
+    SCOPED_TRACE(file);
+    const Camera camera = ReadCamera(file);
+    EXPECT_THAT(file, EndsWith("/" + camera.name + ".yaml"));
+    if (!camera.calibration) continue;
+    // Nobody measured a shipped camera.
+    EXPECT_EQ(camera.calibration->evidence.method, "assumed");
+    const double stated_mm = camera.calibration->evidence.focus_depth_mm.value().value;
+    const ThickLens& lens = camera.lens;
+    // (13) in its own form: 1 = f2/D + f1/zf.
+    const double rear_mm = camera.image_distance_mm() - lens.lens_thickness_mm;
+    EXPECT_NEAR(lens.rear_focal_length_mm / rear_mm + lens.front_focal_length_mm / stated_mm, 1,
+                4e-16);
+    EXPECT_NEAR(camera.focus_depth_mm() / stated_mm, 1, 1e-12);
+  }
+}
+
+TEST(ShippedCameras, KinectHasItsPublishedScale) {
+  const Camera camera =
+      ReadCamera(std::string(THICKLENS_SOURCE_DIR) + "/configs/cameras/kinect.yaml");
+  EXPECT_NEAR(camera.focal_scale_px(), 525, 1e-10);
+  EXPECT_EQ(camera.sensor.principal_point_px, Eigen::Vector2d(319.5, 239.5));
+}
+
+TEST(ShippedSweeps, AreRead) {
+  const std::vector<std::string> files = Shipped("sweeps");
+  EXPECT_GE(files.size(), 6U);
+  for (const std::string& file : files)
+    EXPECT_EQ(ErrorOf([&] { ReadSweepSimulation(file); }), "(no error)") << file;
+}
+
+}  // namespace
+}  // namespace thicklens::model

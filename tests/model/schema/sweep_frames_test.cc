@@ -1,0 +1,180 @@
+// The pictures of a sweep and their readings: tables, folders and lists.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/model/schema/sweep_folder.h"
+
+namespace thicklens::model {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+using ::thicklens::testing::ErrorOf;
+using ::thicklens::testing::kSweepHead;
+using ::thicklens::testing::SweepFolder;
+
+TEST_F(SweepFolder, TablesOfEveryMake) {
+  ExpectThreeFrames("file,reading\na.png,400\nb.png,401.5\nc.png,-3\n");
+  ExpectThreeFrames("a.png,400\nb.png,401.5\nc.png,-3\n");
+  ExpectThreeFrames("a.png,400\nb.png,401.5\nc.png,-3");
+  ExpectThreeFrames("file;reading\na.png;400\nb.png;401.5\nc.png;-3\n");
+  ExpectThreeFrames("file\treading\na.png\t400\nb.png\t401.5\nc.png\t-3\n");
+  ExpectThreeFrames("file,reading\r\na.png,400\r\nb.png,401.5\r\nc.png,-3\r\n");
+  ExpectThreeFrames(
+      "\xEF\xBB\xBF"
+      "a.png,400\nb.png,401.5\nc.png,-3\n");
+  ExpectThreeFrames("\"file\",\"reading\"\n\"a.png\",\"400\"\n\"b.png\",401.5\nc.png,-3\n");
+  ExpectThreeFrames("a.png, +400 \n  b.png , 4.015e2\n\n\nc.png,-3,more,columns\n\n");
+}
+
+TEST_F(SweepFolder, NamesWithQuotesCommasAndLineBreaks) {
+  folder_.Put("x, \"y\".png");
+  const SweepFile sweep = ReadTable("a.png,1\nb.png,2\nc.png,3\n\"x, \"\"y\"\".png\",4\n");
+  ASSERT_THAT(sweep.frames, SizeIs(4));
+  EXPECT_EQ(sweep.frames[3].image, folder_ / "x, \"y\".png");
+}
+
+TEST_F(SweepFolder, TableErrorsNameTheLine) {
+  const std::string csv = folder_ / "r.csv";
+  EXPECT_THAT(ErrorOfTable("file,reading\na.png,1\nb.png,two\n"),
+              AllOf(StartsWith(csv + ":3: "), HasSubstr("'two'")));
+  EXPECT_THAT(ErrorOfTable("file,reading\r\na.png,1\r\nb.png,two"), StartsWith(csv + ":3: "));
+  EXPECT_THAT(ErrorOfTable("a.png,1\n\n\nb.png,4 mm\n"),
+              AllOf(StartsWith(csv + ":4: "), HasSubstr("'4 mm'")));
+  EXPECT_THAT(ErrorOfTable("a.png;1\nb.png;401,5\n"), HasSubstr("'401,5'"));
+  EXPECT_THAT(ErrorOfTable("a.png,1\nb.png,nan\n"), StartsWith(csv + ":2: "));
+  EXPECT_THAT(ErrorOfTable("a.png,1\nb.png,+-2\n"), StartsWith(csv + ":2: "));
+  EXPECT_THAT(ErrorOfTable("a.png,1\nb.png\n"),
+              AllOf(StartsWith(csv + ":2: "), HasSubstr("two columns")));
+  EXPECT_THAT(ErrorOfTable("a.png,1\n,2\n"), AllOf(StartsWith(csv + ":2: "), HasSubstr("missing")));
+  EXPECT_THAT(ErrorOfTable("a.png,1\nb.png,2\na.png,3\n"),
+              AllOf(StartsWith(csv + ":3: "), HasSubstr("'a.png'"), HasSubstr("line 1")));
+  EXPECT_THAT(ErrorOfTable("a.png,1\n./a.png,3\n"),
+              AllOf(StartsWith(csv + ":2: "), HasSubstr("already")));
+  EXPECT_THAT(ErrorOfTable("a.png,1\nnone.png,2\n"),
+              AllOf(StartsWith(csv + ":2: "), HasSubstr("'none.png' is not in")));
+  EXPECT_THAT(ErrorOfTable("a.png,1\n\"b.png,2\n"),
+              AllOf(StartsWith(csv + ":2: "), HasSubstr("CSV")));
+  EXPECT_THAT(ErrorOfTable("a.png,1\nb\"b.png,2\nc.png,3\n"),
+              AllOf(StartsWith(csv + ":2: "), HasSubstr("CSV")));
+  EXPECT_THAT(ErrorOfTable(""), HasSubstr("no rows"));
+  EXPECT_THAT(ErrorOfTable("file,reading\n"), HasSubstr("no rows"));
+  EXPECT_THAT(ErrorWith("frames_csv: none.csv\n"), HasSubstr("none.csv"));
+}
+
+TEST_F(SweepFolder, FilesWithoutARowAreNamed) {
+  EXPECT_THAT(ErrorOfTable("b.png,1\n"),
+              AllOf(HasSubstr("a.png"), HasSubstr("no row"), HasSubstr("2 such")));
+  // Neither hidden files nor files that are no pictures.
+  folder_.Put("._a.png");
+  folder_.Put("notes.txt");
+  ReadTable("a.png,1\nb.png,2\nc.png,3\n", "reading_sigma_mm: 0\n");
+  EXPECT_THAT(notices_, IsEmpty());
+}
+
+TEST_F(SweepFolder, TableInAnotherFolderAndUnits) {
+  folder_.Put("bench/frames/x.JPG");
+  folder_.Put("bench/r.csv", "x.JPG,2\n");
+  const SweepFile sweep =
+      Read("frames_csv: bench/r.csv\nframes_dir: bench/frames\nreadings_unit: in\n");
+  ASSERT_THAT(sweep.frames, SizeIs(1));
+  EXPECT_EQ(sweep.frames[0].image, folder_ / "bench/frames/x.JPG");
+  EXPECT_EQ(sweep.frames[0].reading_mm, 50.8);
+  // Without frames_dir: the table's folder, or the folders in it.
+  EXPECT_EQ(Read("frames_csv: bench/r.csv\n").frames.at(0).image, folder_ / "bench/frames/x.JPG");
+
+  const std::vector<std::pair<std::string, double>> units = {
+      {"mm", 2}, {"um", 0.002}, {"cm", 20}, {"m", 2000}, {"in", 50.8}};
+  for (const auto& [unit, reading_mm] : units) {
+    EXPECT_EQ(
+        Read("frames_csv: bench/r.csv\nreadings_unit: " + unit + "\n").frames.at(0).reading_mm,
+        reading_mm);
+  }
+  EXPECT_THAT(ErrorWith("frames_csv: bench/r.csv\nreadings_unit: feet\n"),
+              AllOf(HasSubstr("s.yaml:4:16: readings_unit"), HasSubstr("'feet'")));
+  EXPECT_THAT(ErrorWith("readings_unit: cm\n" + frames_), HasSubstr("reading_mm"));
+  EXPECT_THAT(ErrorWith("frames_csv: bench/r.csv\nframes_dir: none\n"),
+              HasSubstr("no such folder"));
+}
+
+TEST_F(SweepFolder, SameNameInTwoFoldersIsAskedBack) {
+  folder_.Put("bench/one/x.png");
+  folder_.Put("bench/two/x.png");
+  folder_.Put("bench/r.csv", "x.png,2\n");
+  EXPECT_THAT(ErrorWith("frames_csv: bench/r.csv\n"),
+              AllOf(HasSubstr("r.csv:1: "), HasSubstr("one/x.png"), HasSubstr("two/x.png")));
+  folder_.Put("bench/r.csv", "two/x.png,2\none/x.png,3\n");
+  EXPECT_EQ(Read("frames_csv: bench/r.csv\n").frames.at(0).image, folder_ / "bench/two/x.png");
+}
+
+TEST_F(SweepFolder, GlobChoosesTheFiles) {
+  folder_.Put("odd [1]/raw/x1.png");
+  folder_.Put("odd [1]/raw/x2.png");
+  folder_.Put("odd [1]/raw/dark.png");
+  folder_.Put("odd [1]/r.csv", "x1.png,1\nx2.png,2\n");
+  folder_.Put("odd [1]/s.yaml",
+              std::string(kSweepHead) +
+                  "frames_csv: r.csv\nframes_glob: raw/x*.png\nreading_sigma_mm: 0\n");
+  const SweepFile sweep = ReadSweep(folder_ / "odd [1]/s.yaml", &notices_);
+  ASSERT_THAT(sweep.frames, SizeIs(2));
+  EXPECT_EQ(sweep.frames[1].image, folder_ / "odd [1]/raw/x2.png");
+  EXPECT_THAT(notices_, IsEmpty());
+  folder_.Put("r.csv", "a.png,1\n");
+  EXPECT_THAT(ErrorWith("frames_csv: r.csv\nframes_glob: '*.webp'\n"),
+              AllOf(HasSubstr("s.yaml:4:14: frames_glob"), HasSubstr("no file matches '*.webp'")));
+}
+
+TEST_F(SweepFolder, ListOfFrames) {
+  const SweepFile sweep =
+      Read("frames:\n- {image: b.png, reading_mm: 412.0}\n- {image: ./a.png, reading_mm: -1}\n");
+  ASSERT_THAT(sweep.frames, SizeIs(2));
+  EXPECT_EQ(sweep.frames[0].image, folder_ / "b.png");
+  EXPECT_EQ(sweep.frames[0].reading_mm, 412);
+  EXPECT_EQ(sweep.frames[1].image, folder_ / "a.png");
+  EXPECT_EQ(sweep.camera_path, folder_ / "cam/c.yaml");
+  EXPECT_EQ(sweep.source, folder_ / "s.yaml");
+
+  EXPECT_THAT(ErrorWith("frames:\n- {image: none.png, reading_mm: 1}\n"),
+              AllOf(HasSubstr("s.yaml:4:11: frames[0].image"), HasSubstr("does not exist")));
+  EXPECT_THAT(
+      ErrorWith("frames:\n- {image: a.png, reading_mm: 1}\n- {image: ./a.png, reading_mm: 2}\n"),
+      AllOf(HasSubstr("s.yaml:5:11: frames[1].image"), HasSubstr("twice")));
+  EXPECT_THAT(ErrorWith("frames: [{image: a.png, reading_cm: 1}]\n"), HasSubstr("wrong unit"));
+  EXPECT_THAT(ErrorWith("frames: [{image: a.png}]\n"), HasSubstr("'reading_mm' is missing"));
+  EXPECT_THAT(ErrorWith("frames: [{image: a.png, reading_mm: nan}]\n"), HasSubstr("finite"));
+  EXPECT_THAT(ErrorWith("frames: []\n"), HasSubstr("s.yaml:3:9: frames: a frame at least"));
+  EXPECT_THAT(ErrorWith(""), HasSubstr("either 'frames'"));
+  EXPECT_THAT(ErrorWith(frames_ + "frames_csv: r.csv\n"), HasSubstr("either 'frames'"));
+  EXPECT_THAT(ErrorWith(frames_ + "frames_dir: x\n"), HasSubstr("goes with 'frames_csv'"));
+  EXPECT_THAT(ErrorWith(frames_ + "frames_glob: x\n"), HasSubstr("goes with 'frames_csv'"));
+  EXPECT_THAT(ErrorWith(frames_ + "offset_cm: 3\n"), HasSubstr("this field is 'offset_mm'"));
+}
+
+TEST_F(SweepFolder, FromAFolderWithItsFramesBelow) {
+  folder_.Put("picam/frames/XP005_Z-1X0Y0@1#1.jpg");
+  folder_.Put("picam/frames/XP005_Z0X0Y0@1#1.jpg");
+  const std::string csv = folder_.Put(
+      "picam/positions.csv", "file,z_raw_mm\nXP005_Z0X0Y0@1#1.jpg,0\nXP005_Z-1X0Y0@1#1.jpg,-1\n");
+  for (const char* name : {"picam", "picam/", "picam/frames"}) {
+    notices_.clear();
+    const SweepFile sweep = SweepFromFolder(folder_ / name, csv, "c.yaml", &notices_);
+    ASSERT_THAT(sweep.frames, SizeIs(2)) << name;
+    EXPECT_EQ(sweep.frames[1].image, folder_ / "picam/frames/XP005_Z-1X0Y0@1#1.jpg");
+    EXPECT_EQ(sweep.frames[1].reading_mm, -1);
+    EXPECT_EQ(sweep.camera_path, "c.yaml");
+    EXPECT_THAT(notices_, ElementsAre(HasSubstr("reading_sigma_mm")));
+  }
+  EXPECT_THAT(ErrorOf([&] { SweepFromFolder(folder_ / "none", csv, "c.yaml", nullptr); }),
+              HasSubstr("no such folder"));
+}
+
+}  // namespace
+}  // namespace thicklens::model
