@@ -43,7 +43,7 @@ function(embed_files root files output)
   file(
     WRITE "${output}"
     "// Made by kernels/embed.cmake.\n"
-    "#include \"opencl_device.h\"\n\n"
+    "#include \"kernels/opencl/opencl_device.h\"\n\n"
     "namespace thicklens::kernels {\n"
     "namespace {\n${arrays}}  // namespace\n\n"
     "const std::vector<EmbeddedFile>& EmbeddedKernelFiles() {\n"

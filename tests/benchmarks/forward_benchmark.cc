@@ -14,9 +14,9 @@
 #include <memory>
 #include <vector>
 
-#include "opencl_device.h"
-#include "opencl_program.h"
-#include "opencl_projection.h"
+#include "kernels/opencl/opencl_device.h"
+#include "kernels/opencl/opencl_program.h"
+#include "kernels/opencl/opencl_projection.h"
 #include "scene_data.h"
 #include "scene_priors.h"
 #include "scene_projection.h"

@@ -1,0 +1,32 @@
+#include "kernels/cpu/filter_loops.h"
+
+#include "kernels/cpu/filter_loops_body.h"
+
+namespace thicklens::kernels {
+
+template <typename Real>
+FilterLoops<Real> PlainFilterLoops() {
+  return LoopsOfThisFile<Real>();
+}
+
+#if defined(__x86_64__)
+bool HasAvx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+#endif
+
+template <typename Real>
+const FilterLoops<Real>& BestFilterLoops() {
+#if defined(__x86_64__)
+  static const FilterLoops<Real> loops =
+      HasAvx2() ? Avx2FilterLoops<Real>() : PlainFilterLoops<Real>();
+#else
+  static const FilterLoops<Real> loops = PlainFilterLoops<Real>();
+#endif
+  return loops;
+}
+
+template FilterLoops<float> PlainFilterLoops();
+template FilterLoops<double> PlainFilterLoops();
+template const FilterLoops<float>& BestFilterLoops();
+template const FilterLoops<double>& BestFilterLoops();
+
+}  // namespace thicklens::kernels

@@ -1,0 +1,67 @@
+#ifndef THICKLENS_KERNELS_CPU_PRIOR_ROWS_H_
+#define THICKLENS_KERNELS_CPU_PRIOR_ROWS_H_
+
+#include <cstddef>
+
+#include "thicklens/kernels/radiance_steps.h"
+
+namespace thicklens::kernels {
+
+// Rows of P x: pull x, and smoothness times the differences, taken back by the transposed ones.
+template <typename Real>
+class PriorRows {
+ public:
+  PriorRows(const QuadraticPrior<Real>& prior, int width_px, int height_px)
+      : pull_(prior.pull.data()),
+        t_(prior.smoothness.empty() ? nullptr : prior.smoothness.data()),
+        width_(width_px),
+        height_(height_px) {}
+
+  // across: room for width + 1 numbers.
+  // In the caller's instructions.
+  inline __attribute__((always_inline)) void Multiply(const Real* plane, int y,
+                                                      Real* __restrict across,
+                                                      Real* __restrict out) const {
+    const std::ptrdiff_t row = std::ptrdiff_t{y} * width_;
+    const Real* x = plane + row;
+    const Real* pull = pull_ + row;
+    for (int i = 0; i < width_; ++i) out[i] = pull[i] * x[i];
+    if (t_ == nullptr) return;
+    const Real* t = t_ + row;
+    across[0] = 0;
+    across[width_] = 0;
+    for (int i = 0; i + 1 < width_; ++i) across[i + 1] = t[i] * (x[i + 1] - x[i]);
+    for (int i = 0; i < width_; ++i) out[i] += across[i] - across[i + 1];
+    if (y + 1 < height_) {
+      for (int i = 0; i < width_; ++i) out[i] += t[i] * (x[i] - x[i + width_]);
+    }
+    if (y > 0) {
+      const Real* above = x - width_;
+      const Real* t_above = t - width_;
+      for (int i = 0; i < width_; ++i) out[i] += t_above[i] * (x[i] - above[i]);
+    }
+  }
+
+  // The smoothness of all differences that a pixel has part in, and its pull.
+  void AddDiagonal(int y, Real* out) const {
+    const Real* pull = pull_ + std::ptrdiff_t{y} * width_;
+    for (int i = 0; i < width_; ++i) out[i] += pull[i];
+    if (t_ == nullptr) return;
+    const Real* t = t_ + std::ptrdiff_t{y} * width_;
+    for (int i = 0; i < width_; ++i) {
+      if (i + 1 < width_) out[i] += t[i];
+      if (i > 0) out[i] += t[i - 1];
+      if (y + 1 < height_) out[i] += t[i];
+      if (y > 0) out[i] += t[i - width_];
+    }
+  }
+
+ private:
+  const Real* pull_;
+  const Real* t_;
+  int width_, height_;
+};
+
+}  // namespace thicklens::kernels
+
+#endif  // THICKLENS_KERNELS_CPU_PRIOR_ROWS_H_

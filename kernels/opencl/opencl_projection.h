@@ -1,0 +1,98 @@
+#ifndef THICKLENS_KERNELS_OPENCL_OPENCL_PROJECTION_H_
+#define THICKLENS_KERNELS_OPENCL_OPENCL_PROJECTION_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "kernels/opencl/opencl_call.h"
+#include "kernels/opencl/opencl_device.h"
+#include "kernels/opencl/packed_map.h"
+#include "thicklens/kernels/radiance_steps.h"
+
+namespace thicklens::kernels {
+
+// How pictures lie on a device: Layout in filter.cl.
+struct PictureLayout {
+  cl_int width_px = 0, height_px = 0, stride_px = 0, plane = 0, margin = 0;
+
+  std::size_t size(int channels) const {
+    return 2 * static_cast<std::size_t>(margin) +
+           static_cast<std::size_t>(plane) * static_cast<std::size_t>(channels);
+  }
+};
+
+// A picture on a device, from planes without gaps and back. What is beside the planes is 0.
+template <typename Real>
+class DevicePicture {
+ public:
+  DevicePicture(OpenClQueue* queue, const std::string& what, const PictureLayout& layout,
+                int channels);
+  // As many planes as there are in `planes`; `beside` is what numbers of a row beyond the picture
+  // become.
+  void Write(const std::vector<Real>& planes, Real beside = 0);
+  std::vector<Real> Read(int channels) const;
+  void Clear() { memory_.Clear(); }
+  const DeviceMemory& memory() const { return memory_; }
+
+ private:
+  PictureLayout layout_;
+  DeviceMemory memory_;
+};
+
+// FilteredMap on a device.
+template <typename Real>
+class OpenClProjection {
+ public:
+  // Up to `channels` planes at once. Of `data` nothing is kept.
+  OpenClProjection(OpenClQueue* queue, const DataTerm<Real>& data, const ItemForm& form);
+
+  const PictureLayout& layout() const { return layout_; }
+  // y = H x, or with a plane of weights W, W H x.
+  void Apply(const DevicePicture<Real>& x, int channels, const DevicePicture<Real>* weight,
+             DevicePicture<Real>* y);
+  void ApplyTransposed(const DevicePicture<Real>& y, int channels, DevicePicture<Real>* x);
+
+ private:
+  struct Filter {
+    int step = 1;
+    DeviceMemory first, start, coefficients;
+  };
+  struct Product {
+    Filter across, down, across_transposed, down_transposed;
+  };
+  struct Rows {
+    int count = 0;
+    DeviceMemory pixel, start, index, weight;
+  };
+  struct Pixels {
+    int count = 0;
+    DeviceMemory pixel;
+  };
+  Filter ToDevice(const PackedFilter<Real>& packed, int step);
+  Rows ToDevice(const PackedRows<Real>& packed);
+  void Run(const Filter& filter, const DevicePicture<Real>& x, int channels,
+           const DevicePicture<Real>* weight, bool add, DevicePicture<Real>* y);
+  void Add(const Rows& rows, const DeviceMemory& values, int channel, int channels,
+           const DevicePicture<Real>* weight, DevicePicture<Real>* y);
+
+  // Four channels of those pixels.
+  void Take(const DevicePicture<Real>& from, int channel, int channels, int count,
+            const DeviceMemory& pixel, const DeviceMemory& to);
+
+  OpenClQueue* queue_;
+  ItemForm form_;
+  PictureLayout layout_;
+  std::vector<Product> products_;
+  std::unique_ptr<Rows> rows_, rows_transposed_;
+  std::unique_ptr<Pixels> read_;  // by rows
+  std::unique_ptr<DevicePicture<Real>> between_;
+  // Four channels beside each other, of the pixels that rows read and of those that have rows.
+  std::unique_ptr<DeviceMemory> of_pixels_, of_rows_;
+};
+
+}  // namespace thicklens::kernels
+
+#endif  // THICKLENS_KERNELS_OPENCL_OPENCL_PROJECTION_H_

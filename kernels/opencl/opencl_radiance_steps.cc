@@ -1,0 +1,293 @@
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "kernels/opencl/opencl_call.h"
+#include "kernels/opencl/opencl_device.h"
+#include "kernels/opencl/opencl_projection.h"
+#include "thicklens/kernels/radiance_steps.h"
+
+namespace thicklens::kernels {
+namespace {
+
+std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
+
+constexpr std::size_t kItemPixels = 16;  // ITEM_PIXELS in radiance.cl
+constexpr std::size_t kSums = 3;         // SUMS
+
+// The steps by the kernels of radiance.cl; what they mean stands there and in radiance_steps.h.
+template <typename Real>
+class OpenClSteps : public RadianceSteps<Real> {
+ public:
+  OpenClSteps(std::unique_ptr<OpenClQueue> queue, const DataTerm<Real>& data, const ItemForm& form,
+              bool sums_are_double)
+      : queue_(std::move(queue)),
+        form_(form),
+        sums_are_double_(sums_are_double),
+        most_channels_(data.channels),
+        pixels_(data.pixels()),
+        projection_(queue_.get(), data, form),
+        layout_(projection_.layout()),
+        sums_(queue_.get(), "sums", SumGroups() * kSums * sizeof(double)) {
+    photograph_.Write(data.photograph);
+    weight_.Write(data.weight);
+    WeighBack(photograph_, data.channels, &right_);
+    // As the twin does: the diagonal, about.
+    other_photograph_.Write(data.squared_row);
+    WeighBack(other_photograph_, 1, &data_diagonal_);
+  }
+
+  void SetPrior(const QuadraticPrior<Real>& prior) override {
+    target_ = prior.target_is_photograph ? Target::kPhotograph
+              : prior.target.empty()     ? Target::kNone
+                                         : Target::kGiven;
+    if (target_ == Target::kGiven) {
+      if (!given_target_) given_target_.emplace(NewPicture("target", most_channels_));
+      given_target_->Write(prior.target);
+    }
+    SetPull(prior.pull);
+    if (prior.smoothness.empty()) {
+      smoothness_.Clear();
+    } else {
+      smoothness_.Write(prior.smoothness);
+    }
+  }
+
+  void SetVariation(const TotalVariation<Real>& variation) override {
+    variation_ = variation;
+    variation_.slope_squared = nullptr;
+    slope_squared_.Write(*variation.slope_squared);
+  }
+
+  void TouchVariation() override {
+    target_ = Target::kNone;
+    if (pull_value_ != variation_.pull) {
+      SetPull(std::vector<Real>(pixels_, static_cast<Real>(variation_.pull)));
+      pull_value_ = variation_.pull;
+    }
+    Call("TouchVariation")
+        .Value(cl_int{channels_})
+        .Value(static_cast<Real>(variation_.strength / 2))
+        .Value(static_cast<Real>(variation_.eps * variation_.eps))
+        .OnDevice(slope_squared_.memory())
+        .OnDevice(x_.memory())
+        .OnDevice(smoothness_.memory())
+        .Enqueue(PlaneItems());
+  }
+
+  void Start(const std::vector<Real>& x) override {
+    channels_ = most_channels_;
+    started_photograph_ = &photograph_;
+    started_right_ = &right_;
+    StartAt(x);
+  }
+
+  void StartFor(const std::vector<Real>& photograph, const std::vector<Real>& x) override {
+    channels_ = 1;
+    other_photograph_.Write(photograph);
+    WeighBack(other_photograph_, 1, &other_right_);
+    started_photograph_ = &other_photograph_;
+    started_right_ = &other_right_;
+    StartAt(x);
+  }
+
+  double SquaredRightSide() override {
+    return RunSums(Call("SquareRightSide")
+                       .Value(cl_int{channels_})
+                       .OnDevice(pull_.memory())
+                       .OnDevice(started_right_->memory())
+                       .Value(cl_int{target_ != Target::kNone})
+                       .OnDevice(TargetPicture().memory()))[0];
+  }
+
+  ResidualSums UpdateResidual() override {
+    const auto sums = RunSums(Call("UpdateResidual")
+                                  .Value(cl_int{channels_})
+                                  .OnDevice(data_diagonal_.memory())
+                                  .OnDevice(pull_.memory())
+                                  .OnDevice(smoothness_.memory())
+                                  .OnDevice(x_.memory())
+                                  .OnDevice(data_residual_.memory())
+                                  .Value(cl_int{target_ != Target::kNone})
+                                  .OnDevice(TargetPicture().memory())
+                                  .OnDevice(inverse_diagonal_.memory())
+                                  .OnDevice(residual_.memory()));
+    return {sums[0], sums[1], sums[2]};
+  }
+
+  double Turn(double beta) override {
+    return RunSums(Call("TurnDirection")
+                       .Value(cl_int{channels_})
+                       .Value(static_cast<Real>(beta))
+                       .OnDevice(inverse_diagonal_.memory())
+                       .OnDevice(residual_.memory())
+                       .OnDevice(direction_.memory()))[0];
+  }
+
+  double Curvature() override {
+    projection_.Apply(direction_, channels_, &weight_, &projected_);
+    projection_.ApplyTransposed(projected_, channels_, &product_);
+    const auto sums = RunSums(Call("MeasureCurvature")
+                                  .Value(cl_int{channels_})
+                                  .OnDevice(pull_.memory())
+                                  .OnDevice(smoothness_.memory())
+                                  .OnDevice(direction_.memory())
+                                  .OnDevice(product_.memory()));
+    return sums[0] + sums[1];
+  }
+
+  void Advance(double step) override {
+    AddScaled(step, direction_, &x_);
+    AddScaled(-step, product_, &data_residual_);
+  }
+
+  std::vector<Real> Radiance() override { return x_.Read(channels_); }
+
+  std::vector<Real> Project(const std::vector<Real>& x) override {
+    const int channels = static_cast<int>(x.size() / pixels_);
+    product_.Write(x);
+    projection_.Apply(product_, channels, nullptr, &projected_);
+    return projected_.Read(channels);
+  }
+
+  std::vector<Real> ProjectTransposed(const std::vector<Real>& y) override {
+    const int channels = static_cast<int>(y.size() / pixels_);
+    projected_.Write(y);
+    projection_.ApplyTransposed(projected_, channels, &product_);
+    return product_.Read(channels);
+  }
+
+ private:
+  enum class Target { kNone, kPhotograph, kGiven };
+
+  // Without one, any.
+  const DevicePicture<Real>& TargetPicture() const {
+    return target_ == Target::kGiven ? *given_target_ : *started_photograph_;
+  }
+
+  std::size_t PlaneItems() const { return Index(layout_.plane / form_.lanes); }
+  std::size_t SumItems() const { return (Index(layout_.plane) + kItemPixels - 1) / kItemPixels; }
+  std::size_t SumGroups() { return OpenClCall(queue_.get(), "UpdateResidual").Groups(SumItems()); }
+
+  OpenClCall Call(const char* kernel) {
+    OpenClCall call(queue_.get(), kernel);
+    call.Value(layout_);
+    return call;
+  }
+
+  DevicePicture<Real> NewPicture(const char* what, int channels) {
+    return DevicePicture<Real>(queue_.get(), what, layout_, channels);
+  }
+
+  // 1 beside the picture, so that the preconditioner is a number there.
+  void SetPull(const std::vector<Real>& pull) {
+    pull_.Write(pull, 1);
+    pull_value_ = std::nan("");
+  }
+
+  // to = H^T W picture.
+  void WeighBack(const DevicePicture<Real>& picture, int channels, DevicePicture<Real>* to) {
+    Call("MultiplyPlanes")
+        .Value(cl_int{channels})
+        .OnDevice(weight_.memory())
+        .OnDevice(picture.memory())
+        .OnDevice(projected_.memory())
+        .Enqueue(PlaneItems());
+    projection_.ApplyTransposed(projected_, channels, to);
+  }
+
+  void AddScaled(double scale, const DevicePicture<Real>& x, DevicePicture<Real>* y) {
+    Call("AddScaled")
+        .Value(cl_int{channels_})
+        .Value(static_cast<Real>(scale))
+        .OnDevice(x.memory())
+        .OnDevice(y->memory())
+        .Enqueue(PlaneItems() * Index(channels_));
+  }
+
+  void StartAt(const std::vector<Real>& x) {
+    x_.Write(x);
+    data_residual_.Clear();
+    residual_.Clear();
+    direction_.Clear();
+    AddScaled(1, *started_right_, &data_residual_);
+    projection_.Apply(x_, channels_, &weight_, &projected_);
+    projection_.ApplyTransposed(projected_, channels_, &product_);
+    AddScaled(-1, product_, &data_residual_);
+  }
+
+  // Runs a kernel whose last argument is the sums of its groups, and adds these.
+  std::array<double, kSums> RunSums(OpenClCall& call) {
+    call.OnDevice(sums_).Enqueue(SumItems());
+    return sums_are_double_ ? Added<double>() : Added<float>();
+  }
+  template <typename Number>
+  std::array<double, kSums> Added() {
+    std::vector<Number> of_group(sums_.bytes() / sizeof(Number));
+    sums_.Read(of_group.data());
+    std::array<double, kSums> sums{};
+    const std::size_t count = SumGroups() * kSums;  // not anew for each number: it is looked up
+    for (std::size_t i = 0; i < count; ++i) {
+      sums[i % kSums] += static_cast<double>(of_group[i]);
+    }
+    return sums;
+  }
+
+  const std::unique_ptr<OpenClQueue> queue_;
+  const ItemForm form_;
+  const bool sums_are_double_;
+  const int most_channels_;
+  const std::size_t pixels_;
+  OpenClProjection<Real> projection_;
+  const PictureLayout layout_;
+  DeviceMemory sums_;
+  DevicePicture<Real> photograph_ = NewPicture("photograph", most_channels_);
+  DevicePicture<Real> weight_ = NewPicture("weights", 1);
+  DevicePicture<Real> right_ = NewPicture("right side", most_channels_);
+  DevicePicture<Real> other_photograph_ = NewPicture("probe", 1);
+  DevicePicture<Real> other_right_ = NewPicture("right side of a probe", 1);
+  DevicePicture<Real> data_diagonal_ = NewPicture("diagonal", 1);
+  DevicePicture<Real> inverse_diagonal_ = NewPicture("preconditioner", 1);
+  DevicePicture<Real> pull_ = NewPicture("pull", 1);
+  DevicePicture<Real> smoothness_ = NewPicture("smoothness", 1);
+  DevicePicture<Real> slope_squared_ = NewPicture("slopes", 1);
+  DevicePicture<Real> x_ = NewPicture("radiance", most_channels_);
+  DevicePicture<Real> data_residual_ = NewPicture("residual of the data", most_channels_);
+  DevicePicture<Real> residual_ = NewPicture("residual", most_channels_);
+  DevicePicture<Real> direction_ = NewPicture("direction", most_channels_);
+  DevicePicture<Real> product_ = NewPicture("product", most_channels_);
+  DevicePicture<Real> projected_ = NewPicture("projected picture", most_channels_);
+
+  TotalVariation<Real> variation_;
+  double pull_value_ = std::nan("");  // of all pixels alike; NaN: they are not
+  Target target_ = Target::kNone;
+  std::optional<DevicePicture<Real>> given_target_;
+  int channels_ = 1;
+  const DevicePicture<Real>* started_photograph_ = nullptr;
+  const DevicePicture<Real>* started_right_ = nullptr;
+};
+
+}  // namespace
+
+template <typename Real>
+std::unique_ptr<RadianceSteps<Real>> NewOpenClSteps(std::shared_ptr<const OpenClDevice> device,
+                                                    const cl::Program& program,
+                                                    const DataTerm<Real>& data) {
+  const ItemForm form = FormOf(*device, sizeof(Real));
+  const bool sums_are_double = device->has_double;
+  return std::make_unique<OpenClSteps<Real>>(
+      std::make_unique<OpenClQueue>(std::move(device), program, HostMemory::kCopied), data, form,
+      sums_are_double);
+}
+template std::unique_ptr<RadianceSteps<float>> NewOpenClSteps(std::shared_ptr<const OpenClDevice>,
+                                                              const cl::Program&,
+                                                              const DataTerm<float>&);
+template std::unique_ptr<RadianceSteps<double>> NewOpenClSteps(std::shared_ptr<const OpenClDevice>,
+                                                               const cl::Program&,
+                                                               const DataTerm<double>&);
+
+}  // namespace thicklens::kernels

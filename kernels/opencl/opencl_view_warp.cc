@@ -1,0 +1,158 @@
+// Views on a device: warp.cl.
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "kernels/opencl/opencl_call.h"
+#include "kernels/opencl/opencl_device.h"
+#include "kernels/reference/warp_arguments.h"
+#include "thicklens/kernels/view_warp.h"
+
+namespace thicklens::kernels {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+constexpr int kBefore = 1, kAfter = 2;  // pixels of a border that are repeated
+constexpr int kFour = 4;                // channels of a pixel read at once, of more than one
+
+// Surfaces in warp.cl.
+struct SurfacesArgument {
+  cl_int width_px, height_px, channels;
+  cl_float tolerance, limit_px;
+};
+
+// The pixels of a picture as warp.cl has them.
+std::vector<float> PixelsOf(const SurfacePicture& picture) {
+  const int of_pixel = picture.channels == 1 ? 1 : kFour;
+  const int planes = (picture.channels + of_pixel - 1) / of_pixel;
+  std::vector<float> pixels(Index(picture.width_px + kBefore + kAfter) *
+                            Index(picture.height_px + kBefore + kAfter) * Index(of_pixel) *
+                            Index(planes));
+  float* to = pixels.data();
+  for (int plane = 0; plane < planes; ++plane) {
+    const int first = plane * of_pixel;
+    const int count = std::min(of_pixel, picture.channels - first);
+    for (int y = -kBefore; y < picture.height_px + kAfter; ++y) {
+      const std::size_t row =
+          Index(std::clamp(y, 0, picture.height_px - 1)) * Index(picture.width_px);
+      for (int x = -kBefore; x < picture.width_px + kAfter; ++x, to += of_pixel) {
+        const std::size_t pixel = row + Index(std::clamp(x, 0, picture.width_px - 1));
+        std::copy_n(picture.values->data() + pixel * Index(picture.channels) + first, count, to);
+      }
+    }
+  }
+  return pixels;
+}
+
+// The shift of a view in floats, and what they leave of it, so that a device without double finds
+// the sources to the last digit of a float, as the twin does. A product with what is larger than
+// the bound is outside of any picture.
+cl_float4 ShiftOf(const ViewSources& view) {
+  constexpr double kBound = 1e30;
+  const double x = std::clamp(view.shift_x, -kBound, kBound);
+  const double y = std::clamp(view.shift_y, -kBound, kBound);
+  const auto float_x = static_cast<float>(x), float_y = static_cast<float>(y);
+  return {{float_x, float_y, static_cast<float>(x - float_x), static_cast<float>(y - float_y)}};
+}
+
+static_assert(sizeof(HiddenSample) == 16, "Hidden in warp.cl");
+static_assert(sizeof(MixedSample) == 24, "Mixed in warp.cl");
+
+// Least, largest, pixel by pixel.
+std::vector<float> PairsOf(const TapRanges& ranges) {
+  std::vector<float> pairs;
+  pairs.reserve(2 * ranges.lowest.size());
+  for (std::size_t i = 0; i < ranges.lowest.size(); ++i) {
+    pairs.insert(pairs.end(), {ranges.lowest[i], ranges.highest[i]});
+  }
+  return pairs;
+}
+
+class OpenClWarp : public ViewWarp {
+ public:
+  OpenClWarp(std::unique_ptr<OpenClQueue> queue, const SurfacePicture& picture,
+             const TapRanges& ranges, int lanes)
+      : queue_(std::move(queue)),
+        lanes_(lanes),
+        picture_(picture),
+        pixels_(Copied(queue_.get(), "picture of surfaces", PixelsOf(picture))),
+        disparity_(Copied(queue_.get(), "disparity of a picture", *picture.disparity)),
+        ranges_(Copied(queue_.get(), "ranges of disparities", PairsOf(ranges))) {
+    queue_->Finish();  // the queues that read the picture know nothing of this one's order
+  }
+
+  void Warp(const ViewSources& view, std::vector<float>* values) override {
+    CheckView(picture_, view);
+    const SurfacesArgument surfaces{picture_.width_px, picture_.height_px, picture_.channels,
+                                    picture_.tolerance,
+                                    static_cast<cl_float>(picture_.width_px + picture_.height_px)};
+    // In place of an empty list, which OpenCL cannot have.
+    const std::vector<HiddenSample> no_sample(1);
+    const std::vector<HiddenSample>& hidden = view.hidden->empty() ? no_sample : *view.hidden;
+    const auto hidden_count = static_cast<int>(view.hidden->size());
+    values->resize(picture_.values->size());
+    std::unique_ptr<OpenClQueue> queue = TakeQueue();
+    DeviceArray made(queue.get(), "view", values->data(), values->size() * sizeof(float),
+                     DeviceArray::Holds::kNothing);
+    OpenClCall(queue.get(), "WarpView")
+        .Value(surfaces)
+        .OnDevice(pixels_)
+        .OnDevice(disparity_)
+        .OnDevice(ranges_)
+        .Input("disparity of a view", *view.disparity)
+        .Value(ShiftOf(view))
+        .Input("hidden samples of a view", hidden)
+        .Value(static_cast<cl_int>(hidden_count))
+        .OnDevice(made)
+        .Enqueue(ItemsOf(picture_.width_px) * Index(picture_.height_px) + ItemsOf(hidden_count));
+    if (view.mixed != nullptr && !view.mixed->empty()) {
+      OpenClCall(queue.get(), "MixSamples")
+          .Value(surfaces)
+          .OnDevice(pixels_)
+          .OnDevice(disparity_)
+          .Input("mixed samples of a view", *view.mixed)
+          .Value(static_cast<cl_int>(view.mixed->size()))
+          .OnDevice(made)
+          .Enqueue(view.mixed->size());
+    }
+    made.BringHome();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    spare_queues_.push_back(std::move(queue));
+  }
+
+ private:
+  // Each thread in here has a queue, so that the device computes a view while another waits to be
+  // told of the last one: of small views that is most of the time.
+  std::unique_ptr<OpenClQueue> TakeQueue() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (spare_queues_.empty()) return queue_->Clone();
+    std::unique_ptr<OpenClQueue> queue = std::move(spare_queues_.back());
+    spare_queues_.pop_back();
+    return queue;
+  }
+  std::size_t ItemsOf(int samples) const { return Index((samples + lanes_ - 1) / lanes_); }
+
+  const std::unique_ptr<OpenClQueue> queue_;  // by which the picture came
+  const int lanes_;                           // samples of an item
+  const SurfacePicture picture_;
+  const DeviceMemory pixels_, disparity_, ranges_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<OpenClQueue>> spare_queues_;
+};
+
+}  // namespace
+
+std::unique_ptr<ViewWarp> NewOpenClWarp(std::shared_ptr<const OpenClDevice> device,
+                                        const cl::Program& program, const SurfacePicture& picture) {
+  const TapRanges ranges = TapRangesOf(picture);
+  const HostMemory memory = HostMemoryOf(*device);
+  const int lanes = FormOf(*device, sizeof(float)).lanes;
+  return std::make_unique<OpenClWarp>(
+      std::make_unique<OpenClQueue>(std::move(device), program, memory), picture, ranges, lanes);
+}
+
+}  // namespace thicklens::kernels

@@ -1,0 +1,245 @@
+// A picture read for a view, plainly; warp.cl does the same.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "kernels/reference/warp_arguments.h"
+#include "thicklens/base/error.h"
+#include "thicklens/kernels/view_warp.h"
+
+namespace thicklens::kernels {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+std::size_t PixelsOf(const SurfacePicture& picture) {
+  return Index(picture.width_px) * Index(picture.height_px);
+}
+
+// A place on a line of pixels: the pixel before it, and the rest of the way to the next, < 1.
+struct Place {
+  int pixel = 0;
+  float rest = 0;
+};
+// `limit_px`: more than the line is long.
+Place PlaceAt(int sample, float source, int count, float limit_px) {
+  const float way = std::clamp(source, -limit_px, limit_px);
+  const float below = std::floor(way);
+  const int at = sample + static_cast<int>(below);
+  const int pixel = std::clamp(at, 0, count - 1);
+  return {pixel, at == pixel && at < count - 1 ? way - below : 0.0F};
+}
+
+// Of the pixels at -1, 0, 1 and 2; of Catmull and Rom.
+std::array<float, 4> CatmullRom(float t) {
+  return {((-0.5F * t + 1) * t - 0.5F) * t, (1.5F * t - 2.5F) * t * t + 1,
+          ((-1.5F * t + 2) * t + 0.5F) * t, (0.5F * t - 0.5F) * t * t};
+}
+
+class ReferenceWarp : public ViewWarp {
+ public:
+  explicit ReferenceWarp(const SurfacePicture& picture)
+      : picture_(picture), ranges_(TapRangesOf(picture)) {}
+
+  void Warp(const ViewSources& view, std::vector<float>* values) override {
+    CheckView(picture_, view);
+    values->resize(picture_.values->size());
+    for (std::size_t i = 0; i < view.disparity->size(); ++i) {
+      const float disparity = (*view.disparity)[i];
+      if (std::isnan(disparity)) continue;
+      ReadSample(i, static_cast<float>(view.shift_x * disparity),
+                 static_cast<float>(view.shift_y * disparity), disparity, values);
+    }
+    for (const HiddenSample& hidden : *view.hidden) {
+      ReadSample(Index(hidden.index), hidden.source_x, hidden.source_y, hidden.disparity, values);
+    }
+    if (view.mixed == nullptr) return;
+    for (const MixedSample& mixed : *view.mixed) MixInto(mixed, values);
+  }
+
+ private:
+  void ReadSample(std::size_t sample, float source_x, float source_y, float disparity,
+                  std::vector<float>* values) const {
+    const SourcePlace source = PlaceOf(sample, source_x, source_y);
+    const Place &across = source.across, &down = source.down;
+    const std::size_t there = At(across.pixel, down.pixel);
+    const bool cubic = IsOnSurface(ranges_.lowest[there], disparity) &&
+                       IsOnSurface(ranges_.highest[there], disparity);
+    for (int channel = 0; channel < picture_.channels; ++channel) {
+      (*values)[sample * Index(picture_.channels) + Index(channel)] =
+          cubic ? Cubic(across, down, channel) : Linear(across, down, disparity, channel);
+    }
+  }
+
+  void MixInto(const MixedSample& mixed, std::vector<float>* values) const {
+    const std::size_t sample = Index(mixed.index);
+    const SourcePlace source = PlaceOf(sample, mixed.other.source_x, mixed.other.source_y);
+    for (int channel = 0; channel < picture_.channels; ++channel) {
+      float& value = (*values)[sample * Index(picture_.channels) + Index(channel)];
+      const float other = Linear(source.across, source.down, mixed.other.disparity, channel);
+      value += mixed.share * (other - value);
+    }
+  }
+
+  struct SourcePlace {
+    Place across, down;
+  };
+  SourcePlace PlaceOf(std::size_t sample, float source_x, float source_y) const {
+    const auto limit_px = static_cast<float>(picture_.width_px + picture_.height_px);
+    const int x = static_cast<int>(sample % Index(picture_.width_px));
+    const int y = static_cast<int>(sample / Index(picture_.width_px));
+    return {PlaceAt(x, source_x, picture_.width_px, limit_px),
+            PlaceAt(y, source_y, picture_.height_px, limit_px)};
+  }
+
+  std::size_t At(int x, int y) const {
+    return Index(std::clamp(y, 0, picture_.height_px - 1)) * Index(picture_.width_px) +
+           Index(std::clamp(x, 0, picture_.width_px - 1));
+  }
+  float ValueAt(int x, int y, int channel) const {
+    return (*picture_.values)[At(x, y) * Index(picture_.channels) + Index(channel)];
+  }
+  bool IsOnSurface(float there, float disparity) const {
+    return std::abs(there - disparity) <= picture_.tolerance;
+  }
+
+  float Cubic(const Place& across, const Place& down, int channel) const {
+    const std::array<float, 4> weight_x = CatmullRom(across.rest);
+    const std::array<float, 4> weight_y = CatmullRom(down.rest);
+    float sum = 0;
+    for (int j = 0; j < 4; ++j) {
+      float row = 0;
+      for (int i = 0; i < 4; ++i) {
+        row += weight_x[Index(i)] * ValueAt(across.pixel - 1 + i, down.pixel - 1 + j, channel);
+      }
+      sum += weight_y[Index(j)] * row;
+    }
+    return sum;
+  }
+
+  float Linear(const Place& across, const Place& down, float disparity, int channel) const {
+    float sum = 0, sum_of_weights = 0, closest_value = 0;
+    float closest = std::numeric_limits<float>::infinity();
+    for (int j = 0; j < 2; ++j) {
+      for (int i = 0; i < 2; ++i) {
+        const float weight =
+            (i == 0 ? 1 - across.rest : across.rest) * (j == 0 ? 1 - down.rest : down.rest);
+        if (weight == 0) continue;  // perhaps outside of the picture
+        const int x = across.pixel + i, y = down.pixel + j;
+        const float there = (*picture_.disparity)[At(x, y)];
+        if (std::abs(there - disparity) < closest) {
+          closest = std::abs(there - disparity);
+          closest_value = ValueAt(x, y, channel);
+        }
+        if (!IsOnSurface(there, disparity)) continue;
+        sum_of_weights += weight;
+        sum += weight * ValueAt(x, y, channel);
+      }
+    }
+    return sum_of_weights > 0 ? sum / sum_of_weights : closest_value;
+  }
+
+  const SurfacePicture picture_;
+  const TapRanges ranges_;
+};
+
+void CheckCount(const char* what, const std::vector<float>* numbers, std::size_t count) {
+  if (numbers != nullptr && numbers->size() == count) return;
+  throw Error(fmt::format("{}: {} numbers: there must be {}", what,
+                          numbers == nullptr ? 0 : numbers->size(), count));
+}
+
+}  // namespace
+
+void CheckPicture(const SurfacePicture& picture) {
+  if (picture.width_px < 1 || picture.height_px < 1 || picture.channels < 1) {
+    throw Error(fmt::format("picture of surfaces: {}x{} px in {} channels: each must be >= 1",
+                            picture.width_px, picture.height_px, picture.channels));
+  }
+  CheckCount("picture of surfaces", picture.values, PixelsOf(picture) * Index(picture.channels));
+  CheckCount("disparity of a picture", picture.disparity, PixelsOf(picture));
+  if (!(picture.tolerance >= 0)) {
+    throw Error(fmt::format("tolerance of a surface is {}: it must be >= 0", picture.tolerance));
+  }
+}
+
+namespace {
+
+void CheckMixed(const std::vector<MixedSample>& mixed, std::size_t pixels) {
+  std::int32_t before = -1;  // else two items of a device would write one sample
+  for (const MixedSample& one : mixed) {
+    if (one.index <= before || Index(one.index) >= pixels) {
+      throw Error(
+          fmt::format("mixed sample of a view has the index {} after {}: indices must grow "
+                      "from 0 to {} at most",
+                      one.index, before, pixels - 1));
+    }
+    before = one.index;
+    if (one.share >= 0 && one.share <= 1) continue;
+    throw Error(fmt::format("mixed sample {} of a view has the share {}: it must be 0 to 1",
+                            one.index, one.share));
+  }
+}
+
+}  // namespace
+
+void CheckView(const SurfacePicture& picture, const ViewSources& view) {
+  CheckCount("disparity of a view", view.disparity, PixelsOf(picture));
+  for (const double shift : {view.shift_x, view.shift_y}) {
+    if (std::isfinite(shift)) continue;
+    throw Error(fmt::format("shift of a view is {}: it must be finite", shift));
+  }
+  if (view.hidden == nullptr) throw Error("hidden samples of a view: there must be a list");
+  for (const HiddenSample& hidden : *view.hidden) {
+    if (!(hidden.index >= 0 && Index(hidden.index) < PixelsOf(picture))) {
+      throw Error(fmt::format("hidden sample of a view has the index {}: it must be 0 to {}",
+                              hidden.index, PixelsOf(picture) - 1));
+    }
+    // Else two items of a device would write it.
+    const float seen = (*view.disparity)[Index(hidden.index)];
+    if (std::isnan(seen)) continue;
+    throw Error(
+        fmt::format("hidden sample {} of a view is of disparity {} among those that are "
+                    "seen: it must be NaN there",
+                    hidden.index, seen));
+  }
+  if (view.mixed != nullptr) CheckMixed(*view.mixed, PixelsOf(picture));
+}
+
+TapRanges TapRangesOf(const SurfacePicture& picture) {
+  CheckPicture(picture);
+  const int width = picture.width_px, height = picture.height_px;
+  TapRanges ranges{std::vector<float>(PixelsOf(picture)), std::vector<float>(PixelsOf(picture))};
+  const auto row_at = [&](int y) {
+    return picture.disparity->data() + Index(std::clamp(y, 0, height - 1)) * Index(width);
+  };
+  // Of the four pixels in each column, then of four columns.
+  std::vector<float> lowest(Index(width)), highest(Index(width));
+  for (int y = 0; y < height; ++y) {
+    const float* const rows[] = {row_at(y - 1), row_at(y), row_at(y + 1), row_at(y + 2)};
+    for (std::size_t x = 0; x < Index(width); ++x) {
+      lowest[x] = std::min({rows[0][x], rows[1][x], rows[2][x], rows[3][x]});
+      highest[x] = std::max({rows[0][x], rows[1][x], rows[2][x], rows[3][x]});
+    }
+    for (int x = 0; x < width; ++x) {
+      const std::size_t i = Index(y) * Index(width) + Index(x);
+      const std::size_t before = Index(std::max(x - 1, 0));
+      const std::size_t next = Index(std::min(x + 1, width - 1));
+      const std::size_t last = Index(std::min(x + 2, width - 1));
+      ranges.lowest[i] = std::min({lowest[before], lowest[Index(x)], lowest[next], lowest[last]});
+      ranges.highest[i] =
+          std::max({highest[before], highest[Index(x)], highest[next], highest[last]});
+    }
+  }
+  return ranges;
+}
+
+std::unique_ptr<ViewWarp> NewReferenceWarp(const SurfacePicture& picture) {
+  return std::make_unique<ReferenceWarp>(picture);
+}
+
+}  // namespace thicklens::kernels

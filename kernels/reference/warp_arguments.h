@@ -1,0 +1,21 @@
+#ifndef THICKLENS_KERNELS_REFERENCE_WARP_ARGUMENTS_H_
+#define THICKLENS_KERNELS_REFERENCE_WARP_ARGUMENTS_H_
+
+#include "thicklens/kernels/view_warp.h"
+
+namespace thicklens::kernels {
+
+// Throw Error for sizes and indices that do not fit.
+void CheckPicture(const SurfacePicture& picture);
+void CheckView(const SurfacePicture& picture, const ViewSources& view);
+
+// The 4 x 4 pixels at -1 to 2 around each pixel, cut to the picture: the least and the largest of
+// their disparities.
+struct TapRanges {
+  std::vector<float> lowest, highest;
+};
+TapRanges TapRangesOf(const SurfacePicture& picture);
+
+}  // namespace thicklens::kernels
+
+#endif  // THICKLENS_KERNELS_REFERENCE_WARP_ARGUMENTS_H_
