@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "blur_fit.h"
+#include "calib/fit/blur_fit.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::testing {

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "calib/simulated_sweep.h"
+#include "tests/calib/simulated_sweep.h"
 
 // What goes wrong on a bench, done to a simulated sweep.
 namespace thicklens::testing {

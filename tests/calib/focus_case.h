@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "blur_samples.h"
-#include "focus_solution.h"
+#include "calib/calibrate/focus_solution.h"
+#include "tests/calib/blur_samples.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::testing {

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "blur_measurement.h"
-#include "frame_store.h"
-#include "simulated_sweep.h"
+#include "calib/fit/blur_measurement.h"
+#include "calib/sweep/frame_store.h"
+#include "tests/calib/simulated_sweep.h"
 
 namespace thicklens::testing {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "calib/simulated_sweep.h"
+#include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/estimator/render.h"
 

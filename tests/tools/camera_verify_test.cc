@@ -1,5 +1,5 @@
 // thicklens camera verify: whether a stored calibration still holds. The statistics by hand:
-// tests/calib/verification_test.cc.
+// tests/calib/calibrate/verification_test.cc.
 #include "camera_verify.h"
 
 #include <fmt/format.h>

@@ -6,7 +6,7 @@
 #include <functional>
 #include <iostream>
 
-#include "calib/damaged_sweep.h"
+#include "tests/calib/damaged_sweep.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::accuracy {

@@ -6,7 +6,7 @@
 #include <exception>
 #include <regex>
 
-#include "calib/simulated_sweep.h"
+#include "tests/calib/simulated_sweep.h"
 
 namespace thicklens::accuracy {
 namespace {

@@ -1,0 +1,520 @@
+#include "thicklens/calib/calibrate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <set>
+
+#include "calib/calibrate/focus_solution.h"
+#include "calib/fit/blur_measurement.h"
+#include "calib/fit/source_recipe.h"
+#include "calib/registration/change_of_reference.h"
+#include "calib/registration/frame_structure.h"
+#include "calib/registration/radial_causes.h"
+#include "calib/registration/reading_gates.h"
+#include "calib/registration/scale_causes.h"
+#include "calib/registration/scale_tracking.h"
+#include "calib/sharpness/sharpest_reading.h"
+#include "calib/sharpness/sharpness_peak.h"
+#include "calib/sweep/frame_selection.h"
+#include "calib/sweep/frame_store.h"
+#include "calib/uncertainty/calibration_checks.h"
+#include "calib/uncertainty/field_map.h"
+#include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/calib/edge_blur.h"
+#include "thicklens/calib/sharpness.h"
+#include "thicklens/model/pupil_law.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kZeroReach = 2;    // standard deviations of a zero that contradicts another
+constexpr double kZeroMoves = 0.1;  // of the zero's standard deviation, and what moves it matters
+constexpr double kFewRegistered = 0.8;  // of the used frames: below, the light may be the reason
+
+class Calibrator {
+ public:
+  Calibrator(const FocusSweep& sweep, const CalibrationOptions& options)
+      : sweep_(sweep), options_(options), store_(sweep), result_(Begun(sweep)) {
+    total_steps_ = 4 * static_cast<int>(sweep.frames.size());
+  }
+
+  Calibration Run() {
+    const auto begin = std::chrono::steady_clock::now();
+    std::string why;
+    if (!HasEnoughFrames(sweep_, &why)) {
+      Refuse(why);
+    } else if (RegionSidePx(sweep_) < kSmallestRegionPx) {
+      Refuse(RegionAdvice(sweep_));
+    } else {
+      Measure();
+    }
+    result_.frames_used =
+        result_.blur.done ? result_.blur.frames_used : static_cast<int>(used().size());
+    result_.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return std::move(result_);
+  }
+
+ private:
+  static Calibration Begun(const FocusSweep& sweep) {
+    Calibration result;
+    for (const model::SweepFrame& frame : sweep.frames) {
+      FrameMeasurement measurement;
+      measurement.image = frame.image;
+      measurement.reading_mm = frame.reading_mm;
+      result.frames.push_back(measurement);
+    }
+    return result;
+  }
+
+  bool Refuse(const std::string& reason) {
+    result_.outcome = Outcome::kRefused;
+    result_.reason = reason;
+    return false;
+  }
+  // Of a gate: whether it let enough frames pass.
+  bool Passed(const std::optional<std::string>& refusal) { return !refusal || Refuse(*refusal); }
+
+  void Measure() {
+    const bool needs_scale = options_.fit_blur || !sweep_.offset_mm;
+    if (MeasureAndGate() && MeasureSharpness() && (needs_scale ? FindDepths() : BelieveDepths())) {
+      result_.source = RunSourceRecipe(sweep_.camera, result_.frames, used());
+      FitPeak();
+      if (options_.fit_blur) {
+        MeasureAndSolve();
+      } else {
+        EndBeforeFit();
+      }
+    }
+    FindSharpest();
+    NamePlainCause();
+  }
+
+  // Even of a sweep that is refused, from the frames that the gates of light let pass.
+  void FindSharpest() {
+    const SharpestReading found = FindSharpestReading(result_.frames, used());
+    if (found.done || !result_.sharpest.done) result_.sharpest = found;
+  }
+
+  void LookForStructure(const std::vector<ScaleSample>& samples) {
+    if (result_.structure.measured) return;
+    result_.structure =
+        MeasureStructure({sweep_, [this](std::size_t frame) { return Grey(frame); }, used(),
+                          samples, RegionCentre(sweep_), [this] { Tick(); }});
+  }
+
+  void EndBeforeFit() {
+    result_.outcome = Outcome::kPartial;
+    result_.reason = "the blur was not to be fitted";
+  }
+
+  // What the frames that are left fail for is often only the consequence of something plainer.
+  void NamePlainCause() {
+    const std::string exposure =
+        ExposureAdvice(result_.frames, [this] { return store_.Stored(0).depth() == CV_16U; });
+    if (result_.outcome != Outcome::kRefused) {
+      if (!exposure.empty())
+        result_.warnings.insert(result_.warnings.begin(),
+                                exposure + "; the results come from the others alone");
+      return;
+    }
+    for (const std::string& cause :
+         {exposure, RegionAdvice(sweep_),
+          UnitAdvice(sweep_, result_.frames, result_.scale, causes_),
+          RegistrationAdvice(sweep_, result_.frames, used(), result_.scale, result_.structure)}) {
+      if (cause.empty()) continue;
+      // What is missing because of the light is not to be advised on.
+      result_.reason = cause == exposure ? cause : cause + "; as it is, " + result_.reason;
+      return;
+    }
+  }
+
+  const std::vector<std::size_t>& used() const { return selection_.used(); }
+
+  void Tick() {
+    if (!options_.progress) return;
+    const std::lock_guard<std::mutex> lock(progress_mutex_);
+    if (!options_.progress(std::min(++steps_done_, total_steps_), total_steps_))
+      throw Interrupted();
+  }
+
+  template <typename Work>
+  void ForEachUsed(const Work& work) {
+    ParallelFor(static_cast<int>(used().size()), options_.threads, [&](int i) {
+      work(used()[static_cast<std::size_t>(i)]);
+      Tick();
+    });
+  }
+
+  cv::Mat Grey(std::size_t frame) { return store_.Grey(frame); }
+
+  // Absolute gates on every frame, then the blank gate against the median of those that passed.
+  bool MeasureAndGate() {
+    ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
+      const auto index = static_cast<std::size_t>(i);
+      result_.frames[index].statistics =
+          MeasureFrame(RegionOf(store_.Stored(index), sweep_, index), store_.Grey(index));
+      Tick();
+    });
+    GateOptions gates = options_.gates;
+    gates.edge_target |= sweep_.target == model::SweepTarget::kKnifeEdge;
+    return Passed(selection_.KeepMeasurable(gates));
+  }
+
+  bool MeasureSharpness() {
+    double steepest = 0, steepest_relative = 0;
+    for (const std::size_t i : used()) {
+      const FrameStatistics& s = result_.frames[i].statistics;
+      steepest = std::max(steepest, s.top_gradient);
+      steepest_relative = std::max(steepest_relative, s.top_gradient / s.mean_linear);
+    }
+    ForEachUsed([&](std::size_t i) {
+      FrameMeasurement& frame = result_.frames[i];
+      const cv::Mat grey = Grey(i);
+      const double mean = frame.statistics.mean_linear;
+      const std::vector<SharpnessIndex> indices = MeanEdgeSlopes(
+          grey, {}, {kEdgeThreshold * steepest, kEdgeThreshold * steepest_relative * mean});
+      frame.mean_edge_slope = indices[0].mean_edge_slope;
+      frame.normalised_edge_slope = indices[1].mean_edge_slope / mean;
+      frame.edge_count = indices[1].edge_count;
+      if (const auto blur = MeasureSourceEdgeBlur(grey))
+        frame.source_blur_sigma_px = blur->sigma_px;
+    });
+    reference_ = SharpestUsed();
+    if (!Passed(selection_.KeepThoseWithEdges())) return false;
+    FindSharpest();
+    return true;
+  }
+
+  std::size_t SharpestUsed() const {
+    return *std::max_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
+      return result_.frames[a].normalised_edge_slope < result_.frames[b].normalised_edge_slope;
+    });
+  }
+
+  // The bench zero, given or from the image scale; then every frame's depth.
+  bool FindDepths() {
+    std::optional<double> known_mm;
+    if (sweep_.offset_mm) known_mm = sweep_.offset_mm->value;
+    std::vector<ScaleSample> samples = TrackScale(
+        sweep_, [this](std::size_t frame) { return Grey(frame); }, used(), reference_, known_mm,
+        options_.threads, [this] { Tick(); });
+    result_.scale = FitScaleLaw(samples, static_cast<int>(reference_), sweep_.reading_sigma_mm,
+                                sweep_.direction, RegionCornerRadiusPx(sweep_));
+    ReckonWithFalloff(kUsualRatio, result_.scale.reference_depth_mm, &result_.scale);
+    const bool is_lone_edge = IsLoneEdge(sweep_, used().size(), samples.size(), result_.scale);
+    if (is_lone_edge) ForgetScales(sweep_, &samples, &result_.scale);
+    for (const ScaleSample& sample : samples) {
+      if (sample.scale_is_from_reading) continue;
+      result_.frames[sample.frame].image_scale = sample.scale;
+      result_.frames[sample.frame].image_scale_sigma = sample.registration.scale_sigma;
+    }
+    if (!is_lone_edge && !ScalesAllowAResult(samples)) return false;
+    if (const auto reason = ReasonAgainstScales(sweep_, result_.frames, used(), result_.scale))
+      return Refuse(*reason);
+    RejectUnregistered(samples, used(), reference_, result_.scale, result_.structure,
+                       &result_.frames);
+    WarnOfBands(samples.size());
+    RejectWrongReadings(sweep_, samples, result_.scale, &result_.frames);
+    if (!Passed(selection_.KeepUnrejected())) return false;
+    for (const ScaleSample& sample : samples) {
+      if (!result_.frames[sample.frame].rejection.empty()) continue;
+      scales_.push_back(sample);
+      result_.frames[sample.frame].in_scale_fit = result_.scale.done;
+    }
+    ReplaceReference();
+    if (sweep_.offset_mm) {
+      TakeGivenOffset();
+      if (!is_lone_edge) {
+        const OffsetCheck check = CheckGivenOffset(sweep_, UnitThatFits(sweep_, causes_), &result_);
+        if (check.refusal) return Refuse(*check.refusal);
+        conflicting_offset_mm_ = check.conflicting_mm;
+      }
+    } else if (result_.scale.done) {
+      result_.bench_offset_mm = result_.scale.offset_mm;
+    } else {
+      return Refuse(ReasonOfUnknownOffset(result_.scale));
+    }
+    if (ShowsDistortion(result_) || FindBend(scales_, result_.scale, sweep_))
+      LookForStructure(scales_);
+    if (const auto refusal = CheckDistortion(&result_)) return Refuse(*refusal);
+    slip_ = FindSlip(scales_, result_.scale);
+    if (slip_) WarnOfSlip(*slip_, &result_);
+    bend_ = CheckBend(sweep_, scales_, &result_);
+    return PlacedWithinReach();
+  }
+
+  // Compares what may be behind the scales as they are.
+  bool ScalesAllowAResult(const std::vector<ScaleSample>& samples) {
+    const ScaleKind kind = result_.scale.kind;
+    if (static_cast<double>(samples.size()) < kFewRegistered * static_cast<double>(used().size()))
+      LookForStructure(samples);
+    if (kind == ScaleKind::kConstant) {
+      const std::string warning = ConstantScaleWarning(sweep_, samples);
+      if (!warning.empty()) result_.scale.message = warning;
+    }
+    if (kind != ScaleKind::kInverseDepth && kind != ScaleKind::kReversed) return true;
+    causes_ = CompareScaleCauses(samples, sweep_);
+    result_.diagnoses.push_back(causes_.diagnosis);
+    const auto reason = ReasonOfScaleCauses(sweep_, result_.scale, causes_);
+    return !reason || Refuse(*reason);
+  }
+
+  void WarnOfBands(std::size_t registered) {
+    if (!result_.structure.HasBands() || !result_.scale.done) return;
+    result_.warnings.push_back(fmt::format("only {} of {} frames could be registered: {}",
+                                           registered, used().size(),
+                                           StructureInWords(result_.structure)));
+  }
+
+  // The given bench zero and the readings as they are.
+  bool BelieveDepths() {
+    TakeGivenOffset();
+    return PlacedWithinReach();
+  }
+
+  void TakeGivenOffset() {
+    result_.bench_offset_mm =
+        Result{sweep_.offset_mm->value, sweep_.offset_mm->sigma, std::nullopt};
+  }
+
+  bool PlacedWithinReach() {
+    PlaceFrames();
+    return Passed(selection_.KeepPossibleDepths(result_.bench_offset_mm->value,
+                                                sweep_.camera.lens.front_focal_length_mm));
+  }
+
+  void PlaceFrames() {
+    const double sign = model::DirectionSign(sweep_.direction);
+    for (FrameMeasurement& frame : result_.frames)
+      frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
+  }
+
+  // The image scale's zero is the centre of perspective. How far from the aperture it lies depends
+  // on the blur and on how the light spreads over the pupil, which nobody knows of a real lens: the
+  // paper's law gives the value, the others an interval about it.
+  void ReckonWithFalloff(double blur_ratio, double focus_depth_mm, ScaleLaw* law) const {
+    const model::Camera& camera = sweep_.camera;
+    law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
+    if (!law->done || !(focus_depth_mm > camera.lens.front_focal_length_mm)) return;
+    const double line_zero_mm = law->line_zero_mm();
+    const auto centre_mm = [&](model::PupilLaw pupil) {
+      return model::CentreOfPerspectiveMm(camera.lens, camera.psf, pupil, blur_ratio,
+                                          focus_depth_mm);
+    };
+    law->centre_mm = centre_mm(model::PupilLaw::kPaper);
+    law->offset_mm.value = line_zero_mm + law->centre_mm;
+    law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
+    for (const model::PupilLaw pupil : model::AllPupilLaws()) {
+      const double offset_mm = line_zero_mm + centre_mm(pupil);
+      law->offset_of_pupil_laws_mm = {std::min(law->offset_of_pupil_laws_mm.x(), offset_mm),
+                                      std::max(law->offset_of_pupil_laws_mm.y(), offset_mm)};
+    }
+  }
+
+  // The sharpest frame may be the one whose reading is wrong: the next sharpest takes its place,
+  // and what was registered to the one is said of the other.
+  void ReplaceReference() {
+    if (result_.frames[reference_].rejection.empty()) return;
+    const ScaleSample* next = nullptr;
+    for (const ScaleSample& sample : scales_) {
+      if (next == nullptr || result_.frames[sample.frame].normalised_edge_slope >
+                                 result_.frames[next->frame].normalised_edge_slope)
+        next = &sample;
+    }
+    reference_ = next == nullptr ? SharpestUsed() : next->frame;
+    if (next != nullptr) ReferTo(next->registration, &scales_);
+  }
+
+  void FitPeak() {
+    std::vector<SharpnessSample> samples;
+    for (const std::size_t i : used()) {
+      samples.push_back({result_.frames[i].depth_mm, result_.frames[i].normalised_edge_slope});
+    }
+    result_.sharpness = FitSharpnessPeak(samples);
+  }
+
+  // Flat and defocused frames show the noise alone; a fine texture in focus passes for noise.
+  double SweepNoise() const {
+    std::vector<double> noises;
+    for (const std::size_t i : used()) noises.push_back(result_.frames[i].statistics.noise_sigma);
+    std::sort(noises.begin(), noises.end());
+    return noises[noises.size() / 10];
+  }
+
+  void MeasureAndSolve() {
+    const double start_mm = result_.sharpness.done ? result_.sharpness.focus_depth_mm
+                                                   : result_.frames[reference_].depth_mm;
+    BlurTask task(sweep_, store_);
+    task.frames = used();
+    task.reference = reference_;
+    task.scales = scales_;
+    task.scale_centre_mm = result_.scale.centre_mm;
+    task.law =
+        result_.scale.kind == ScaleKind::kConstant ? BlurLaw::kTelecentric : BlurLaw::kPerspective;
+    task.scale_follows_readings = result_.scale.done;
+    task.offset_mm = {result_.bench_offset_mm->value, result_.bench_offset_mm->sigma};
+    task.reading_sigma_mm = sweep_.reading_sigma_mm;
+    task.reading_sigma_is_known = sweep_.reading_sigma_mm > 0;
+    if (!task.reading_sigma_is_known && result_.scale.done) {
+      // Nobody stated it, but the scale law has measured it.
+      task.reading_sigma_mm = result_.scale.reading_rms_mm;
+    }
+    const auto [nearest, farthest] = DepthRange();
+    task.start_focus_depth_mm = std::clamp(start_mm, nearest, farthest);
+    task.pixel_noise = SweepNoise();
+    task.threads = options_.threads;
+    task.tick = [this] { Tick(); };
+    BlurEvidence evidence = MeasureBlur(task);
+    BlurFitResult fit;
+    const Calibration before = result_;
+    SolveFocus(sweep_, &evidence, &fit, &result_);
+    if (ReplaceRejectedReference(before) || MovesZero(before)) return MeasureAndSolve();
+    if (!result_.frames[reference_].rejection.empty()) return;
+    if (sweep_.target_period_mm) CheckMagnification(sweep_, reference_, Grey(reference_), &result_);
+    if (result_.outcome == Outcome::kRefused) return;
+    WidenByContradictions(evidence.setup, fit);
+    if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
+  }
+
+  // What the checks found, as far as it moves the results.
+  void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
+    if (!sweep_.offset_mm && result_.scale.done) {
+      const Eigen::Vector2d& offsets_mm = result_.scale.offset_of_pupil_laws_mm;
+      WidenByTrials("pupil law",
+                    "measure offset_mm: a zero from the image scale depends on how the light "
+                    "spreads over the pupil",
+                    WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);
+    }
+    if (conflicting_offset_mm_) {
+      // Believing it is believing its error too.
+      const model::Estimate& zero = *conflicting_offset_mm_;
+      const double reach_mm = kZeroReach * zero.sigma;
+      const Eigen::Vector2d& laws_mm = result_.scale.offset_of_pupil_laws_mm;
+      WidenByTrials("given offset_mm", "measure offset_mm again: the image scale contradicts it",
+                    WithOffsets(setup, {laws_mm.x() - reach_mm, laws_mm.y() + reach_mm}), fit,
+                    &result_);
+    }
+    if (slip_) {
+      WidenByTrials("jump of the readings", "find what slipped, or take the sweep again",
+                    WithoutSlip(sweep_, setup, *slip_, scales_, reference_, result_), fit,
+                    &result_);
+    }
+    if (bend_ && !sweep_.offset_mm) {
+      const double half_mm = 0.5 * std::abs(bend_->zero_spread_mm);
+      const double zero_mm = setup.offset_mm.value;
+      WidenByTrials("bend of the image scale", BendRemedy(result_.structure),
+                    WithOffsets(setup, {zero_mm - half_mm, zero_mm + half_mm}), fit, &result_);
+    }
+  }
+
+  // Everything was measured against the reference; if its blur turns out not to follow the others',
+  // the next sharpest takes its place.
+  bool ReplaceRejectedReference(const Calibration& before) {
+    if (result_.frames[reference_].rejection.empty()) return false;
+    std::vector<std::pair<std::string, double>> rejections;
+    for (const FrameMeasurement& frame : result_.frames)
+      rejections.emplace_back(frame.rejection, frame.reading_error_mm);
+    result_ = before;
+    for (std::size_t i = 0; i < rejections.size(); ++i) {
+      result_.frames[i].rejection = rejections[i].first;
+      result_.frames[i].reading_error_mm = rejections[i].second;
+    }
+    const auto is_rejected = [this](const ScaleSample& sample) {
+      return !result_.frames[sample.frame].rejection.empty();
+    };
+    scales_.erase(std::remove_if(scales_.begin(), scales_.end(), is_rejected), scales_.end());
+    if (!Passed(selection_.KeepUnrejected())) return false;
+    ReplaceReference();
+    return true;
+  }
+
+  // The bench zero of the image scale was found with a usual blur ratio; once more where the one
+  // that was found moves it by a part of its error.
+  bool MovesZero(const Calibration& before) {
+    if (sweep_.offset_mm || zero_is_settled_ || !result_.blur_ratio) return false;
+    zero_is_settled_ = true;
+    Calibration again = before;
+    ReckonWithFalloff(result_.blur_ratio->value, result_.focus_depth_mm->value, &again.scale);
+    const Result& zero_mm = again.scale.offset_mm;
+    if (!(std::abs(zero_mm.value - before.scale.offset_mm.value) > kZeroMoves * zero_mm.sigma))
+      return false;
+    result_ = std::move(again);
+    result_.bench_offset_mm = result_.scale.offset_mm;
+    PlaceFrames();
+    return true;
+  }
+
+  std::pair<double, double> DepthRange() const {
+    const auto [low, high] =
+        std::minmax_element(used().begin(), used().end(), [&](std::size_t a, std::size_t b) {
+          return result_.frames[a].depth_mm < result_.frames[b].depth_mm;
+        });
+    return {result_.frames[*low].depth_mm, result_.frames[*high].depth_mm};
+  }
+
+  const FocusSweep& sweep_;
+  const CalibrationOptions& options_;
+  FrameStore store_;
+  Calibration result_;
+  FrameSelection selection_{&result_.frames};  // frames that passed the gates
+  std::size_t reference_ = 0;                  // the sharpest of them, normalised
+  std::vector<ScaleSample> scales_;            // registered frames
+  ScaleCauses causes_;                         // what may be behind the scales
+  std::optional<Slip> slip_;
+  std::optional<Bend> bend_;
+  bool zero_is_settled_ = false;
+  // What the image scale says of a given bench zero.
+  std::optional<model::Estimate> conflicting_offset_mm_;
+  std::mutex progress_mutex_;
+  int steps_done_ = 0;
+  int total_steps_ = 0;
+};
+
+}  // namespace
+
+bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
+  std::set<double> distinct;
+  for (const model::SweepFrame& frame : sweep.frames) distinct.insert(frame.reading_mm);
+  if (sweep.frames.size() < kFewestFrames) {
+    *why = fmt::format("a sweep needs at least {} frames, this one has {}", kFewestFrames,
+                       sweep.frames.size());
+    return false;
+  }
+  if (distinct.size() < kFewestFrames) {
+    *why =
+        fmt::format("a sweep needs at least {} different readings, this one has {}{}",
+                    kFewestFrames, distinct.size(),
+                    distinct.size() == 1 ? fmt::format(" (all are {} mm)", *distinct.begin()) : "");
+    return false;
+  }
+  return true;
+}
+
+bool CalibrationOptions::IsValid(std::string* why) const {
+  const auto fail = [why](const std::string& message) {
+    if (why != nullptr) *why = message;
+    return false;
+  };
+  if (threads < 0) return fail(fmt::format("threads must be >= 0, found {}", threads));
+  if (!(gates.max_saturated_fraction >= 0)) {
+    return fail(fmt::format("gates.max_saturated_fraction must be >= 0, found {}",
+                            gates.max_saturated_fraction));
+  }
+  return true;
+}
+
+Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options) {
+  std::string why;
+  if (!options.IsValid(&why)) throw Error("calibration options: " + why);
+  if (!sweep.IsValid(&why)) throw Error("sweep: " + why);
+  return Calibrator(sweep, options).Run();
+}
+
+}  // namespace thicklens::calib

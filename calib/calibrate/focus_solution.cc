@@ -1,0 +1,368 @@
+#include "calib/calibrate/focus_solution.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "calib/fit/blur_tails.h"
+#include "calib/fit/frame_outliers.h"
+#include "calib/fit/misfit_causes.h"
+#include "calib/uncertainty/blur_choices.h"
+#include "calib/uncertainty/floor_choice.h"
+#include "calib/uncertainty/systematic_parts.h"
+#include "thicklens/base/statistics.h"
+
+namespace thicklens::calib {
+namespace {
+
+// Weight of the robust loss below which a frame is told.
+constexpr double kOutlierWeight = 0.6;
+// chi^2 per degree of freedom above which the law itself is in doubt.
+constexpr double kLargeMisfit = 2;
+constexpr double kSmallestRatio = 0.2, kLargestRatio = 0.8;
+// Beyond these a lens is unusual: the full aperture gives .5 by second moment.
+constexpr double kLowRatio = 0.35, kHighRatio = 0.65;
+class Solution {
+ public:
+  Solution(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
+           Calibration* calibration)
+      : sweep_(sweep), evidence_(*evidence), fit_(*fit), result_(*calibration) {}
+
+  void Run() {
+    if (evidence_.setup.meters.empty()) return Refuse(evidence_.message);
+    if (const auto reason = ThrowOutFrames(sweep_.direction, &evidence_, &result_))
+      return Refuse(*reason);
+    CompareChoices(sweep_.camera.psf, &evidence_);
+    const FloorChoice choice = ChooseFloor(sweep_.floor, evidence_, &result_.warnings);
+    evidence_.setup.floor_variance_px2 = choice.variance_px2;
+    fit_ = FitBlur(evidence_.setup);
+    if (fit_.done && TakeTails(sweep_.camera.psf, fit_, &evidence_))
+      fit_ = FitBlur(evidence_.setup);
+    result_.blur.message = fit_.message;
+    if (!fit_.done) return Refuse(fit_.message + StatedFloor());
+    FillBlur();
+    FillFrames();
+    FillValues();
+    if (!IsPlausible()) return;
+    WarnOfMisfit();
+    FitSides(evidence_, fit_, &result_);
+    AddSystematicParts(sweep_, evidence_, fit_, choice.interval_px2, &result_);
+    FillFloor(choice);
+    FillCovariance();
+    NameUnused();
+    Decide();
+  }
+
+ private:
+  void Refuse(const std::string& reason) {
+    result_.outcome = Outcome::kRefused;
+    result_.reason = reason;
+    if (result_.scale.kind == ScaleKind::kConstant) result_.reason += "; " + result_.scale.message;
+    result_.image_distance_mm.reset();
+    result_.focus_depth_mm.reset();
+    result_.blur_ratio.reset();
+    result_.blur_floor_px.reset();
+  }
+
+  // A floor that is stated too large leaves nothing of the blur, whatever else may be wrong.
+  std::string StatedFloor() const {
+    if (!sweep_.floor.given_px) return "";
+    return fmt::format(" (blur_floor_px is stated as {:.3g}, which may be too large)",
+                       sweep_.floor.given_px->value);
+  }
+
+  FrameMeasurement& Frame(std::size_t fit_frame) {
+    return result_.frames[evidence_.frames[fit_frame]];
+  }
+  double DepthMm(std::size_t fit_frame) { return Frame(fit_frame).depth_mm; }
+
+  // Readings in the fit, nearest and farthest, as depths.
+  std::pair<double, double> DepthRange() {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
+      if (!Frame(f).rejection.empty()) continue;
+      low = std::min(low, DepthMm(f));
+      high = std::max(high, DepthMm(f));
+    }
+    return {low, high};
+  }
+
+  double StepMm() const {
+    std::vector<double> readings, steps;
+    for (const FrameMeasurement& frame : result_.frames) readings.push_back(frame.reading_mm);
+    std::sort(readings.begin(), readings.end());
+    for (std::size_t i = 1; i < readings.size(); ++i) {
+      if (readings[i] > readings[i - 1]) steps.push_back(readings[i] - readings[i - 1]);
+    }
+    return Median(steps);
+  }
+
+  // ---- results ----
+  void FillBlur() {
+    BlurFit& blur = result_.blur;
+    blur.done = true;
+    blur.chi2_per_dof = fit_.chi2_per_dof;
+    blur.weak_direction = fit_.weak_direction;
+    blur.weak_correlation = fit_.weak_correlation;
+    blur.meter = evidence_.edges < 0      ? "relative spectrum"
+                 : evidence_.spectrum < 0 ? "edges"
+                                          : "edges and relative spectrum";
+    blur.family = sweep_.camera.psf;
+    blur.tails = evidence_.taken_tails;
+    if (evidence_.spectrum >= 0) blur.band = UsualBand(sweep_.camera.psf);
+    blur.better_psf = evidence_.disc_misfit ? evidence_.better_psf : sweep_.camera.psf;
+    blur.gaussian_misfit = evidence_.gaussian_misfit;
+    blur.disc_misfit = evidence_.disc_misfit;
+    result_.examples = evidence_.examples;
+  }
+
+  void WarnOfMisfit() {
+    if (!(fit_.chi2_per_dof > kLargeMisfit) || !(fit_.error_factor > 1)) return;
+    result_.warnings.push_back(
+        fmt::format("the frames lie farther off the blur law than their errors say (chi2/dof "
+                    "{:.3g}), which were widened for it: {}",
+                    fit_.chi2_per_dof, CausesOfMisfit(sweep_, evidence_, result_)));
+  }
+
+  void FillFrames() {
+    for (std::size_t m = 0; m < evidence_.setup.meters.size(); ++m) {
+      const BlurSamples& meter = evidence_.setup.meters[m];
+      for (std::size_t i = 0; i < meter.frames.size(); ++i) {
+        const std::size_t f = meter.frames[i];
+        FrameMeasurement& frame = Frame(f);
+        const auto row = static_cast<Eigen::Index>(i);
+        const double s2 = std::pow(evidence_.setup.frames[f].scale, 2);
+        const double variance =
+            std::max(0.0, (meter.variances_px2[row] - fit_.softness_px2[m]) * s2);
+        const double error = std::sqrt(std::max(0.0, meter.covariance(row, row))) * s2;
+        frame.blur_sigma_px = std::sqrt(variance);
+        // Near 0 the root's derivative grows without bound; the variance's own root bounds it.
+        frame.blur_sigma_error_px =
+            std::min(error / (2 * std::max(frame.blur_sigma_px, 1e-9)), std::sqrt(error));
+        frame.in_blur_fit = true;
+      }
+    }
+    std::vector<std::size_t> light;
+    for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
+      FrameMeasurement& frame = Frame(f);
+      if (!frame.in_blur_fit) continue;
+      const auto row = static_cast<Eigen::Index>(f);
+      frame.blur_fit_weight = fit_.weights[row];
+      frame.reading_error_mm = fit_.reading_errors_mm[row];
+      frame.reading_error_sigma_mm = fit_.reading_error_sigmas_mm[row];
+      ++result_.blur.frames_used;
+      if (frame.blur_fit_weight < kOutlierWeight) light.push_back(f);
+    }
+    WarnOfLight(light);
+  }
+
+  void WarnOfLight(const std::vector<std::size_t>& light) {
+    if (light.empty()) return;
+    std::string names;
+    for (std::size_t i = 0; i < std::min<std::size_t>(light.size(), 3); ++i) {
+      const FrameMeasurement& frame = Frame(light[i]);
+      // Readings that are stated to be exact have no error that could be told.
+      const std::string why =
+          evidence_.setup.reading_sigma_mm > 0
+              ? fmt::format("off by {:.2f} mm or damaged", frame.reading_error_mm)
+              : std::string("damaged, or its reading is not exact");
+      names += fmt::format("{}{} (reading {} mm, {})", i == 0 ? "" : ", ",
+                           std::filesystem::path(frame.image).filename().string(), frame.reading_mm,
+                           why);
+    }
+    if (light.size() > 3) names += fmt::format(" and {} more", light.size() - 3);
+    result_.warnings.push_back(
+        fmt::format("{} of {} frames follow the laws badly and weigh less: {}", light.size(),
+                    result_.blur.frames_used, names));
+  }
+
+  void FillValues() {
+    const double zf = fit_.values[kFocusDepth];
+    const model::ThickLens& lens = evidence_.setup.lens;
+    result_.focus_depth_mm =
+        Result{zf, std::sqrt(fit_.covariance(kFocusDepth, kFocusDepth)), std::nullopt};
+    result_.blur_ratio = Result{fit_.values[kBlurRatio],
+                                std::sqrt(fit_.covariance(kBlurRatio, kBlurRatio)), std::nullopt};
+    const model::Estimate& zero_mm = evidence_.setup.offset_mm;
+    at_held_zero_ = fit_;
+    if (zero_mm.sigma > 0) {
+      BlurFitSetup held = evidence_.setup;
+      held.offset_mm.sigma = 0;
+      const BlurFitResult alone = FitBlur(held, &fit_);
+      if (alone.done) at_held_zero_ = alone;
+    }
+    result_.focus_reading_mm =
+        model::Estimate{model::DirectionSign(sweep_.direction) * (zf - zero_mm.value),
+                        std::sqrt(at_held_zero_.covariance(kFocusDepth, kFocusDepth))};
+    result_.image_distance_mm =
+        Result{model::ImageDistanceMm(lens, zf),
+               std::abs(model::ImageDistanceSlope(lens, zf)) * result_.focus_depth_mm->sigma,
+               std::nullopt};
+  }
+
+  bool IsPlausible() {
+    const double zf = fit_.values[kFocusDepth];
+    const double kappa = fit_.values[kBlurRatio];
+    const double zf_sigma = result_.focus_depth_mm->sigma;
+    const double kappa_sigma = result_.blur_ratio->sigma;
+    const auto [nearest, farthest] = DepthRange();
+    const double outside_mm = std::max({0.0, nearest - zf, zf - farthest});
+    const char* side = zf < nearest ? "nearer" : "farther";
+    // What the blur itself leaves open, the bench zero apart.
+    const double own_kappa_sigma = std::sqrt(at_held_zero_.covariance(kBlurRatio, kBlurRatio));
+    const double own_zf_sigma = result_.focus_reading_mm->sigma;
+    if (!(kappa > 3 * own_kappa_sigma)) {
+      result_.focus_reading_mm.reset();
+      Refuse(fmt::format(
+          "the blur does not change over the sweep by more than its errors, whatever the bench "
+          "zero "
+          "(kappa would be {:.2g} +- {:.2g}): move the target farther from focus on both sides",
+          kappa, own_kappa_sigma));
+      return false;
+    }
+    if (!(own_zf_sigma < 0.5 * (farthest - nearest))) {
+      result_.focus_reading_mm.reset();
+      Refuse(
+          fmt::format("the depth of focus is not fixed by the blur: {:.1f} +- {:.1f} mm in a "
+                      "sweep from {:.1f} to {:.1f} mm, with the bench zero held",
+                      zf, own_zf_sigma, nearest, farthest));
+      return false;
+    }
+    if (!(zf_sigma < 0.5 * (farthest - nearest)) || !(kappa > 3 * kappa_sigma)) {
+      Refuse(ReasonOfZero(nearest, farthest));
+      return false;
+    }
+    if (outside_mm > 0 && !(own_zf_sigma < StepMm())) {
+      Refuse(
+          fmt::format("sharpness is monotone: the focus lies {} than the sweep ({:.1f} to "
+                      "{:.1f} mm), about {:.0f} +- {:.0f} mm; extend the sweep that way",
+                      side, nearest, farthest, zf, std::max(zf_sigma, own_zf_sigma)));
+      return false;
+    }
+    if (!(kappa >= kSmallestRatio && kappa <= kLargestRatio)) {
+      Refuse(fmt::format(
+          "the blur ratio would have to be {:.{}f}, which no lens has ({} to {}): check "
+          "focal lengths, aperture radius, pixel pitch and the unit of the readings, and "
+          "that the target moved and not the lens",
+          kappa, kappa < 0.1 ? 4 : 2, kSmallestRatio, kLargestRatio));
+      return false;
+    }
+    if (!(kappa >= kLowRatio && kappa <= kHighRatio)) {
+      result_.warnings.push_back(fmt::format(
+          "a blur ratio of {:.3f} is unusual (the full aperture gives .5): a wrong focal "
+          "length, aperture radius or pixel pitch looks like this; state "
+          "target_period_mm of a grid to check them",
+          kappa));
+    }
+    result_.blur.outside_mm = outside_mm;
+    if (outside_mm > 0) {
+      result_.warnings.push_back(
+          fmt::format("the focus at {:.2f} mm is extrapolated: it lies {:.2f} mm {} than the sweep",
+                      zf, outside_mm, side));
+    }
+    return true;
+  }
+
+  // The blur fixes where focus lies in the sweep, and the bench zero does not fix where the sweep
+  // lies.
+  std::string ReasonOfZero(double nearest_mm, double farthest_mm) const {
+    const model::Estimate& zero_mm = evidence_.setup.offset_mm;
+    const std::string from =
+        sweep_.offset_mm
+            ? fmt::format("offset_mm is stated as {:.4g} +- {:.2g} mm", zero_mm.value,
+                          zero_mm.sigma)
+            : fmt::format(
+                  "the sweep is {:.3g} mm long at a depth of {:.4g} mm, too short for its "
+                  "image scale to fix the bench zero ({:.4g} +- {:.2g} mm)",
+                  farthest_mm - nearest_mm, fit_.values[kFocusDepth], zero_mm.value, zero_mm.sigma);
+    return fmt::format(
+        "the bench zero is not known well enough: {}, so that the depth of focus is {:.1f} +- "
+        "{:.1f} mm. Where focus lies in the sweep is known: at the reading {:.6g} +- {:.2g} mm. "
+        "State offset_mm{}",
+        from, fit_.values[kFocusDepth], result_.focus_depth_mm->sigma,
+        result_.focus_reading_mm->value, result_.focus_reading_mm->sigma,
+        sweep_.offset_mm ? " more exactly" : "");
+  }
+
+  void FillFloor(const FloorChoice& choice) {
+    const double floor_px2 = fit_.values[kFloorVariance];
+    const double error_px2 = std::sqrt(fit_.covariance(kFloorVariance, kFloorVariance));
+    if (choice.interval_px2) {
+      // Only the interval is known; any value in it would be made up.
+      constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+      result_.blur_floor_px =
+          Result{kUnknown, kUnknown, Eigen::Vector2d(choice.interval_px2->cwiseSqrt())};
+      result_.blur.undetermined.emplace_back("blur_floor_px");
+    } else if (floor_px2 > error_px2 || !choice.is_measured) {
+      const double floor_px = std::sqrt(std::max(0.0, floor_px2));
+      result_.blur_floor_px =
+          Result{floor_px, floor_px > 0 ? error_px2 / (2 * floor_px) : 0, std::nullopt};
+    } else {
+      result_.blur.undetermined.emplace_back("blur_floor_px");
+    }
+  }
+
+  // From (zf, kappa, S0, offset) to the parameters of the camera file; what is left open has no
+  // row.
+  void FillCovariance() {
+    std::vector<int> rows = {kFocusDepth, kBlurRatio};
+    result_.covariance_order = {"image_distance_mm", "blur_ratio"};
+    Eigen::Vector4d slope(model::ImageDistanceSlope(evidence_.setup.lens, fit_.values[kFocusDepth]),
+                          1, 0, 1);
+    const bool floor_is_open = !result_.blur.undetermined.empty();
+    Eigen::Matrix4d covariance = fit_.covariance;
+    const double offset_sigma = evidence_.setup.offset_mm.sigma;
+    covariance(kBenchOffset, kBenchOffset) =
+        std::max(covariance(kBenchOffset, kBenchOffset), offset_sigma * offset_sigma);
+    if (!floor_is_open) {
+      rows.push_back(kFloorVariance);
+      result_.covariance_order.emplace_back("blur_floor_px");
+      const double floor_px = std::sqrt(std::max(0.0, fit_.values[kFloorVariance]));
+      slope[kFloorVariance] = floor_px > 0 ? 1 / (2 * floor_px) : 0;
+    }
+    rows.push_back(kBenchOffset);
+    result_.covariance_order.emplace_back("bench_offset_mm");
+    const Eigen::Matrix4d full = slope.asDiagonal() * covariance * slope.asDiagonal();
+    result_.covariance = full(rows, rows);
+  }
+
+  // Frames that passed every gate and still say nothing of the blur.
+  void NameUnused() {
+    for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
+      FrameMeasurement& frame = Frame(f);
+      if (frame.in_blur_fit || !frame.rejection.empty()) continue;
+      frame.not_in_fit = frame.image_scale
+                             ? "too strongly blurred, or too far off in scale, for the "
+                               "part of the target that all frames share"
+                             : "could be neither registered, nor does it show edges";
+    }
+  }
+
+  void Decide() {
+    result_.outcome = Outcome::kOk;
+    result_.reason.clear();
+    if (!result_.blur.undetermined.empty()) {
+      result_.outcome = Outcome::kPartial;
+      result_.reason = "the data do not fix blur_floor_px; it is not written";
+    }
+  }
+
+  const FocusSweep& sweep_;
+  BlurEvidence& evidence_;
+  BlurFitResult& fit_;
+  BlurFitResult at_held_zero_;  // the same fit, whose errors do not hold the bench zero's
+  Calibration& result_;
+};
+
+}  // namespace
+
+void SolveFocus(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
+                Calibration* calibration) {
+  Solution(sweep, evidence, fit, calibration).Run();
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,39 @@
+#ifndef THICKLENS_CALIB_EDGES_STEP_FIT_H_
+#define THICKLENS_CALIB_EDGES_STEP_FIT_H_
+
+#include <cmath>
+#include <optional>
+
+#include "calib/edges/feature_pixels.h"
+#include "thicklens/calib/edge_spread.h"
+
+namespace thicklens::calib {
+
+// Half the width of what is fitted: the edge itself and enough of both plateaus for their slopes.
+inline double StripHalfWidthPx(double sigma_px) { return 5.5 * sigma_px + 6; }
+// Plateaus narrower than this on each side do not tell blur from slope.
+inline double LeastHalfWidthPx(double sigma_px) { return 2.2 * sigma_px + 1.5; }
+
+inline double SigmaOf(double variance_px2) { return std::sqrt(std::max(variance_px2, 0.0)); }
+
+// A variance, which may have come out below 0, as a sigma: one standard deviation up from it. Limit
+// error << variance: error/(2 sigma); variance 0: sqrt(error).
+inline BlurSigma SigmaWithError(double variance_px2, double error_px2) {
+  const double sigma_px = SigmaOf(variance_px2);
+  return {sigma_px, std::sqrt(sigma_px * sigma_px + error_px2) - sigma_px};
+}
+
+// Whether the blur is known well enough to be called measured.
+inline bool IsDetermined(const BlurSigma& blur) {
+  return blur.error_px < 0.1 + 0.1 * blur.sigma_px;
+}
+
+// FitEdgeSpread for each kind.
+std::optional<EdgeSpreadFit> FitEdge(const cv::Mat& grey, const EdgeFeature& feature,
+                                     model::Psf psf, double floor_px, bool want_profile);
+std::optional<EdgeSpreadFit> FitCorner(const cv::Mat& grey, const EdgeFeature& feature,
+                                       model::Psf psf, double floor_px);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_EDGES_STEP_FIT_H_

@@ -1,0 +1,121 @@
+#include "calib/fit/frame_outliers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "thicklens/base/statistics.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr std::size_t kFewestFrames = 5;
+// A frame whose spectrum scatters by so much more than the others' shows something else.
+constexpr double kScatterOfDamage = 30;
+
+// The same blur lies on both sides of focus.
+std::string InWords(const std::vector<double>& errors_mm) {
+  if (errors_mm.empty()) return "frame damaged";
+  if (errors_mm.size() == 1)
+    return fmt::format("reading off by {:.1f} mm, or frame damaged", errors_mm[0]);
+  return fmt::format("reading off by {:.1f} mm (or {:.1f}, beyond focus), or frame damaged",
+                     errors_mm[0], errors_mm[1]);
+}
+
+class Outliers {
+ public:
+  Outliers(model::BenchDirection direction, BlurEvidence* evidence, Calibration* calibration)
+      : sign_(model::DirectionSign(direction)), evidence_(*evidence), result_(*calibration) {}
+
+  std::optional<std::string> ThrowOut() {
+    RejectScattered();
+    for (BlurSamples& meter : evidence_.setup.meters) RejectOffParabola(meter);
+    for (BlurSamples& meter : evidence_.setup.meters) DropRejected(&meter);
+    std::size_t most = 0;
+    for (const BlurSamples& meter : evidence_.setup.meters)
+      most = std::max(most, meter.frames.size());
+    if (most >= kFewestFrames) return std::nullopt;
+    return fmt::format("the blur of {} frames follows one law, {} are needed", most, kFewestFrames);
+  }
+
+ private:
+  FrameMeasurement& Frame(std::size_t fit_frame) {
+    return result_.frames[evidence_.frames[fit_frame]];
+  }
+
+  void RejectScattered() {
+    std::vector<double> ratios;
+    for (const double r : evidence_.frame_noise_ratios) {
+      if (r > 0) ratios.push_back(r);
+    }
+    if (ratios.empty()) return;
+    const double typical = Median(ratios);
+    for (std::size_t f = 0; f < evidence_.frame_noise_ratios.size(); ++f) {
+      const double ratio = evidence_.frame_noise_ratios[f] / typical;
+      if (!(ratio > kScatterOfDamage)) continue;
+      Frame(f).rejection = fmt::format(
+          "does not show what the others show: its spectrum lies {:.0f} times farther off than "
+          "theirs (smeared, shifted within the exposure, something in front of the target, or so "
+          "far out of focus that the blur law does not hold)",
+          std::sqrt(ratio));
+    }
+  }
+
+  // On the target any blur follows a parabola in depth, whatever floor and texture: what lies far
+  // off it has a wrong reading or is damaged.
+  void RejectOffParabola(const BlurSamples& meter) {
+    const auto n = static_cast<Eigen::Index>(meter.frames.size());
+    Eigen::VectorXd depths(n);
+    for (Eigen::Index i = 0; i < n; ++i)
+      depths[i] = Frame(meter.frames[static_cast<std::size_t>(i)]).depth_mm;
+    const Parabola parabola =
+        FitParabola(depths, meter.variances_px2, meter.covariance.diagonal().cwiseSqrt(),
+                    evidence_.setup.reading_sigma_mm);
+    if (!parabola.done) return;
+    const double range_mm = depths.maxCoeff() - depths.minCoeff();
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      FrameMeasurement& frame = Frame(meter.frames[s]);
+      if (parabola.follows[s] || !frame.rejection.empty()) continue;
+      const double off = parabola.residuals_px2[i] / parabola.sigmas_px2[i];
+      // Written minus believed.
+      std::vector<double> errors_mm;
+      for (const double depth_mm : parabola.DepthsOf(meter.variances_px2[i], depths[i])) {
+        if (std::abs(depths[i] - depth_mm) < range_mm)
+          errors_mm.push_back(sign_ * (depths[i] - depth_mm));
+      }
+      if (!errors_mm.empty()) frame.reading_error_mm = errors_mm.front();
+      frame.rejection =
+          fmt::format("{}: its blur lies {:.0f} standard deviations off the others' law",
+                      InWords(errors_mm), std::abs(off));
+    }
+  }
+
+  void DropRejected(BlurSamples* meter) {
+    std::vector<Eigen::Index> kept;
+    BlurSamples rest = *meter;
+    rest.frames.clear();
+    for (std::size_t i = 0; i < meter->frames.size(); ++i) {
+      if (!Frame(meter->frames[i]).rejection.empty()) continue;
+      kept.push_back(static_cast<Eigen::Index>(i));
+      rest.frames.push_back(meter->frames[i]);
+    }
+    rest.variances_px2 = meter->variances_px2(kept);
+    rest.covariance = meter->covariance(kept, kept);
+    *meter = std::move(rest);
+  }
+
+  double sign_;
+  BlurEvidence& evidence_;
+  Calibration& result_;
+};
+
+}  // namespace
+
+std::optional<std::string> ThrowOutFrames(model::BenchDirection direction, BlurEvidence* evidence,
+                                          Calibration* calibration) {
+  return Outliers(direction, evidence, calibration).ThrowOut();
+}
+
+}  // namespace thicklens::calib

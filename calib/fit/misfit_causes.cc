@@ -1,0 +1,83 @@
+#include "calib/fit/misfit_causes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kSignificant = 4;
+constexpr double kMatters = 0.02;       // of the sweep's length
+constexpr double kAsStated = 1.5;       // of the stated error of the readings
+constexpr double kClearlyBetter = 1.1;  // of chi^2 with the other shape of the blur
+// Parts of the field are known worse than the whole, and their textures differ.
+constexpr double kReach = 1.5;
+
+double SweepLengthMm(const Calibration& calibration) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const FrameMeasurement& frame : calibration.frames) {
+    if (!frame.in_blur_fit) continue;
+    low = std::min(low, frame.reading_mm);
+    high = std::max(high, frame.reading_mm);
+  }
+  return high - low;
+}
+
+}  // namespace
+
+std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence,
+                           const Calibration& calibration) {
+  std::vector<std::string> causes;
+  if (calibration.structure.HasBands()) causes.emplace_back("bands of the light");
+  if (calibration.structure.HasFixedStructure())
+    causes.emplace_back("structure that stays on the sensor");
+  const ScaleLaw& scale = calibration.scale;
+  // The image scale sees the readings' errors without the blur.
+  const bool readings_are_as_stated = scale.done && sweep.reading_sigma_mm > 0 &&
+                                      scale.reading_rms_mm < kAsStated * sweep.reading_sigma_mm;
+  if (!readings_are_as_stated) causes.emplace_back("readings worse than stated");
+  if (scale.kind == ScaleKind::kConstant)
+    causes.emplace_back("borders that were filled in when the frames were aligned");
+  causes.emplace_back("an aberrated or astigmatic lens");
+  causes.emplace_back("sharpened or compressed images");
+  causes.emplace_back("a wrong sensor.transfer");
+  const bool is_gaussian = sweep.camera.psf == model::Psf::kGaussian;
+  const auto& stated = is_gaussian ? evidence.gaussian_misfit : evidence.disc_misfit;
+  const auto& other = is_gaussian ? evidence.disc_misfit : evidence.gaussian_misfit;
+  if (!stated || !other || !(*other > kClearlyBetter * *stated))
+    causes.emplace_back("another shape of the blur");
+  std::string words = fmt::format("{} or {} do that, and this sweep does not tell these apart",
+                                  fmt::join(causes.begin(), causes.end() - 1, ", "), causes.back());
+  if (readings_are_as_stated)
+    words += fmt::format(" (the readings do not: they scatter by {:.2g} mm about the image scale)",
+                         scale.reading_rms_mm);
+  return words;
+}
+
+bool IsAstigmatic(const Calibration& calibration) {
+  const auto& astigmatism = calibration.field.astigmatism_mm;
+  return astigmatism &&
+         std::abs(astigmatism->value) >
+             std::max(kSignificant * astigmatism->sigma, kMatters * SweepLengthMm(calibration));
+}
+
+std::string AstigmatismInWords(const Calibration& calibration) {
+  if (!IsAstigmatic(calibration)) return "";
+  const model::Estimate& astigmatism = *calibration.field.astigmatism_mm;
+  return fmt::format(
+      "the blur along x is least {:.3g} +- {:.2g} mm {} than the blur along y: astigmatism of the "
+      "lens, or a texture of other depths along x than along y (turn the target by 90 degrees: the "
+      "lens's stays). One blur law does not describe both, and zf lies between them",
+      std::abs(astigmatism.value), astigmatism.sigma, astigmatism.value < 0 ? "nearer" : "farther");
+}
+
+bool AstigmatismExplains(double spread_mm, const Calibration& calibration) {
+  return IsAstigmatic(calibration) &&
+         spread_mm < kReach * std::abs(calibration.field.astigmatism_mm->value);
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,202 @@
+#include "calib/registration/scale_tracking.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/registration/coarse_registration.h"
+#include "calib/registration/radial_distortion.h"
+#include "calib/registration/registration.h"
+#include "calib/registration/shift_registration.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/statistics.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kSmallestScale = 0.1, kLargestScale = 10;
+constexpr std::size_t kFirstWave = 4;
+constexpr std::size_t kEnoughToLearn = 5;
+// Steps of the ladder are half of what a registration finds its way over.
+constexpr double kRung = 1.1;
+constexpr int kRungs = 12;  // up, and as many down: 1.1^12 = 3.1
+constexpr std::ptrdiff_t kTriedRungs = 4;
+// Relative change of the image height at the corner that a lens is expected to have at most.
+constexpr double kLikelyDistortion = 0.02;
+
+// Predicts the scale at a reading: 1/scale is a straight line. It is drawn through the frames as
+// they are registered, by medians, so that neither a wrong reading, the reference's included, nor a
+// registration that went wrong moves it.
+class ScalePrediction {
+ public:
+  ScalePrediction(const FocusSweep& sweep, std::size_t reference,
+                  std::optional<double> known_offset_mm) {
+    const double reading_mm = sweep.frames[reference].reading_mm;
+    const double sign = model::DirectionSign(sweep.direction);
+    const double depth_mm = known_offset_mm ? *known_offset_mm + sign * reading_mm : 0;
+    if (depth_mm > 0) slope_ = sign / depth_mm;
+    intercept_ = 1 - slope_ * reading_mm;
+    is_known_ = depth_mm > 0;
+  }
+
+  double At(double reading_mm) const {
+    const double inverse = intercept_ + slope_ * reading_mm;
+    return std::clamp(inverse > 0 ? 1 / inverse : kLargestScale, kSmallestScale, kLargestScale);
+  }
+
+  void Learn(const std::vector<ScaleSample>& samples) {
+    if (samples.size() < (is_known_ ? kEnoughToLearn : 2)) return;
+    std::vector<double> slopes;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const double step_mm = samples[i].reading_mm - samples[j].reading_mm;
+        if (step_mm != 0) slopes.push_back((1 / samples[i].scale - 1 / samples[j].scale) / step_mm);
+      }
+    }
+    if (slopes.empty()) return;
+    slope_ = Median(slopes);
+    std::vector<double> intercepts;
+    for (const ScaleSample& s : samples) intercepts.push_back(1 / s.scale - slope_ * s.reading_mm);
+    intercept_ = Median(intercepts);
+  }
+
+ private:
+  double slope_ = 0, intercept_ = 1;  // of 1/scale against the reading
+  bool is_known_ = false;
+};
+
+// Starts from the scale expected, then from those of a ladder at which the phases agree best.
+std::optional<FreeRegistration> RegisterAnyhow(const cv::Mat& reference, const cv::Mat& frame,
+                                               double expected, cv::Point2d centre) {
+  if (auto found = RegisterFreely(reference, frame, expected, centre)) return found;
+  std::vector<std::pair<double, double>> starts;  // agreement, scale
+  for (int rung = -kRungs; rung <= kRungs; ++rung) {
+    const double scale = std::pow(kRung, rung);
+    if (std::abs(std::log(scale / expected)) < 0.3 * std::log(kRung)) continue;
+    starts.emplace_back(CoarseAgreement(reference, frame, scale, centre), scale);
+  }
+  const auto tried = std::min(kTriedRungs, static_cast<std::ptrdiff_t>(starts.size()));
+  std::partial_sort(starts.begin(), starts.begin() + tried, starts.end(), std::greater<>());
+  for (auto start = starts.begin(); start != starts.begin() + tried; ++start) {
+    if (auto found = RegisterFreely(reference, frame, start->second, centre)) return found;
+  }
+  return std::nullopt;
+}
+
+// Radial distortion is common to all frames, so that all together know it better than each.
+void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& registrations,
+                       std::vector<ScaleSample>* samples) {
+  const double likely = kLikelyDistortion / (corner_px * corner_px);
+  double k = 0, variance = likely * likely;
+  if (const auto fitted = FitRadialDistortion(*samples)) {
+    // Weighed against the expectation that there is none.
+    const double part = variance / (variance + fitted->sigma * fitted->sigma);
+    k = part * fitted->value;
+    variance = part * fitted->sigma * fitted->sigma;
+  }
+  for (std::size_t i = 0; i < samples->size(); ++i) {
+    ScaleSample& sample = (*samples)[i];
+    const double response = CubicPerDistortion(sample.scale);
+    sample.registration = registrations[i].WithCubic(
+        k * response,
+        std::min(std::sqrt(variance) * std::abs(response), registrations[i].free.cubic_sigma));
+    sample.scale = sample.registration.scale;
+  }
+}
+
+// The scales are the readings', as they stand; the shifts are measured. The reference alone where
+// the depths are not known.
+std::vector<ScaleSample> TrackShifts(const FocusSweep& sweep,
+                                     const std::function<cv::Mat(std::size_t)>& read_grey,
+                                     const std::vector<std::size_t>& frames, std::size_t reference,
+                                     std::optional<double> known_offset_mm, int threads,
+                                     const std::function<void()>& tick) {
+  const auto depth_mm = [&](std::size_t frame) {  // without an offset no frame has one
+    return known_offset_mm.value_or(-1e300) +
+           model::DirectionSign(sweep.direction) * sweep.frames[frame].reading_mm;
+  };
+  const cv::Mat reference_grey = read_grey(reference);
+  std::vector<std::optional<Registration>> found(frames.size());
+  ParallelFor(static_cast<int>(frames.size()), threads, [&](int i) {
+    const auto index = static_cast<std::size_t>(i);
+    if (frames[index] == reference) return;
+    const double scale = depth_mm(reference) / depth_mm(frames[index]);
+    if (depth_mm(reference) > 0 && scale >= kSmallestScale && scale <= kLargestScale) {
+      found[index] =
+          RegisterShift(reference_grey, read_grey(frames[index]), scale, RegionCentre(sweep));
+    }
+    tick();
+  });
+  std::vector<ScaleSample> samples = {
+      {reference, sweep.frames[reference].reading_mm, 1.0, {}, true}};
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!found[i]) continue;
+    samples.push_back(
+        {frames[i], sweep.frames[frames[i]].reading_mm, found[i]->scale, *found[i], true});
+  }
+  return samples;
+}
+
+}  // namespace
+
+cv::Point2d RegionCentre(const FocusSweep& sweep) {
+  const Eigen::Vector2d& axis = sweep.camera.sensor.principal_point_px;
+  return {axis.x() - sweep.roi.x, axis.y() - sweep.roi.y};
+}
+
+double RegionCornerRadiusPx(const FocusSweep& sweep) {
+  const cv::Point2d centre = RegionCentre(sweep);
+  const bool is_whole = !(sweep.roi.width > 0);
+  const double right = (is_whole ? sweep.camera.sensor.width_px : sweep.roi.width) - 1;
+  const double bottom = (is_whole ? sweep.camera.sensor.height_px : sweep.roi.height) - 1;
+  return std::hypot(std::max(centre.x, right - centre.x), std::max(centre.y, bottom - centre.y));
+}
+
+std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
+                                    const std::function<cv::Mat(std::size_t)>& read_grey,
+                                    const std::vector<std::size_t>& frames, std::size_t reference,
+                                    std::optional<double> known_offset_mm, int threads,
+                                    const std::function<void()>& tick) {
+  const cv::Mat reference_grey = read_grey(reference);
+  if (sweep.target != model::SweepTarget::kKnifeEdge && ShowsShiftAlone(reference_grey))
+    return TrackShifts(sweep, read_grey, frames, reference, known_offset_mm, threads, tick);
+  const cv::Point2d centre = RegionCentre(sweep);
+  const double reference_reading_mm = sweep.frames[reference].reading_mm;
+  std::vector<std::size_t> order;
+  for (const std::size_t frame : frames) {
+    if (frame != reference) order.push_back(frame);
+  }
+  const auto distance_mm = [&](std::size_t frame) {
+    return std::abs(sweep.frames[frame].reading_mm - reference_reading_mm);
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return distance_mm(a) < distance_mm(b); });
+
+  std::vector<ScaleSample> samples = {{reference, reference_reading_mm, 1.0, {}, false}};
+  std::vector<FreeRegistration> registrations(1);
+  ScalePrediction prediction(sweep, reference, known_offset_mm);
+  std::size_t done = 0;
+  // Waves that double: within one, every start comes from the law of the waves before.
+  while (done < order.size()) {
+    const std::size_t count = std::min(std::max(kFirstWave, done), order.size() - done);
+    std::vector<std::optional<FreeRegistration>> found(count);
+    ParallelFor(static_cast<int>(count), threads, [&](int i) {
+      const std::size_t frame = order[done + static_cast<std::size_t>(i)];
+      found[static_cast<std::size_t>(i)] = RegisterAnyhow(
+          reference_grey, read_grey(frame), prediction.At(sweep.frames[frame].reading_mm), centre);
+      tick();
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!found[i]) continue;
+      const std::size_t frame = order[done + i];
+      const Registration alone = found[i]->WithCubic(0, 0);
+      samples.push_back({frame, sweep.frames[frame].reading_mm, alone.scale, alone, false});
+      registrations.push_back(*found[i]);
+    }
+    prediction.Learn(samples);
+    done += count;
+  }
+  TakeOutDistortion(RegionCornerRadiusPx(sweep), registrations, &samples);
+  return samples;
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,94 @@
+#include "calib/registration/tile_pass.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace thicklens::calib {
+namespace {
+
+// Larger fields are shrunk to this: more pixels would cost time and tell nothing more of the scale.
+constexpr int kLargestFieldPx = 640;
+constexpr int kSmallestFieldPx = 96;  // that a field is shrunk to
+constexpr int kTilesAcross = 4;
+constexpr double kTilePart = 0.36;  // of the field's shorter side
+// A picture blurred by this many shrunk pixels holds nothing that shrinking loses.
+constexpr double kBlurPerShrunkPixel = 1.3;
+
+// Sides of tiles, which have fast transforms.
+int TileSize(int field_px) {
+  static constexpr std::array<int, 18> kSizes = {24, 30, 32, 36,  40,  48,  54,  60,  64,
+                                                 72, 80, 96, 108, 120, 128, 144, 160, 180};
+  int size = kSizes[0];
+  for (const int candidate : kSizes) {
+    if (candidate <= kTilePart * field_px) size = candidate;
+  }
+  return size;
+}
+
+// The added blur of the softer picture is put on the sharper one: else what a window cuts off
+// differs between the two, and looks like a shift.
+void MatchBlur(double variance_px2, cv::Mat* reference, cv::Mat* frame) {
+  const double sigma_px = std::sqrt(std::abs(variance_px2));
+  if (!(sigma_px > 0.3)) return;
+  cv::Mat* sharper = variance_px2 > 0 ? reference : frame;
+  cv::GaussianBlur(*sharper, *sharper, cv::Size(), sigma_px, sigma_px, cv::BORDER_REPLICATE);
+}
+
+}  // namespace
+
+std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& frame,
+                                     const FrameMap& map, int factor, double variance_px2) {
+  const cv::Rect2d shared = SharedField(map, reference.size(), frame.size());
+  const double blur_px = std::sqrt(std::abs(variance_px2)) / factor;
+  const cv::Rect whole(0, 0, frame.cols / factor, frame.rows / factor);
+  const int left = static_cast<int>(std::ceil((shared.x + 0.5) / factor));
+  const int top = static_cast<int>(std::ceil((shared.y + 0.5) / factor));
+  const cv::Rect field =
+      cv::Rect(left, top, static_cast<int>((shared.x + shared.width + 0.5) / factor) - left,
+               static_cast<int>((shared.y + shared.height + 0.5) / factor) - top) &
+      whole;
+  const int size = TileSize(std::min(field.width, field.height));
+  if (std::min(field.width, field.height) < size + kTilesAcross) return std::nullopt;
+  // What lies around the field is blurred into it.
+  const int margin = static_cast<int>(std::ceil(3 * blur_px));
+  const cv::Rect region = cv::Rect(field.x - margin, field.y - margin, field.width + 2 * margin,
+                                   field.height + 2 * margin) &
+                          whole;
+  cv::Mat expected = InFrameGeometry(reference, map, factor, region);
+  cv::Mat seen = Shrunk(frame, factor)(region);
+  MatchBlur(variance_px2 / (factor * factor), &expected, &seen);
+
+  TilePhases phases(size);
+  for (int j = 0; j < kTilesAcross; ++j) {
+    for (int i = 0; i < kTilesAcross; ++i) {
+      const cv::Point corner(field.x + (field.width - size) * i / (kTilesAcross - 1),
+                             field.y + (field.height - size) * j / (kTilesAcross - 1));
+      phases.Add(expected, seen, corner - region.tl());
+    }
+  }
+  TilePass pass;
+  pass.shifts = phases.Solve();
+  for (TileShift& tile : pass.shifts) {
+    const Eigen::Vector2d shrunk = tile.centre_px + Eigen::Vector2d(region.x, region.y);
+    tile.centre_px = (factor * (shrunk.array() + 0.5) - 0.5).matrix() - map.centre;
+    tile.shift_px *= factor;
+    tile.information /= factor * factor;
+  }
+  pass.weight_variance_px2 = phases.weight_variance_px2() * factor * factor;
+  pass.agreement = phases.agreement();
+  // What was matched before is added.
+  if (phases.added_variance_px2())
+    pass.added_variance_px2 = variance_px2 + *phases.added_variance_px2() * factor * factor;
+  return pass;
+}
+
+int TileFactor(double field_px, double blur_px) {
+  const int size = static_cast<int>(std::ceil(field_px / kLargestFieldPx));
+  const int blur = static_cast<int>(blur_px / kBlurPerShrunkPixel);
+  const int most = std::max(1, static_cast<int>(field_px / kSmallestFieldPx));
+  return std::clamp(std::max(size, blur), 1, most);
+}
+
+}  // namespace thicklens::calib

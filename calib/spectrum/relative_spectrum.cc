@@ -1,0 +1,462 @@
+#include "calib/spectrum/relative_spectrum.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "calib/spectrum/spectral_transfer.h"
+#include "thicklens/base/cancel.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kTwoPiSquared = 2 * kPi * kPi;
+constexpr int kMostSteps = 30;
+// By how much neighbouring modes, which share a sixth of their noise and of the texture's amplitude
+// (the transform of the squared Hann window), widen the variances of independent ones: (1 +
+// 2/36)^2.
+constexpr double kSharedNoise = 1.114;
+// N is the noise of a complex value; the derivatives see its real part alone.
+constexpr double kRealPart = 0.5;
+
+// Gauss-Newton with T projected out. Amplitudes (ln g, V) and shifts do not mix in the normal
+// equations: the derivatives of the ones are real multiples of the model, of the others imaginary.
+class Fit {
+ public:
+  Fit(const std::vector<SpectrumSample>& samples, std::size_t reference, const TargetWindow& window,
+      const std::vector<Mode>& modes, const WindowLeakage& leakage,
+      const RelativeBlurOptions& options)
+      : samples_(samples), reference_(reference), leakage_(leakage), options_(options) {
+    const auto n = static_cast<Eigen::Index>(samples.size());
+    const auto count = static_cast<Eigen::Index>(modes.size());
+    nu_.resize(2, count);
+    for (Eigen::Index k = 0; k < count; ++k)
+      nu_.col(k) = ModeFrequency(modes[static_cast<std::size_t>(k)], window);
+    norm2_ = nu_.colwise().squaredNorm().transpose().array();
+    box2_.resize(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const auto c = samples[i].spectrum.values.size();
+      box2_[i].resize(c);
+      for (Eigen::Index k = 0; k < c; ++k) {
+        const double box =
+            BoxTransfer(modes[static_cast<std::size_t>(k)], window, samples[i].scale);
+        box2_[i][k] = box * box;
+      }
+    }
+    state_.log_gain = Eigen::VectorXd::Zero(n);
+    state_.variance.resize(n);
+    state_.shift = Eigen::Matrix2Xd::Zero(2, n);
+    noise_.resize(n);
+    expected_noise_.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const SpectrumSample& sample = samples[static_cast<std::size_t>(i)];
+      state_.variance[i] = sample.start_variance_px2;
+      expected_noise_[i] =
+          std::max(sample.spectrum.noise_gain * sample.pixel_noise * sample.pixel_noise, 1e-14);
+    }
+    noise_ = expected_noise_;
+  }
+
+  RelativeBlur Run() {
+    if (samples_.size() < 3) {
+      result_.message = fmt::format("spectra of {} frames, at least 3 are needed", samples_.size());
+      return result_;
+    }
+    // The band, the leakage and the noise follow the blur found; three rounds settle them.
+    for (int round = 0; round < 3; ++round) {
+      ChooseBands();
+      TakeLeakageOut();
+      if (!Descend()) return result_;
+      EstimateNoise();
+    }
+    if (!Finish()) return result_;
+    result_.done = true;
+    result_.message = "converged";
+    return result_;
+  }
+
+ private:
+  struct State {
+    Eigen::VectorXd log_gain, variance;
+    Eigen::Matrix2Xd shift;
+  };
+
+  Eigen::Index n() const { return static_cast<Eigen::Index>(samples_.size()); }
+  Eigen::Index Count(Eigen::Index i) const { return counts_[static_cast<std::size_t>(i)]; }
+
+  void ChooseBands() {
+    const double least = state_.variance.minCoeff();
+    counts_.assign(samples_.size(), 0);
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const double range = std::max(state_.variance[i] - least, 1e-9);
+      const double limit = options_.band / (kTwoPiSquared * range);
+      const auto available = samples_[static_cast<std::size_t>(i)].spectrum.values.size();
+      Eigen::Index c = 0;
+      while (c < available && norm2_[c] < limit) ++c;
+      counts_[static_cast<std::size_t>(i)] = c;
+    }
+    modes_ = *std::max_element(counts_.begin(), counts_.end());
+  }
+
+  void TakeLeakageOut() {
+    data_.resize(samples_.size());
+    const double base = state_.variance[static_cast<Eigen::Index>(reference_)];
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      // What leaks has the frame's own gain and the shift that is left over.
+      Eigen::ArrayXcd leaked =
+          leakage_.At(state_.variance[i] - base, static_cast<std::size_t>(Count(i)));
+      for (Eigen::Index k = 0; k < leaked.size(); ++k) {
+        leaked[k] *= std::polar(std::exp(state_.log_gain[i]),
+                                -2 * kPi * nu_.col(k).dot(state_.shift.col(i)));
+      }
+      data_[s] = samples_[s].spectrum.values.head(Count(i)) - leaked;
+    }
+  }
+
+  // M_i(k) = g_i H_i(k) exp(-2 pi i nu.t_i), with d ln M/dV beside it.
+  void Model(const State& state, Eigen::Index i, Eigen::ArrayXcd* model,
+             Eigen::ArrayXd* slope) const {
+    const double scale = samples_[static_cast<std::size_t>(i)].scale;
+    const double gain = std::exp(state.log_gain[i]);
+    model->resize(Count(i));
+    slope->resize(Count(i));
+    for (Eigen::Index k = 0; k < Count(i); ++k) {
+      const TransferAndSlope h = SpectralTransfer(options_.psf, options_.floor_variance_px2,
+                                                  state.variance[i], scale, std::sqrt(norm2_[k]));
+      const double phase = -2 * kPi * nu_.col(k).dot(state.shift.col(i));
+      (*model)[k] = std::polar(1.0, phase) * (gain * h.value);
+      (*slope)[k] = h.log_slope;
+    }
+  }
+
+  struct Evaluation {
+    double cost = 0;
+    Eigen::ArrayXcd texture;
+    Eigen::ArrayXd information;  // P = sum |M|^2/N per mode
+    std::vector<Eigen::ArrayXcd> models;
+    std::vector<Eigen::ArrayXd> slopes;
+  };
+
+  // T by linear least squares at every mode, and what is left.
+  Evaluation Evaluate(const State& state) const {
+    Evaluation e;
+    e.models.resize(samples_.size());
+    e.slopes.resize(samples_.size());
+    e.texture = Eigen::ArrayXcd::Zero(modes_);
+    e.information = Eigen::ArrayXd::Zero(modes_);
+    Eigen::ArrayXd energy = Eigen::ArrayXd::Zero(modes_);
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      Model(state, i, &e.models[s], &e.slopes[s]);
+      const Eigen::ArrayXd weight = box2_[s].head(Count(i)) / noise_[i];
+      e.texture.head(Count(i)) += e.models[s].conjugate() * data_[s] * weight;
+      e.information.head(Count(i)) += e.models[s].abs2() * weight;
+      energy.head(Count(i)) += data_[s].abs2() * weight;
+    }
+    e.cost = (energy - e.texture.abs2() / e.information).sum();
+    e.texture /= e.information;
+    return e;
+  }
+
+  // Gauss-Newton with a damping that grows where a step fails.
+  bool Descend() {
+    Evaluation now = Evaluate(state_);
+    double damping = 1e-6;
+    for (int step = 0; step < kMostSteps; ++step) {
+      ThrowIfCancelled();
+      Eigen::VectorXd gradient;
+      const Eigen::MatrixXd normal = AmplitudeNormal(now, &gradient);
+      const Eigen::Matrix2Xd shifts = ShiftSteps(now);
+      bool better = false;
+      for (int attempt = 0; attempt < 8 && !better; ++attempt) {
+        ThrowIfCancelled();
+        const State next = Moved(Solved(normal, gradient, damping), shifts / (1 + damping));
+        Evaluation there = Evaluate(next);
+        if (std::isfinite(there.cost) && there.cost <= now.cost) {
+          const double gained = now.cost - there.cost;
+          state_ = next;
+          now = std::move(there);
+          damping = std::max(1e-9, 0.1 * damping);
+          better = true;
+          if (gained < 1e-7 * now.cost + 1e-9) step = kMostSteps;
+        } else {
+          damping = std::max(1e-4, 30 * damping);
+        }
+      }
+      if (!better) break;
+    }
+    last_ = std::move(now);
+    if (!std::isfinite(last_.cost) || !state_.variance.allFinite()) {
+      result_.message = "the fit of the spectra did not converge";
+      return false;
+    }
+    return true;
+  }
+
+  // Without the reference's rows: its gain and variance are held, they would only move T.
+  static Eigen::VectorXd Solved(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gradient,
+                                double damping) {
+    Eigen::MatrixXd damped = normal;
+    damped.diagonal() *= 1 + damping;
+    damped.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();
+    const Eigen::VectorXd diagonal = damped.diagonal();
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(damped);  // in place
+    if (factor.info() == Eigen::Success) return factor.solve(gradient);
+    damped = normal;
+    damped.diagonal() = diagonal;
+    return damped.ldlt().solve(gradient);  // indefinite by rounding alone
+  }
+
+  State Moved(const Eigen::VectorXd& amplitude, const Eigen::Matrix2Xd& shifts) const {
+    State next = state_;
+    next.shift += shifts;
+    Eigen::Index row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      next.log_gain[i] += std::clamp(amplitude[2 * row], -0.3, 0.3);
+      next.variance[i] += amplitude[2 * row + 1];
+      ++row;
+    }
+    return next;
+  }
+
+  // Of (ln g, V) of every frame: sum over modes of |T|^2 |M|^2/N d d^T within a frame, minus the
+  // projection on T. The lower triangle alone.
+  Eigen::MatrixXd AmplitudeNormal(const Evaluation& e, Eigen::VectorXd* gradient) const {
+    const Eigen::Index size = 2 * (n() - 1);
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
+    Eigen::MatrixXd projection = Eigen::MatrixXd::Zero(size, modes_);
+    gradient->resize(size);
+    const Eigen::ArrayXd power = e.texture.abs2();
+    const Eigen::ArrayXd root = (power / e.information).sqrt();
+    Eigen::Index row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      Eigen::Matrix2Xd d(2, c);
+      d.row(0).setOnes();
+      d.row(1) = e.slopes[s].matrix().transpose();
+      const Eigen::ArrayXcd model = e.models[s] * e.texture.head(c);
+      const Eigen::ArrayXd noise = box2_[s].head(c) / noise_[i];
+      const Eigen::ArrayXd pull = (model.conjugate() * (data_[s] - model)).real() * noise;
+      gradient->segment<2>(2 * row) = d * pull.matrix();
+      const Eigen::ArrayXd weight = e.models[s].abs2() * noise;
+      const Eigen::Matrix2Xd weighted = d.array().rowwise() * (weight * power.head(c)).transpose();
+      normal.block<2, 2>(2 * row, 2 * row) = weighted * d.transpose();
+      projection.block(2 * row, 0, 2, c) =
+          d.array().rowwise() * (weight * root.head(c)).transpose();
+      ++row;
+    }
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(projection, -1);
+    return normal;
+  }
+
+  // d M/dt = -2 pi i nu M. The frames' shifts hang together through T only weakly: a step of their
+  // own for each frame converges as well, and nobody asks for their covariance.
+  Eigen::Matrix2Xd ShiftSteps(const Evaluation& e) const {
+    Eigen::Matrix2Xd steps = Eigen::Matrix2Xd::Zero(2, n());
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      if (c < 3) continue;
+      const Eigen::ArrayXcd model = e.models[s] * e.texture.head(c);
+      const Eigen::ArrayXd weight = box2_[s].head(c) / noise_[i];
+      const Eigen::ArrayXd pull = (model.conjugate() * (data_[s] - model)).imag() * weight;
+      const Eigen::Matrix2Xd d = -2 * kPi * nu_.leftCols(c);
+      const Eigen::Matrix2Xd weighted = d.array().rowwise() * (model.abs2() * weight).transpose();
+      const Eigen::Matrix2d normal = weighted * d.transpose();
+      // Along a lone edge a shift shows nothing: that direction stays where it is.
+      steps.col(i) = normal.completeOrthogonalDecomposition().solve(d * pull.matrix());
+    }
+    return steps;
+  }
+
+  // From the residuals, each by its frame's own degrees of freedom; never far below what the pixel
+  // noise explains in the other frames: a frame that alone holds a mode fits itself.
+  void EstimateNoise() {
+    Eigen::VectorXd found(n());
+    std::vector<double> ratios;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      const Eigen::ArrayXd weight = box2_[s].head(c) / noise_[i];
+      const Eigen::ArrayXd leverage = last_.models[s].abs2() * weight / last_.information.head(c);
+      const double freedom =
+          std::max(1.0, static_cast<double>(c) - leverage.sum() - 2 * (n() > 1 ? 1 : 0));
+      const Eigen::ArrayXcd rest = data_[s] - last_.models[s] * last_.texture.head(c);
+      found[i] = (rest.abs2() * box2_[s].head(c)).sum() / freedom;
+      ratios.push_back(found[i] / expected_noise_[i]);
+    }
+    std::vector<double> sorted = ratios;
+    std::nth_element(sorted.begin(), sorted.begin() + n() / 2, sorted.end());
+    const double typical = sorted[static_cast<std::size_t>(n() / 2)];
+    for (Eigen::Index i = 0; i < n(); ++i)
+      noise_[i] = std::max(found[i], 0.5 * typical * expected_noise_[i]);
+  }
+
+  // The tails by one Gauss-Newton step, gains, variances and T eliminated: d ln M/d tails = 4 u^2
+  // is real, as those of the amplitudes are. `solve` applies the inverse of their normal matrix.
+  template <typename Solve>
+  void FillTails(const Evaluation& e, const Eigen::VectorXd& gradient, const Solve& solve) {
+    const Eigen::ArrayXd power = e.texture.abs2();
+    const Eigen::ArrayXd root = (power / e.information).sqrt();
+    std::vector<Eigen::ArrayXd> slopes(samples_.size()), weights(samples_.size());
+    Eigen::VectorXd projected = Eigen::VectorXd::Zero(modes_);
+    double own = 0, pull = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      const double defocus_px2 =
+          state_.variance[i] - options_.floor_variance_px2 / std::pow(samples_[s].scale, 2);
+      slopes[s] = 4 * (kTwoPiSquared * defocus_px2 * norm2_.head(c)).square();
+      const Eigen::ArrayXd noise = box2_[s].head(c) / noise_[i];
+      weights[s] = e.models[s].abs2() * noise;
+      projected.head(c) += (weights[s] * root.head(c) * slopes[s]).matrix();
+      own += (weights[s] * power.head(c) * slopes[s].square()).sum();
+      const Eigen::ArrayXcd model = e.models[s] * e.texture.head(c);
+      pull += ((model.conjugate() * (data_[s] - model)).real() * noise * slopes[s]).sum();
+    }
+    Eigen::VectorXd mixed(2 * (n() - 1));
+    Eigen::Index row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::Index c = Count(i);
+      const Eigen::ArrayXd shared =
+          weights[s] * (power.head(c) * slopes[s] - root.head(c) * projected.head(c).array());
+      mixed[2 * row] = shared.sum();
+      mixed[2 * row + 1] = (shared * e.slopes[s]).sum();
+      ++row;
+    }
+    const Eigen::VectorXd answer = solve(mixed);
+    const double information = own - projected.squaredNorm() - mixed.dot(answer);
+    result_.variance_by_tails = Eigen::VectorXd::Zero(n());
+    row = 0;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i == static_cast<Eigen::Index>(reference_)) continue;
+      result_.variance_by_tails[i] = -answer[2 * row + 1];
+      ++row;
+    }
+    // Without defocus, or at one blur alone, nothing tells the shape.
+    if (!(information > 1e-12 * own)) {
+      result_.tails = {0, std::numeric_limits<double>::infinity()};
+      return;
+    }
+    result_.tails = {(pull - answer.dot(gradient)) / information,
+                     std::sqrt(kRealPart * kSharedNoise / information)};
+  }
+
+  bool Finish() {
+    const Eigen::Index size = 2 * (n() - 1);
+    Eigen::VectorXd gradient;
+    Eigen::MatrixXd normal = AmplitudeNormal(Evaluate(state_), &gradient);
+    const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    // The gains first: what is left of the factor for the variances is that of their own normal
+    // matrix with the gains eliminated.
+    std::vector<Eigen::Index> order;
+    for (const Eigen::Index first : {0, 1}) {
+      for (Eigen::Index k = first; k < size; k += 2) order.push_back(k);
+    }
+    Eigen::MatrixXd scaled(size, size);  // its lower triangle
+    for (Eigen::Index b = 0; b < size; ++b) {
+      for (Eigen::Index a = b; a < size; ++a) {
+        const auto [low, high] =
+            std::minmax(order[static_cast<std::size_t>(a)], order[static_cast<std::size_t>(b)]);
+        scaled(a, b) = scale[low] * scale[high] * normal(high, low);
+      }
+    }
+    const Eigen::VectorXd full_scale = scale;
+    normal.resize(0, 0);  // matrices of this size are what a long sweep's memory goes to
+    scaled.diagonal().array() += 1e-12;
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(scaled);  // in place
+    if (factor.info() != Eigen::Success) {
+      result_.message = "the spectra do not tell the blur of every frame";
+      return false;
+    }
+    FillTails(Evaluate(state_), gradient, [&](const Eigen::VectorXd& of) -> Eigen::VectorXd {
+      Eigen::VectorXd permuted(size), solved(size);
+      for (Eigen::Index a = 0; a < size; ++a) {
+        const Eigen::Index at = order[static_cast<std::size_t>(a)];
+        permuted[a] = full_scale[at] * of[at];
+      }
+      permuted = factor.solve(permuted);
+      for (Eigen::Index a = 0; a < size; ++a) {
+        const Eigen::Index at = order[static_cast<std::size_t>(a)];
+        solved[at] = full_scale[at] * permuted[a];
+      }
+      return solved;
+    });
+    Eigen::MatrixXd inverse_root = Eigen::MatrixXd::Identity(size / 2, size / 2);
+    scaled.bottomRightCorner(size / 2, size / 2)
+        .triangularView<Eigen::Lower>()
+        .solveInPlace(inverse_root);
+    scaled.resize(0, 0);
+    for (Eigen::Index k = 0; k < size / 2; ++k) inverse_root.col(k) *= scale[2 * k + 1];
+    const Eigen::MatrixXd inverse = inverse_root.transpose() * inverse_root;
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      if (i != static_cast<Eigen::Index>(reference_)) rows.push_back(i);
+    }
+    result_.covariance = Eigen::MatrixXd::Zero(n(), n());
+    for (std::size_t a = 0; a < rows.size(); ++a) {
+      for (std::size_t b = 0; b < rows.size(); ++b) {
+        result_.covariance(rows[a], rows[b]) =
+            kRealPart * kSharedNoise *
+            inverse(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
+      }
+    }
+    result_.variances_px2 = state_.variance;
+    result_.gains = state_.log_gain.array().exp();
+    result_.shifts_px = state_.shift;
+    result_.noise_ratio = noise_.cwiseQuotient(expected_noise_);
+    result_.modes_used.assign(counts_.begin(), counts_.end());
+    result_.texture = last_.texture;
+    FillMisfit();
+    return true;
+  }
+
+  void FillMisfit() {
+    double chi2 = 0, freedom = -static_cast<double>(modes_) - 2.0 * static_cast<double>(n() - 1);
+    for (Eigen::Index i = 0; i < n(); ++i) {
+      const auto s = static_cast<std::size_t>(i);
+      const Eigen::ArrayXcd rest = data_[s] - last_.models[s] * last_.texture.head(Count(i));
+      chi2 += (rest.abs2() * box2_[s].head(Count(i))).sum() / expected_noise_[i];
+      freedom += static_cast<double>(Count(i));
+    }
+    result_.chi2_per_dof = freedom > 0 ? chi2 / freedom : 0;
+  }
+
+  const std::vector<SpectrumSample>& samples_;
+  std::size_t reference_;
+  const WindowLeakage& leakage_;
+  RelativeBlurOptions options_;
+  Eigen::Matrix2Xd nu_;
+  Eigen::ArrayXd norm2_;
+  std::vector<Eigen::ArrayXd> box2_;
+  std::vector<Eigen::Index> counts_;
+  Eigen::Index modes_ = 0;
+  std::vector<Eigen::ArrayXcd> data_;  // spectra without the window's leakage
+  State state_;
+  Eigen::VectorXd noise_, expected_noise_;
+  Evaluation last_;
+  RelativeBlur result_;
+};
+}  // namespace
+
+RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
+                             const TargetWindow& window, const std::vector<Mode>& modes,
+                             const WindowLeakage& leakage, const RelativeBlurOptions& options) {
+  return Fit(samples, reference, window, modes, leakage, options).Run();
+}
+double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,
+                    double nu) {
+  return SpectralTransfer(options.psf, options.floor_variance_px2, variance_px2, scale, nu).value;
+}
+
+}  // namespace thicklens::calib

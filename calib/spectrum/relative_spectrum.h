@@ -1,0 +1,86 @@
+#ifndef THICKLENS_CALIB_SPECTRUM_RELATIVE_SPECTRUM_H_
+#define THICKLENS_CALIB_SPECTRUM_RELATIVE_SPECTRUM_H_
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calib/spectrum/frame_spectrum.h"
+#include "calib/spectrum/window_leakage.h"
+#include "thicklens/model/camera.h"
+
+namespace thicklens::calib {
+
+// Blur of the frames of a sweep relative to each other, whatever the texture: the windowed spectra
+// of all frames at once are fitted by
+//   G_i(nu) = g_i H_i(nu) exp(-2 pi i nu.t_i) T(nu),
+// T the texture's own spectrum (free at every frequency: variable projection), g_i a gain near 1,
+// t_i a shift that the registration left over, H_i the blur's transfer function:
+//   Gaussian: exp(-2 pi^2 V_i |nu|^2);  disc: the lens floor's Gaussian times the disc's.
+// V_i, px^2 of the target: blur variance over scale^2, without the pixel box. T takes up any common
+// blur: V is known up to a constant (Gaussian; a disc's shape would fix it, but the reference's is
+// held there too).
+
+struct SpectrumSample {
+  double scale = 1;
+  FrameSpectrum spectrum;
+  double pixel_noise = 0;         // standard deviation of a pixel of the frame
+  double start_variance_px2 = 0;  // V, relative to the reference for a Gaussian, else absolute
+};
+
+struct RelativeBlurOptions {
+  model::Psf psf = model::Psf::kGaussian;
+  // A mode is used in a frame where 2 pi^2 (V - Vmin) nu^2 is below: 2 for a Gaussian; a disc's
+  // first zero is at 1.84, stay well below.
+  double band = 2;
+  double floor_variance_px2 = 0.25;  // disc: sigma^2 of the lens floor, sensor px
+};
+
+struct RelativeBlur {
+  bool done = false;
+  std::string message = "not run";
+  Eigen::VectorXd variances_px2;  // V of each sample; the reference keeps its start value
+  Eigen::MatrixXd covariance;     // of V; row and column of the reference are 0
+  Eigen::VectorXd gains;          // g
+  Eigen::Matrix2Xd shifts_px;     // t
+  Eigen::VectorXd noise_ratio;    // scatter about the fit over what the pixel noise explains
+  std::vector<int> modes_used;    // of each sample
+  double chi2_per_dof = 0;        // against the pixel noise, all samples
+  // How the shape departs from the family's: H exp(4 tails u^2), u = 2 pi^2 v nu^2 with v the
+  // defocus alone; the same in all frames, and no change of the second moment. 0: the family
+  // itself; a disc is a Gaussian with -1/24 to the first order. One step of the fit from 0, and how
+  // V answers.
+  model::Estimate tails;
+  Eigen::VectorXd variance_by_tails;  // dV/d tails, px^2
+  Eigen::ArrayXcd texture;            // T
+};
+
+RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::size_t reference,
+                             const TargetWindow& window, const std::vector<Mode>& modes,
+                             const WindowLeakage& leakage, const RelativeBlurOptions& options);
+
+// The transfer function H of one frame at |nu|, cycles per target px.
+double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,
+                    double nu);
+
+// For the eye: what was measured of H of one sample, averaged over rings of |nu| against the
+// texture that was fitted.
+struct TransferRing {
+  double nu = 0;  // cycles per target px
+  double measured = 0;
+};
+std::vector<TransferRing> MeasuredTransfer(const SpectrumSample& sample, const RelativeBlur& fit,
+                                           std::size_t index, double reference_variance_px2,
+                                           const TargetWindow& window,
+                                           const std::vector<Mode>& modes,
+                                           const WindowLeakage& leakage);
+
+// Of all modes those with the largest power in `power`, up to `most_per_ring` in each of 24 rings
+// of equal width in ln|nu|, so that strongly and weakly blurred frames both keep some. In the order
+// of |nu|.
+std::vector<Mode> StrongestModes(const std::vector<Mode>& modes, const Eigen::ArrayXd& power,
+                                 const TargetWindow& window, double least_power, int most_per_ring);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_SPECTRUM_RELATIVE_SPECTRUM_H_

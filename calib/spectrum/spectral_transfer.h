@@ -1,0 +1,22 @@
+#ifndef THICKLENS_CALIB_SPECTRUM_SPECTRAL_TRANSFER_H_
+#define THICKLENS_CALIB_SPECTRUM_SPECTRAL_TRANSFER_H_
+
+#include "thicklens/model/camera.h"
+
+namespace thicklens::calib {
+
+// The blur's transfer function H at one frequency, and d ln H/dV.
+struct TransferAndSlope {
+  double value = 1, log_slope = 0;  // 1, 1/px^2
+};
+
+// H of a frame of that scale at |nu|, cycles per target px, for a blur of V px^2 on the target.
+//   Gaussian: exp(-2 pi^2 V nu^2);  disc: the lens floor's Gaussian times the disc's of what V has
+//   beyond it; `floor_variance_px2` is the lens floor's sigma^2 on the sensor, a Gaussian needs
+//   none. Noise may push V, or a disc's part of it, below 0: H goes on smoothly.
+TransferAndSlope SpectralTransfer(model::Psf psf, double floor_variance_px2, double variance_px2,
+                                  double scale, double nu);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_SPECTRUM_SPECTRAL_TRANSFER_H_

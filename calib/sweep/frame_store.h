@@ -1,0 +1,44 @@
+#ifndef THICKLENS_CALIB_SWEEP_FRAME_STORE_H_
+#define THICKLENS_CALIB_SWEEP_FRAME_STORE_H_
+
+#include <cstddef>
+#include <mutex>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "thicklens/calib/focus_sweep.h"
+
+namespace thicklens::calib {
+
+// The frames of a sweep for steps that look at them again and again. Frames are kept as they were
+// read, first come first kept, up to a limit in all; beyond it a frame is read anew each time, so
+// that memory does not grow with the sweep. Thread safe; results do not depend on what is kept.
+class FrameStore {
+ public:
+  static constexpr std::size_t kDefaultLimit = std::size_t{128} << 20;  // bytes
+
+  // `sweep` must outlive the store.
+  explicit FrameStore(const FocusSweep& sweep, std::size_t byte_limit = kDefaultLimit);
+
+  // The whole frame as its file stores it; not to be written to. Throws what the reader throws.
+  cv::Mat Stored(std::size_t index);
+
+  // The region of interest in linear light, CV_32F.
+  cv::Mat Grey(std::size_t index);
+  // One colour: 0 red, 1 green, 2 blue; of a frame with one channel 0 alone. Throws Error if the
+  // frame has no such channel.
+  cv::Mat Channel(std::size_t index, int channel);
+
+  std::size_t kept_bytes() const;
+
+ private:
+  const FocusSweep& sweep_;
+  const std::size_t byte_limit_;
+  mutable std::mutex mutex_;
+  std::vector<cv::Mat> kept_;  // empty where a frame is not
+  std::size_t kept_bytes_ = 0;
+};
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_SWEEP_FRAME_STORE_H_

@@ -1,0 +1,26 @@
+#ifndef THICKLENS_CALIB_SWEEP_PILE_UP_H_
+#define THICKLENS_CALIB_SWEEP_PILE_UP_H_
+
+#include <opencv2/core/mat.hpp>
+
+namespace thicklens::calib {
+
+// Pixels that gather on the outermost value in use: what a clipping camera makes of them.
+struct PileUp {
+  double fraction = 0;  // of a channel's pixels; 0: none
+  double level = 0;     // stored value, in units of full scale
+};
+
+// Of the channel that is clipped most, at either end. `noise_sigma` is that of a linear grey pixel.
+struct PileUps {
+  PileUp bright, dark;
+};
+PileUps FindPileUps(const cv::Mat& stored, double noise_sigma);
+
+// Whether the pixels at or below `level` (in units of full scale, in any channel) fill one side of
+// a straight line: a backlit edge, whose one side is black by right.
+bool DarkIsOneSide(const cv::Mat& stored, double level);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_SWEEP_PILE_UP_H_

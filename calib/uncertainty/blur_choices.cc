@@ -1,0 +1,113 @@
+#include "calib/uncertainty/blur_choices.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "calib/fit/blur_examples.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kNarrowPart = 0.5;     // of the usual band
+constexpr double kLeakageMargin = 1.4;  // of the largest sigma expected
+
+// Disc and Gaussian are compared over the disc's band, the narrower one.
+double CommonPart(model::Psf psf) { return UsualBand(model::Psf::kDisc) / UsualBand(psf); }
+
+class Choices {
+ public:
+  Choices(model::Psf stated, BlurEvidence* evidence) : stated_(stated), evidence_(*evidence) {}
+
+  void Run() {
+    if (evidence_.spectrum < 0 || evidence_.region.samples.empty()) return;
+    if (!LeaveOutRejected()) return;
+    if (const FittedRegion narrow = Fit(stated_, kNarrowPart); narrow.blur.done)
+      evidence_.narrow_band = FitSamples(evidence_, narrow.blur, narrow.region);
+    CompareShapes();
+  }
+
+ private:
+  BlurSamples& Samples() {
+    return evidence_.setup.meters[static_cast<std::size_t>(evidence_.spectrum)];
+  }
+
+  bool IsKept(std::size_t meter_frame) {
+    const std::vector<std::size_t>& kept = Samples().frames;
+    return std::find(kept.begin(), kept.end(), evidence_.fit_index[meter_frame]) != kept.end();
+  }
+
+  FittedRegion Fit(model::Psf psf, double part) const {
+    return FitRegion(evidence_.region, SpectralOptions(psf, evidence_.assumed_floor_px2, part));
+  }
+
+  // False where the reference itself was thrown out: everything refers to it.
+  bool LeaveOutRejected() {
+    MeterRegion& region = evidence_.region;
+    if (!IsKept(region.frames[region.reference])) return false;
+    if (std::all_of(region.frames.begin(), region.frames.end(),
+                    [this](std::size_t f) { return IsKept(f); }))
+      return true;
+    MeterRegion kept = PartOf(
+        region, [this](std::size_t f) { return IsKept(f); }, [](const Mode&) { return true; });
+    std::swap(region, kept);
+    FittedRegion fitted = Fit(stated_, 1);
+    if (!fitted.blur.done) {
+      std::swap(region, kept);
+      return false;
+    }
+    region = std::move(fitted.region);
+    evidence_.blur = std::move(fitted.blur);
+    Samples() = FitSamples(evidence_, evidence_.blur, region);
+    return true;
+  }
+
+  // Both shapes over the same band, each with its own leakage.
+  void CompareShapes() {
+    const RelativeBlur as_stated = Fit(stated_, CommonPart(stated_)).blur;
+    const FittedRegion other = FitOtherShape();
+    const RelativeBlur& as_other = other.blur;
+    if (as_stated.done && as_other.done) {
+      const bool is_gaussian = stated_ == model::Psf::kGaussian;
+      evidence_.other_psf = FitSamples(evidence_, as_other, other.region);
+      evidence_.gaussian_misfit = (is_gaussian ? as_stated : as_other).chi2_per_dof;
+      evidence_.disc_misfit = (is_gaussian ? as_other : as_stated).chi2_per_dof;
+      evidence_.shape_dof = DegreesOfFreedom(as_stated);
+      evidence_.better_psf = *evidence_.gaussian_misfit <= *evidence_.disc_misfit
+                                 ? model::Psf::kGaussian
+                                 : model::Psf::kDisc;
+    }
+    AddTransferExamples(stated_, other, &evidence_);
+  }
+
+  // Real and imaginary part of each mode of each frame, less the texture's.
+  static double DegreesOfFreedom(const RelativeBlur& blur) {
+    const double used = std::accumulate(blur.modes_used.begin(), blur.modes_used.end(), 0.0);
+    return std::max(0.0, 2 * (used - static_cast<double>(blur.texture.size())));
+  }
+
+  FittedRegion FitOtherShape() {
+    MeterRegion& region = evidence_.region;
+    const SpectralMeterSetup& meter = evidence_.spectral;
+    double largest = 0;
+    for (const std::size_t f : region.frames)
+      largest = std::max(largest, meter.frames[f].expected_variance_px2);
+    WindowLeakage leakage(meter.read_grey(meter.frames[meter.reference].frame), meter.origin_px,
+                          region.window, region.modes, region.samples[region.reference].spectrum,
+                          OtherPsf(stated_), kLeakageMargin * std::sqrt(largest) + 0.5,
+                          meter.threads);
+    std::swap(region.leakage, leakage);
+    FittedRegion fit = Fit(OtherPsf(stated_), CommonPart(OtherPsf(stated_)));
+    std::swap(region.leakage, leakage);
+    return fit;
+  }
+
+  model::Psf stated_;
+  BlurEvidence& evidence_;
+};
+
+}  // namespace
+
+void CompareChoices(model::Psf stated, BlurEvidence* evidence) { Choices(stated, evidence).Run(); }
+
+}  // namespace thicklens::calib

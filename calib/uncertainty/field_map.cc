@@ -1,0 +1,409 @@
+#include "calib/uncertainty/field_map.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <opencv2/core.hpp>
+
+#include "calib/fit/misfit_causes.h"
+#include "calib/uncertainty/evenly_spread.h"
+#include "calib/uncertainty/systematic_advice.h"
+#include "thicklens/base/parallel.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kWholeField = 0.98;
+constexpr double kSmallField = 240;  // px; below, three tiles a side, above, five
+constexpr int kModesPerRing = 48;
+constexpr std::size_t kFewestTiles = 5;
+constexpr double kSpreadOverErrors = 4;  // squares; below, the tiles agree
+constexpr double kApart = 6;             // standard deviations between depths of a target
+constexpr double kRoughSurface = 4;  // chi^2 per dof of a smooth field above which depths differ
+constexpr double kColourDifference = 0.01;  // of the mean: below, the channels are copies
+// Of a longer sweep at most so many frames are mapped, evenly spread: the fit of one part takes
+// time with the square of its frames, and all parts' spectra are held at once.
+constexpr std::size_t kMostFrames = 128;
+
+class Field {
+ public:
+  Field(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
+        FrameStore* store, Calibration* calibration)
+      : sweep_(sweep), evidence_(evidence), fit_(fit), store_(*store), result_(*calibration) {
+    setup_ = evidence.spectral;
+    setup_.modes_per_ring = kModesPerRing;
+    KeepUsedFrames();
+  }
+
+  void Run() {
+    FieldMap& map = result_.field;
+    if (evidence_.spectrum < 0 || setup_.frames.size() < 5) {
+      map.message = "the field needs a texture all over it";
+      return;
+    }
+    setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
+    // First: it may be what lets parts of the field come into focus at different depths.
+    MeasureAstigmatism();
+    const std::string astigmatism = AstigmatismInWords(result_);
+    if (!astigmatism.empty()) result_.warnings.push_back(astigmatism);
+    MapTiles();
+    MeasureChannels();
+  }
+
+ private:
+  // Without the frames that were thrown out, with the blur that was found.
+  void KeepUsedFrames() {
+    const std::size_t reference = setup_.frames.empty() ? 0 : setup_.frames[setup_.reference].frame;
+    std::vector<MeterFrame> kept;
+    for (const MeterFrame& frame : setup_.frames) {
+      if (!result_.frames[frame.frame].in_blur_fit) continue;
+      MeterFrame entry = frame;
+      const double depth_mm = DepthMm(frame.frame);
+      entry.expected_variance_px2 =
+          (fit_.values[kFloorVariance] + FittedDefocusVariance(evidence_.setup, fit_, depth_mm)) /
+          (frame.place.scale * frame.place.scale);
+      if (frame.frame == reference) setup_.reference = kept.size();
+      kept.push_back(entry);
+    }
+    setup_.frames = std::move(kept);
+    // The reference itself may have been thrown out; without it there is nothing to refer to.
+    if (setup_.frames.empty() || setup_.frames[setup_.reference].frame != reference)
+      setup_.frames.clear();
+    else
+      ThinOut();
+  }
+
+  void ThinOut() {
+    std::vector<MeterFrame> kept;
+    std::size_t reference = 0;
+    for (const std::size_t f : EvenlySpread(setup_.frames.size(), setup_.reference, kMostFrames)) {
+      if (f == setup_.reference) reference = kept.size();
+      kept.push_back(setup_.frames[f]);
+    }
+    setup_.frames = std::move(kept);
+    setup_.reference = reference;
+  }
+
+  double BelievedReading(std::size_t frame) const {
+    return result_.frames[frame].reading_mm - result_.frames[frame].reading_error_mm;
+  }
+  double DepthMm(std::size_t frame) const {
+    return evidence_.setup.offset_mm.value +
+           model::DirectionSign(sweep_.direction) * BelievedReading(frame);
+  }
+
+  // zf of one region; the readings as believed, the floor as fitted.
+  std::optional<model::Estimate> FocusOf(const MeterRegion& region, std::string* message) const {
+    if (region.frames.size() < 5 || region.modes.size() < 8) {
+      *message = "too little texture, or too few frames see it";
+      return std::nullopt;
+    }
+    const FittedRegion fitted =
+        FitRegion(region, SpectralOptions(sweep_.camera.psf, fit_.values[kFloorVariance], 1));
+    if (!fitted.blur.done) {
+      *message = fitted.blur.message;
+      return std::nullopt;
+    }
+    BlurFitSetup setup = evidence_.setup;
+    setup.frames.clear();
+    setup.offset_mm.sigma = 0;
+    setup.reading_sigma_mm = 0;
+    setup.reading_sigma_is_known =
+        false;  // errors from the scatter: there is more than noise in it
+    setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
+    for (const MeterFrame& frame : setup_.frames)
+      setup.frames.push_back({BelievedReading(frame.frame), frame.place.scale, std::nullopt});
+    setup.meters = {AsSamples(fitted.blur, fitted.region)};
+    const BlurFitResult fit = FitBlur(setup);
+    *message = fit.message;
+    if (!fit.done) return std::nullopt;
+    return model::Estimate{fit.values[kFocusDepth],
+                           std::sqrt(fit.covariance(kFocusDepth, kFocusDepth))};
+  }
+
+  void MapTiles() {
+    FieldMap& map = result_.field;
+    const int side = setup_.size_px.minCoeff() < kSmallField ? 3 : 5;
+    const double part = 2.0 / (side + 1);  // neighbours overlap by half
+    map.columns = map.rows = side;
+    std::vector<MeterRegion> regions;
+    std::vector<std::size_t> tile_of;
+    for (int row = 0; row < side; ++row) {
+      for (int column = 0; column < side; ++column) {
+        const Eigen::Vector2d place =
+            kWholeField * 0.5 * part *
+            Eigen::Vector2d(column - 0.5 * (side - 1), row - 0.5 * (side - 1));
+        FieldTile tile;
+        auto region = PlanRegion(setup_, kWholeField * part, place);
+        if (region) {
+          tile.centre_px = region->window.centre_px + sweep_.camera.sensor.principal_point_px;
+          tile_of.push_back(map.tiles.size());
+          regions.push_back(std::move(*region));
+        } else {
+          tile.message = "too few frames see this part";
+        }
+        map.tiles.push_back(tile);
+      }
+    }
+    if (regions.empty()) {
+      map.message = "too few frames see the same parts of the target";
+      return;
+    }
+    MeasureRegions(setup_, &regions);
+    ParallelFor(static_cast<int>(regions.size()), setup_.threads, [&](int i) {
+      const auto index = static_cast<std::size_t>(i);
+      FieldTile& tile = map.tiles[tile_of[index]];
+      if (const auto focus = FocusOf(regions[index], &tile.message)) {
+        tile.done = true;
+        tile.focus_depth_mm = *focus;
+      }
+    });
+    std::vector<std::size_t> fitted;
+    for (std::size_t i = 0; i < map.tiles.size(); ++i) {
+      if (map.tiles[i].done) fitted.push_back(i);
+    }
+    map.done = fitted.size() >= kFewestTiles;
+    map.message = map.done ? "done"
+                           : fmt::format("{} parts of the field could be fitted, {} are needed",
+                                         fitted.size(), kFewestTiles);
+    if (map.done) DescribeSurface(fitted);
+  }
+
+  // zf = c + gx X + gy Y + q R^2, X and Y mm on the target. Tilt is seen only beside the curvature:
+  // without the quadratic term an off-centre field would pass for a tilted one.
+  void DescribeSurface(const std::vector<std::size_t>& fitted) {
+    FieldMap& map = result_.field;
+    const bool with_curvature = fitted.size() >= 6;
+    const Eigen::Index terms = with_curvature ? 4 : 3;
+    const auto n = static_cast<Eigen::Index>(fitted.size());
+    const double mm_per_px = TargetPixelMm();
+    Eigen::MatrixXd design(n, terms);
+    Eigen::VectorXd value(n), weight(n);
+    double farthest2 = 0;  // mm^2 on the target, of the outermost tile
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const FieldTile& tile = map.tiles[fitted[static_cast<std::size_t>(i)]];
+      const Eigen::Vector2d x_mm =
+          mm_per_px * (tile.centre_px - sweep_.camera.sensor.principal_point_px);
+      design(i, 0) = 1;
+      design(i, 1) = x_mm.x();
+      design(i, 2) = x_mm.y();
+      if (with_curvature) design(i, 3) = x_mm.squaredNorm();
+      value[i] = tile.focus_depth_mm.value;
+      weight[i] = 1 / std::pow(std::max(tile.focus_depth_mm.sigma, 1e-9), 2);
+      farthest2 = std::max(farthest2, x_mm.squaredNorm());
+    }
+    const Eigen::MatrixXd normal = design.transpose() * weight.asDiagonal() * design;
+    const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
+    const Eigen::VectorXd surface = solver.solve(design.transpose() * weight.asDiagonal() * value);
+    const Eigen::VectorXd rest = value - design * surface;
+    const double freedom = static_cast<double>(n - terms);
+    const double chi2 = freedom > 0 ? (rest.array().square() * weight.array()).sum() / freedom : 1;
+    const Eigen::MatrixXd covariance =
+        std::max(1.0, chi2) * solver.solve(Eigen::MatrixXd::Identity(terms, terms));
+    const auto degrees = [&](Eigen::Index term) {
+      const double slope = surface[term];
+      return model::Estimate{std::atan(slope) * 180 / kPi,
+                             std::sqrt(covariance(term, term)) / (1 + slope * slope) * 180 / kPi};
+    };
+    map.tilt_right_deg = degrees(1);
+    map.tilt_down_deg = degrees(2);
+    if (with_curvature) {
+      map.curvature_mm =
+          model::Estimate{surface[3] * farthest2, std::sqrt(covariance(3, 3)) * farthest2};
+    }
+    FindClusters(fitted, chi2);
+    WarnOfTilt();
+    WidenBySpread(fitted);
+  }
+
+  // Size of a reference pixel on the target: p z f2/(f1 D).
+  double TargetPixelMm() const {
+    const model::ThickLens& lens = sweep_.camera.lens;
+    const double zf = fit_.values[kFocusDepth];
+    const double d1_mm = model::ImageDistanceMm(lens, zf);
+    const double depth_mm = DepthMm(setup_.frames[setup_.reference].frame);
+    return sweep_.camera.sensor.pixel_pitch_mm /
+           std::abs(model::ChiefRayMagnification(lens, d1_mm, depth_mm));
+  }
+
+  // Depths of a target in steps: where no smooth surface describes the tiles, they are parted at
+  // the gaps between their depths.
+  void FindClusters(std::vector<std::size_t> fitted, double chi2) {
+    FieldMap& map = result_.field;
+    std::sort(fitted.begin(), fitted.end(), [&](std::size_t a, std::size_t b) {
+      return map.tiles[a].focus_depth_mm.value < map.tiles[b].focus_depth_mm.value;
+    });
+    const double scatter = std::sqrt(std::max(1.0, chi2));
+    std::vector<std::vector<std::size_t>> groups(1);
+    for (std::size_t i = 0; i < fitted.size(); ++i) {
+      const model::Estimate& here = map.tiles[fitted[i]].focus_depth_mm;
+      if (i > 0 && chi2 > kRoughSurface) {
+        const model::Estimate& before = map.tiles[fitted[i - 1]].focus_depth_mm;
+        const double gap_mm = here.value - before.value;
+        const double range_mm = map.tiles[fitted.back()].focus_depth_mm.value -
+                                map.tiles[fitted.front()].focus_depth_mm.value;
+        // A gap that holds a third of the whole range stands out of any smooth field.
+        if (gap_mm > kApart * std::hypot(here.sigma, before.sigma) && gap_mm > range_mm / 3)
+          groups.emplace_back();
+      }
+      groups.back().push_back(fitted[i]);
+    }
+    for (const std::vector<std::size_t>& group : groups) {
+      DepthCluster cluster;
+      double weights = 0;
+      for (const std::size_t t : group) {
+        FieldTile& tile = map.tiles[t];
+        tile.cluster = static_cast<int>(map.clusters.size());
+        const double weight = 1 / std::pow(std::max(tile.focus_depth_mm.sigma, 1e-9), 2);
+        cluster.focus_depth_mm.value += weight * tile.focus_depth_mm.value;
+        weights += weight;
+      }
+      cluster.focus_depth_mm.value /= weights;
+      cluster.focus_depth_mm.sigma = scatter / std::sqrt(weights);
+      cluster.tiles = static_cast<int>(group.size());
+      map.clusters.push_back(cluster);
+    }
+    if (map.clusters.size() < 2) return;
+    std::string depths;
+    for (const DepthCluster& cluster : map.clusters) {
+      depths += fmt::format("{}{:.2f} mm ({} parts)", depths.empty() ? "" : ", ",
+                            cluster.focus_depth_mm.value, cluster.tiles);
+    }
+    const double spread_mm =
+        map.clusters.back().focus_depth_mm.value - map.clusters.front().focus_depth_mm.value;
+    result_.warnings.push_back(
+        AstigmatismExplains(spread_mm, result_)
+            ? fmt::format("parts of the field come into focus at {}: the astigmatism is as large, "
+                          "and does that where the texture runs another way; or the target is not "
+                          "at one depth. A target of even texture in all directions tells",
+                          depths)
+            : fmt::format("the target is not at one depth; parts of the field come into focus at "
+                          "{}: restrict roi_px to one of them",
+                          depths));
+  }
+
+  void WarnOfTilt() {
+    const FieldMap& map = result_.field;
+    if (map.clusters.size() > 1) return;
+    const auto significant = [](const model::Estimate& tilt) {
+      return std::abs(tilt.value) > std::max(1.0, 4 * tilt.sigma);
+    };
+    if (!significant(*map.tilt_right_deg) && !significant(*map.tilt_down_deg)) return;
+    double nearest_mm = std::numeric_limits<double>::infinity(), farthest_mm = -nearest_mm;
+    for (const FieldTile& tile : map.tiles) {
+      if (!tile.done) continue;
+      nearest_mm = std::min(nearest_mm, tile.focus_depth_mm.value);
+      farthest_mm = std::max(farthest_mm, tile.focus_depth_mm.value);
+    }
+    result_.warnings.push_back(fmt::format(
+        "{}the target is tilted against the sensor: {:+.1f} +- {:.1f} degrees toward the right, "
+        "{:+.1f} +- {:.1f} toward the bottom (positive: nearer there)",
+        AstigmatismExplains(farthest_mm - nearest_mm, result_)
+            ? "the astigmatism makes parts of the field come into focus at different depths, or "
+            : "",
+        map.tilt_right_deg->value, map.tilt_right_deg->sigma, map.tilt_down_deg->value,
+        map.tilt_down_deg->sigma));
+  }
+
+  // One zf for a field that has several is wrong by as much as they differ beyond their own errors;
+  // where the target stands at several depths, by all of it.
+  void WidenBySpread(const std::vector<std::size_t>& fitted) {
+    const FieldMap& map = result_.field;
+    const double zf = fit_.values[kFocusDepth];
+    double farthest_mm = 0, squares = 0, errors = 0;
+    for (const std::size_t t : fitted) {
+      const model::Estimate& focus = map.tiles[t].focus_depth_mm;
+      farthest_mm = std::max(farthest_mm, std::abs(focus.value - zf));
+      squares += (focus.value - zf) * (focus.value - zf) / static_cast<double>(fitted.size());
+      errors += focus.sigma * focus.sigma / static_cast<double>(fitted.size());
+    }
+    const bool is_flat = map.clusters.size() < 2;
+    const double spread_mm = is_flat ? std::sqrt(std::max(0.0, squares - errors)) : farthest_mm;
+    if (is_flat && !(squares > kSpreadOverErrors * errors)) return;
+    WidenFocus(is_flat ? "zf over the field" : "depths of the target", spread_mm,
+               is_flat
+                   ? "restrict roi_px to the middle of the field, and set the target parallel to "
+                     "the sensor"
+                   : "restrict roi_px to a part of the target at one depth",
+               sweep_.camera.lens, &result_);
+  }
+
+  // zf from the blur along x alone and along y alone.
+  void MeasureAstigmatism() {
+    const TargetWindow& window = evidence_.region.window;
+    const auto along = [&](int axis) {
+      MeterRegion part = PartOf(
+          evidence_.region, [&](std::size_t f) { return NewIndex(f).has_value(); },
+          [&](const Mode& mode) {
+            const Eigen::Vector2d nu = ModeFrequency(mode, window).cwiseAbs();
+            return nu[axis] > nu[1 - axis];
+          });
+      for (std::size_t& f : part.frames) f = *NewIndex(f);
+      std::string message;
+      return FocusOf(part, &message);
+    };
+    const auto along_x = along(0);
+    const auto along_y = along(1);
+    if (!along_x || !along_y) return;
+    result_.field.astigmatism_mm = model::Estimate{along_x->value - along_y->value,
+                                                   std::hypot(along_x->sigma, along_y->sigma)};
+  }
+
+  // Of a frame of the evidence's own set-up among those that are used here.
+  std::optional<std::size_t> NewIndex(std::size_t evidence_index) const {
+    const std::size_t frame = evidence_.spectral.frames[evidence_index].frame;
+    for (std::size_t f = 0; f < setup_.frames.size(); ++f) {
+      if (setup_.frames[f].frame == frame) return f;
+    }
+    return std::nullopt;
+  }
+
+  void MeasureChannels() {
+    const std::size_t reference = setup_.frames[setup_.reference].frame;
+    if (store_.Stored(reference).channels() < 3) return;
+    const cv::Mat red = store_.Channel(reference, 0), blue = store_.Channel(reference, 2);
+    const double mean = cv::mean(red)[0] + cv::mean(blue)[0];
+    if (!(cv::norm(red, blue, cv::NORM_L1) / static_cast<double>(red.total()) >
+          kColourDifference * mean))
+      return;
+    const char* const names[] = {"red", "green", "blue"};
+    for (int channel = 0; channel < 3; ++channel) {
+      ChannelFocus focus;
+      focus.name = names[channel];
+      setup_.read_grey = [this, channel](std::size_t frame) {
+        return store_.Channel(frame, channel);
+      };
+      auto region = PlanRegion(setup_, kWholeField, Eigen::Vector2d::Zero());
+      if (region) {
+        std::vector<MeterRegion> regions = {std::move(*region)};
+        MeasureRegions(setup_, &regions);
+        if (const auto found = FocusOf(regions[0], &focus.message)) {
+          focus.done = true;
+          focus.focus_depth_mm = *found;
+        }
+      }
+      result_.channels.push_back(focus);
+    }
+  }
+
+  const FocusSweep& sweep_;
+  const BlurEvidence& evidence_;
+  const BlurFitResult& fit_;
+  FrameStore& store_;
+  Calibration& result_;
+  SpectralMeterSetup setup_;
+};
+
+}  // namespace
+
+void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
+              FrameStore* store, Calibration* calibration) {
+  Field(sweep, evidence, fit, store, calibration).Run();
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,180 @@
+#include "calib/uncertainty/floor_choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "thicklens/base/statistics.h"
+
+namespace thicklens::calib {
+namespace {
+
+// A lens floor that nobody measured: between a perfect lens and a soft one, px; up to the softest
+// one that a sharp picture may come from where the target does not exclude it.
+constexpr double kUnknownFloorFromPx = 0;
+constexpr double kUnknownFloorToPx = 1.0;
+constexpr double kSoftestLensPx = 3.0;
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr int kRings = 14;
+constexpr double kLowestFrequency = 0.03, kHighestFrequency = 0.33;  // cycles per px
+// Where a soft picture holds noise alone; what a sharp one still has there makes the bound larger.
+constexpr double kNoiseFrom = 0.40, kNoiseTo = 0.49;
+constexpr int kFewestModes = 8;  // in a ring
+
+// sigma^2 of the target's edges in the plane of focus, lens and ink together, if it has edges.
+std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
+  BlurFitSetup setup = evidence.setup;
+  if (evidence.edges >= 0) {
+    setup.meters = {setup.meters[static_cast<std::size_t>(evidence.edges)]};
+    setup.meters[0].held_softness_px2 = 0;
+    setup.floor_variance_px2.reset();
+    const BlurFitResult fit = FitBlur(setup);
+    if (!fit.done || !(fit.values[kFloorVariance] > 0)) return std::nullopt;
+    return fit.values[kFloorVariance];
+  }
+  if (!evidence.unstated_edges) return std::nullopt;
+  setup.floor_variance_px2 = model::Estimate{kUnknownFloorToPx * kUnknownFloorToPx / 2, 0};
+  const BlurFitResult fit = FitBlur(setup);
+  if (!fit.done) return std::nullopt;
+  const double sign = model::DirectionSign(setup.direction);
+  std::vector<double> rests;
+  for (std::size_t i = 0; i < evidence.unstated_edges->frames.size(); ++i) {
+    const FitFrame& frame = setup.frames[evidence.unstated_edges->frames[i]];
+    const double depth_mm = setup.offset_mm.value + sign * frame.reading_mm;
+    const double defocus = FittedDefocusVariance(setup, fit, depth_mm);
+    rests.push_back(evidence.unstated_edges->variances_px2[static_cast<Eigen::Index>(i)] *
+                        frame.scale * frame.scale -
+                    defocus);
+  }
+  const double softness = Median(rests);
+  return softness > 0 ? std::optional<double>(softness) : std::nullopt;
+}
+
+Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::string>* warnings) {
+  if (const std::optional<double> softness_px2 = EdgeSoftness(evidence)) {
+    // From none of the edge's softness to all of it.
+    warnings->push_back(fmt::format(
+        "the edges are {:.2f} px soft at focus; how much of it is the lens and how much the "
+        "target is not known: photograph a knife edge, or state blur_floor_px",
+        std::sqrt(*softness_px2)));
+    return {0, *softness_px2};
+  }
+  double to_px = kUnknownFloorToPx;
+  std::string why = "a softer lens is not";
+  if (evidence.spectrum >= 0) {
+    const std::optional<double> bound = LargestBlurVariance(evidence.spectral, evidence.region);
+    const double bound_px = bound ? std::sqrt(std::max(0.0, *bound)) : kSoftestLensPx;
+    if (bound_px > to_px) {
+      to_px = std::min(bound_px, kSoftestLensPx);
+      why = "the texture, which shows little fine detail, does not exclude a lens as soft as that";
+    }
+  }
+  warnings->push_back(
+      fmt::format("the lens floor cannot be found from this target; {} to {:.1f} px is allowed "
+                  "for, {}: measure it on a knife edge, or state blur_floor_px",
+                  kUnknownFloorFromPx, to_px, why));
+  return {kUnknownFloorFromPx * kUnknownFloorFromPx, to_px * to_px};
+}
+
+struct Ring {
+  double nu = 0, power = 0, sigma = 0;  // |nu| as root mean square; mean power and its error
+};
+
+// Mean power of a mode before the pixel's box was taken out.
+double NoisePower(const SpectralMeterSetup& meter, const MeterRegion& region) {
+  const MeterFrame& frame = meter.frames[meter.reference];
+  const std::vector<Mode> modes = ModesBetween(region.window, kNoiseFrom, kNoiseTo);
+  const auto spectrum = MeasureSpectrum(meter.read_grey(frame.frame), meter.origin_px, frame.place,
+                                        region.window, modes, modes.size());
+  if (!spectrum || modes.empty()) return 0;
+  double sum = 0;
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    const double box = BoxTransfer(modes[k], region.window, frame.place.scale);
+    sum += std::norm(spectrum->values[static_cast<Eigen::Index>(k)]) * box * box;
+  }
+  return std::max(sum / static_cast<double>(modes.size()),
+                  spectrum->noise_gain * frame.pixel_noise * frame.pixel_noise);
+}
+
+std::vector<Ring> MeasureRings(const SpectralMeterSetup& meter, const MeterRegion& region) {
+  const MeterFrame& frame = meter.frames[meter.reference];
+  const std::vector<Mode> modes = ModesBetween(region.window, kLowestFrequency, kHighestFrequency);
+  const auto spectrum = MeasureSpectrum(meter.read_grey(frame.frame), meter.origin_px, frame.place,
+                                        region.window, modes, modes.size());
+  if (!spectrum) return {};
+  const double noise = NoisePower(meter, region);
+  std::vector<Ring> rings(kRings);
+  std::vector<int> counts(kRings, 0);
+  std::vector<double> raw(kRings, 0);
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    const double nu = ModeFrequency(modes[k], region.window).norm();
+    const double part = (nu - kLowestFrequency) / (kHighestFrequency - kLowestFrequency);
+    const auto r = static_cast<std::size_t>(std::clamp<int>(int(part * kRings), 0, kRings - 1));
+    const double box = BoxTransfer(modes[k], region.window, frame.place.scale);
+    const double power = std::norm(spectrum->values[static_cast<Eigen::Index>(k)]);
+    rings[r].nu += nu * nu;
+    rings[r].power += power - noise / (box * box);
+    raw[r] += power;
+    ++counts[r];
+  }
+  std::vector<Ring> kept;
+  for (std::size_t r = 0; r < rings.size(); ++r) {
+    if (counts[r] < kFewestModes) continue;
+    Ring ring = rings[r];
+    ring.nu = std::sqrt(ring.nu / counts[r]);
+    ring.power /= counts[r];
+    // The power of a random texture, noise included, has its own mean as standard deviation.
+    ring.sigma = raw[r] / counts[r] / std::sqrt(counts[r]);
+    kept.push_back(ring);
+  }
+  return kept;
+}
+
+}  // namespace
+
+FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& evidence,
+                        std::vector<std::string>* warnings) {
+  FloorChoice choice;
+  const std::vector<BlurSamples>& meters = evidence.setup.meters;
+  if (known.given_px) {
+    const double px = known.given_px->value;
+    const double sigma_px = known.given_px->sigma;
+    // Near 0 the square's own term counts: the variance of x^2 is 4 mu^2 s^2 + 2 s^4.
+    choice.variance_px2 = model::Estimate{
+        px * px, std::hypot(2 * px * sigma_px, std::sqrt(2.0) * sigma_px * sigma_px)};
+  } else if (known.from_px) {
+    choice.interval_px2 =
+        Eigen::Vector2d(*known.from_px * *known.from_px, *known.to_px * *known.to_px);
+  } else if (std::any_of(meters.begin(), meters.end(), [](const BlurSamples& meter) {
+               return meter.held_softness_px2.has_value();
+             })) {
+    choice.is_measured = true;
+  } else {
+    choice.interval_px2 = UnknownFloor(evidence, warnings);
+  }
+  if (choice.interval_px2) choice.variance_px2 = model::Estimate{choice.interval_px2->mean(), 0};
+  return choice;
+}
+
+std::optional<double> LargestBlurVariance(const SpectralMeterSetup& meter,
+                                          const MeterRegion& region) {
+  if (region.samples.empty() || !meter.read_grey) return std::nullopt;
+  const std::vector<Ring> rings = MeasureRings(meter, region);
+  std::optional<double> least;
+  for (std::size_t a = 0; a < rings.size(); ++a) {
+    for (std::size_t b = a + 1; b < rings.size(); ++b) {
+      const double most = rings[a].power + 2 * rings[a].sigma;
+      const double fewest = rings[b].power - 2 * rings[b].sigma;
+      if (!(fewest > 0) || !(most > 0)) continue;
+      const double apart = rings[b].nu * rings[b].nu - rings[a].nu * rings[a].nu;
+      const double bound = std::max(0.0, std::log(most / fewest) / (4 * kPi * kPi * apart));
+      if (!least || bound < *least) least = bound;
+    }
+  }
+  return least;
+}
+
+}  // namespace thicklens::calib

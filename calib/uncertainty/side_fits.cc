@@ -1,0 +1,74 @@
+// Each side of focus alone.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/uncertainty/systematic_parts.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr std::size_t kFewestOnASide = 6;
+
+// The samples on one side of focus, the target's softness held as the whole sweep has it.
+std::optional<BlurFitSetup> SideOf(const BlurEvidence& evidence, const BlurFitResult& fit,
+                                   bool nearer, std::size_t* frames) {
+  BlurFitSetup setup = evidence.setup;
+  setup.offset_mm.sigma = 0;  // moves both sides alike
+  if (!setup.floor_variance_px2)
+    setup.floor_variance_px2 = model::Estimate{fit.values[kFloorVariance], 0};
+  *frames = 0;
+  for (std::size_t m = 0; m < setup.meters.size(); ++m) {
+    BlurSamples& meter = setup.meters[m];
+    std::vector<Eigen::Index> kept;
+    std::vector<std::size_t> kept_frames;
+    for (std::size_t i = 0; i < meter.frames.size(); ++i) {
+      const double depth_mm = setup.offset_mm.value + model::DirectionSign(setup.direction) *
+                                                          setup.frames[meter.frames[i]].reading_mm;
+      if ((depth_mm < fit.values[kFocusDepth]) != nearer) continue;
+      kept.push_back(static_cast<Eigen::Index>(i));
+      kept_frames.push_back(meter.frames[i]);
+    }
+    BlurSamples side;
+    side.frames = kept_frames;
+    side.variances_px2 = meter.variances_px2(kept);
+    side.covariance = meter.covariance(kept, kept);
+    side.held_softness_px2 = fit.softness_px2[m];
+    meter = std::move(side);
+    *frames = std::max(*frames, kept.size());
+  }
+  setup.meters.erase(std::remove_if(setup.meters.begin(), setup.meters.end(),
+                                    [](const BlurSamples& m) { return m.frames.empty(); }),
+                     setup.meters.end());
+  if (*frames < kFewestOnASide) return std::nullopt;
+  return setup;
+}
+
+SideFit FitSide(const BlurEvidence& evidence, const BlurFitResult& fit, bool nearer) {
+  SideFit side;
+  std::size_t frames = 0;
+  const std::optional<BlurFitSetup> setup = SideOf(evidence, fit, nearer, &frames);
+  side.frames_used = static_cast<int>(frames);
+  if (!setup) {
+    side.message = fmt::format("{} frames on this side, {} are needed", frames, kFewestOnASide);
+    return side;
+  }
+  const BlurFitResult alone = FitBlur(*setup, &fit);
+  side.message = alone.message;
+  if (!alone.done) return side;
+  side.done = true;
+  side.focus_depth_mm = {alone.values[kFocusDepth],
+                         std::sqrt(alone.covariance(kFocusDepth, kFocusDepth))};
+  side.blur_ratio = {alone.values[kBlurRatio], std::sqrt(alone.covariance(kBlurRatio, kBlurRatio))};
+  return side;
+}
+
+}  // namespace
+
+void FitSides(const BlurEvidence& evidence, const BlurFitResult& fit, Calibration* calibration) {
+  calibration->nearer = FitSide(evidence, fit, true);
+  calibration->farther = FitSide(evidence, fit, false);
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,120 @@
+#include "calib/uncertainty/systematic_advice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace thicklens::calib {
+namespace {
+
+double Width(const Eigen::Vector2d& interval) { return interval.y() - interval.x(); }
+
+// A shape that is plain wrong makes kappa another one, whatever the shares of d1 are.
+std::optional<std::string> WrongShape(const Calibration& calibration) {
+  for (const SystematicPart& part : calibration.systematic_parts) {
+    if (part.name == kShapePart && Width(part.blur_ratio) > 0) return part.remedy;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void SortAndAdvise(Calibration* calibration) {
+  std::vector<SystematicPart>& parts = calibration->systematic_parts;
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const SystematicPart& a, const SystematicPart& b) {
+                     return Width(a.image_distance_mm) > Width(b.image_distance_mm);
+                   });
+  const double zf_sigma_mm = calibration->focus_depth_mm->sigma;
+  const double zero_sigma_mm =
+      calibration->bench_offset_mm ? std::min(calibration->bench_offset_mm->sigma, zf_sigma_mm) : 0;
+  const double d1_per_zf =
+      zf_sigma_mm > 0 ? calibration->image_distance_mm->sigma / zf_sigma_mm : 0;
+  const double zero_mm = 2 * 1.96 * d1_per_zf * zero_sigma_mm;
+  const double noise_mm =
+      2 * 1.96 * d1_per_zf * std::sqrt(zf_sigma_mm * zf_sigma_mm - zero_sigma_mm * zero_sigma_mm);
+  double all_mm = noise_mm + zero_mm;
+  for (const SystematicPart& part : parts) all_mm += Width(part.image_distance_mm);
+  if (!(all_mm > 0)) return;
+  const double worst_mm = parts.empty() ? 0 : Width(parts.front().image_distance_mm);
+  if (const auto wrong = WrongShape(*calibration)) {
+    calibration->advice = *wrong;
+    return;
+  }
+  const auto share = [&](double part_mm) { return 100 * part_mm / all_mm; };
+  if (worst_mm > noise_mm && worst_mm > zero_mm) {
+    calibration->advice = fmt::format("{} is {:.0f} % of the error of d1: {}", parts.front().name,
+                                      share(worst_mm), parts.front().remedy);
+  } else if (zero_mm > noise_mm) {
+    calibration->advice = fmt::format(
+        "the bench zero is {:.0f} % of the error of d1: measure offset_mm, or sweep over "
+        "a longer range so that the image scale shows it better",
+        share(zero_mm));
+  } else {
+    calibration->advice = fmt::format(
+        "noise and readings are {:.0f} % of the error of d1: more frames, or a finer bench scale",
+        share(noise_mm));
+  }
+}
+
+void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
+                const model::ThickLens& lens, Calibration* calibration) {
+  const double zf = calibration->focus_depth_mm->value;
+  const double d1_mm = model::ImageDistanceMm(lens, zf);
+  SystematicPart part;
+  part.name = name;
+  part.remedy = remedy;
+  // d1 falls as zf grows; nearer than the focal point nothing comes into focus.
+  const double nearest_mm = std::max(zf - move_mm, std::min(zf, 1.01 * lens.front_focal_length_mm));
+  part.focus_depth_mm = {nearest_mm - zf, move_mm};
+  part.image_distance_mm = {model::ImageDistanceMm(lens, zf + move_mm) - d1_mm,
+                            model::ImageDistanceMm(lens, nearest_mm) - d1_mm};
+  if (calibration->focus_depth_mm->systematic)
+    *calibration->focus_depth_mm->systematic += part.focus_depth_mm;
+  if (calibration->image_distance_mm->systematic)
+    *calibration->image_distance_mm->systematic += part.image_distance_mm;
+  calibration->systematic_parts.push_back(part);
+  SortAndAdvise(calibration);
+}
+
+void WidenByTrials(const std::string& name, const std::string& remedy,
+                   const std::vector<BlurFitSetup>& setups, const BlurFitResult& fit,
+                   Calibration* calibration) {
+  SystematicPart part;
+  part.name = name;
+  part.remedy = remedy;
+  std::optional<Result>& zero = calibration->bench_offset_mm;
+  Eigen::Vector2d zero_mm(0, 0);
+  if (zero) zero_mm = zero->systematic.value_or(Eigen::Vector2d(zero->value, zero->value));
+  for (const BlurFitSetup& setup : setups) {
+    const BlurFitResult trial = FitBlur(setup, &fit);
+    if (!trial.done) {
+      calibration->warnings.push_back(
+          fmt::format("{}: how far it moves the results could not be fitted, and the intervals do "
+                      "not hold it ({})",
+                      name, trial.message));
+      continue;
+    }
+    const double d1_mm = model::ImageDistanceMm(setup.lens, fit.values[kFocusDepth]);
+    const auto widen = [](double move, Eigen::Vector2d* interval) {
+      *interval = {std::min(interval->x(), move), std::max(interval->y(), move)};
+    };
+    widen(trial.values[kFocusDepth] - fit.values[kFocusDepth], &part.focus_depth_mm);
+    widen(model::ImageDistanceMm(setup.lens, trial.values[kFocusDepth]) - d1_mm,
+          &part.image_distance_mm);
+    widen(trial.values[kBlurRatio] - fit.values[kBlurRatio], &part.blur_ratio);
+    widen(setup.offset_mm.value, &zero_mm);
+  }
+  if (zero) zero->systematic = zero_mm;
+  const auto add = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
+    if (*result && (*result)->systematic) *(*result)->systematic += moves;
+  };
+  add(&calibration->focus_depth_mm, part.focus_depth_mm);
+  add(&calibration->image_distance_mm, part.image_distance_mm);
+  add(&calibration->blur_ratio, part.blur_ratio);
+  calibration->systematic_parts.push_back(part);
+  SortAndAdvise(calibration);
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,321 @@
+#include "calib/uncertainty/systematic_parts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/fit/blur_tails.h"
+#include "calib/fit/pupil_shapes.h"
+#include "calib/uncertainty/systematic_advice.h"
+
+namespace thicklens::calib {
+namespace {
+
+constexpr std::size_t kFewestFrames = 5;
+constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
+// Difference of chi^2 of the frames, 4 standard deviations, beyond which a family is ruled out.
+constexpr double kRuledOut = 16;
+constexpr double kLawFails = 2;       // chi^2 per degree of freedom of the blur law
+constexpr double kSidesDisagree = 3;  // of their standard deviations
+// What the meters themselves are good for, relative to kappa: measured on simulated sweeps.
+constexpr double kMeterRatioError = 0.003;
+
+// A choice that was tried: what it is called, the fit with it, and the lens that it is for.
+struct Trial {
+  BlurFitResult fit;
+  model::ThickLens lens;
+};
+
+std::string SideInWords(const SideFit& side) {
+  return side.done ? fmt::format("{} frames", side.frames_used) : side.message;
+}
+
+class Parts {
+ public:
+  Parts(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
+        Calibration* calibration)
+      : sweep_(sweep), evidence_(evidence), fit_(fit), result_(*calibration) {
+    d1_mm_ = model::ImageDistanceMm(evidence.setup.lens, fit.values[kFocusDepth]);
+  }
+
+  void Run(const FloorInterval& floor) {
+    AddFloor(floor);
+    AddSides();
+    AddBand();
+    AddShape();
+    AddTails();
+    AddMeter();
+    AddTolerances();
+    SystematicPart own;
+    own.name = "blur meter";
+    own.blur_ratio = kMeterRatioError * fit_.values[kBlurRatio] * Eigen::Vector2d(-1, 1);
+    own.remedy = "nothing: it is what the meter itself is good for";
+    result_.systematic_parts.push_back(own);
+    SetIntervals(floor);
+    SortAndAdvise(&result_);
+  }
+
+ private:
+  // Widens a part by a trial's answer.
+  void Include(const Trial& trial, SystematicPart* part) const {
+    if (!trial.fit.done) return;
+    const auto widen = [](double move, Eigen::Vector2d* interval) {
+      *interval = {std::min(interval->x(), move), std::max(interval->y(), move)};
+    };
+    const double zf = trial.fit.values[kFocusDepth];
+    widen(zf - fit_.values[kFocusDepth], &part->focus_depth_mm);
+    widen(model::ImageDistanceMm(trial.lens, zf) - d1_mm_, &part->image_distance_mm);
+    widen(trial.fit.values[kBlurRatio] - fit_.values[kBlurRatio], &part->blur_ratio);
+  }
+
+  Trial Try(const BlurFitSetup& setup) const { return {FitBlur(setup, &fit_), setup.lens}; }
+
+  void AddFloor(const FloorInterval& floor) {
+    if (!floor) return;
+    SystematicPart part;
+    part.name = "lens floor";
+    part.remedy =
+        "photograph a knife edge (target: knife-edge) with the same lens and state "
+        "blur_floor_px: {from_calibration: ...}";
+    for (const double end_px2 : {floor->x(), floor->y()}) {
+      BlurFitSetup setup = evidence_.setup;
+      setup.floor_variance_px2 = model::Estimate{end_px2, 0};
+      Include(Try(setup), &part);
+    }
+    result_.systematic_parts.push_back(part);
+  }
+
+  // Only where the two sides contradict each other.
+  void AddSides() {
+    const SideFit& nearer = result_.nearer;
+    const SideFit& farther = result_.farther;
+    if (!nearer.done || !farther.done) {
+      result_.warnings.push_back(
+          fmt::format("the two sides of focus cannot be compared (nearer: {}; farther: {}): a lens "
+                      "that blurs differently on them would not be noticed",
+                      SideInWords(nearer), SideInWords(farther)));
+      return;
+    }
+    const double apart_mm = nearer.focus_depth_mm.value - farther.focus_depth_mm.value;
+    const double sigma_mm = std::hypot(nearer.focus_depth_mm.sigma, farther.focus_depth_mm.sigma);
+    if (!(std::abs(apart_mm) > kSidesDisagree * sigma_mm)) return;
+    result_.warnings.push_back(fmt::format(
+        "the two sides of focus disagree: the nearer frames alone give {:.2f} +- {:.2g} mm, "
+        "the farther ones {:.2f} +- {:.2g} mm",
+        nearer.focus_depth_mm.value, nearer.focus_depth_mm.sigma, farther.focus_depth_mm.value,
+        farther.focus_depth_mm.sigma));
+    SystematicPart part;
+    part.name = "side of focus";
+    part.remedy =
+        "use frames closer to focus: one blur law does not describe both sides (spherical "
+        "aberration, a wrong sensor.transfer or light that changes along the bench do that)";
+    for (const SideFit* side : {&nearer, &farther}) {
+      BlurFitResult as_fit;
+      as_fit.done = true;
+      as_fit.values = fit_.values;
+      as_fit.values[kFocusDepth] = side->focus_depth_mm.value;
+      as_fit.values[kBlurRatio] = side->blur_ratio.value;
+      Include({as_fit, evidence_.setup.lens}, &part);
+    }
+    result_.systematic_parts.push_back(part);
+  }
+
+  // Another set of samples in a meter's place. Frames that were thrown out stay out.
+  std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter) const {
+    if (!samples || meter < 0) return std::nullopt;
+    BlurFitSetup setup = evidence_.setup;
+    BlurSamples& place = setup.meters[static_cast<std::size_t>(meter)];
+    std::vector<Eigen::Index> kept;
+    for (std::size_t i = 0; i < samples->frames.size(); ++i) {
+      if (std::find(place.frames.begin(), place.frames.end(), samples->frames[i]) !=
+          place.frames.end())
+        kept.push_back(static_cast<Eigen::Index>(i));
+    }
+    if (kept.size() < kFewestFrames) return std::nullopt;
+    BlurSamples chosen;
+    chosen.held_softness_px2 = place.held_softness_px2;
+    chosen.variances_px2 = samples->variances_px2(kept);
+    chosen.covariance = samples->covariance(kept, kept);
+    for (const Eigen::Index i : kept)
+      chosen.frames.push_back(samples->frames[static_cast<std::size_t>(i)]);
+    place = std::move(chosen);
+    return Try(setup);
+  }
+
+  void AddBand() {
+    const std::optional<Trial> trial = With(evidence_.narrow_band, evidence_.spectrum);
+    if (!trial) return;
+    SystematicPart part;
+    part.name = "frequency band";
+    part.remedy = "a target with finer texture, or steps closer to focus";
+    Include(*trial, &part);
+    result_.systematic_parts.push_back(part);
+  }
+
+  // The other shape is right beyond doubt: the frames themselves say so, or the law holds with it
+  // and not with the stated one.
+  bool OtherShapeIsRight(const Trial& other) const {
+    if (!other.fit.done) return false;
+    if (evidence_.gaussian_misfit && evidence_.disc_misfit) {
+      const bool is_gaussian = sweep_.camera.psf == model::Psf::kGaussian;
+      const double stated = is_gaussian ? *evidence_.gaussian_misfit : *evidence_.disc_misfit;
+      const double better = is_gaussian ? *evidence_.disc_misfit : *evidence_.gaussian_misfit;
+      if (stated > kShapesDiffer * better) return true;
+    }
+    return evidence_.better_psf != sweep_.camera.psf && fit_.chi2_per_dof > kLawFails &&
+           fit_.chi2_per_dof > 2 * other.fit.chi2_per_dof;
+  }
+
+  // The stated family describes the frames better beyond doubt. Another family's kappa says nothing
+  // then: it is the second moment of a shape that the blur does not have.
+  bool OtherShapeIsRuledOut() const {
+    if (!evidence_.gaussian_misfit || !evidence_.disc_misfit) return false;
+    const bool is_gaussian = sweep_.camera.psf == model::Psf::kGaussian;
+    const double stated = is_gaussian ? *evidence_.gaussian_misfit : *evidence_.disc_misfit;
+    const double other = is_gaussian ? *evidence_.disc_misfit : *evidence_.gaussian_misfit;
+    if (evidence_.shape_dof > 0) return (other / stated - 1) * evidence_.shape_dof > kRuledOut;
+    return other > kShapesDiffer * stated;
+  }
+
+  // The spread over the families that the frames do not rule out. The depth is compared in any
+  // case.
+  void AddShape() {
+    const std::optional<Trial> trial =
+        With(evidence_.other_psf, evidence_.spectrum >= 0 ? evidence_.spectrum : evidence_.edges);
+    if (!trial) return;
+    SystematicPart part;
+    part.name = kShapePart;
+    const bool is_right = OtherShapeIsRight(*trial);
+    const model::Psf other = OtherPsf(sweep_.camera.psf);
+    part.remedy =
+        is_right || evidence_.better_psf != sweep_.camera.psf
+            ? fmt::format("state psf: {} in the camera file: it fits better", model::PsfName(other))
+            : std::string("nothing: the shape that the camera file states fits better");
+    Include(*trial, &part);
+    if (!is_right && OtherShapeIsRuledOut()) part.blur_ratio.setZero();
+    result_.systematic_parts.push_back(part);
+    if (!is_right) return;
+    result_.warnings.push_back(fmt::format(
+        "the blur is a {}, not the {} that the camera file states: with it the frames "
+        "follow the blur law (chi2/dof {:.3g} against {:.3g}) and the blur ratio is "
+        "{:.4f}; state psf: {} in the camera file",
+        model::PsfName(other), model::PsfName(sweep_.camera.psf), trial->fit.chi2_per_dof,
+        fit_.chi2_per_dof, trial->fit.values[kBlurRatio], model::PsfName(other)));
+  }
+
+  // What the shape of the blur's tails does to its second moment: pupil laws differ by it.
+  void AddTails() {
+    const double kappa = fit_.values[kBlurRatio];
+    const double zf_mm = fit_.values[kFocusDepth];
+    if (!(kappa > 0) || !(zf_mm > evidence_.setup.lens.front_focal_length_mm)) return;
+    const model::PupilOptics optics =
+        model::PupilOpticsOf(evidence_.setup.lens, sweep_.camera.psf, kappa, zf_mm);
+    SystematicPart part;
+    part.name = "tails of the blur";
+    part.remedy =
+        "a smaller aperture: of a wide one the light's spread over the pupil is known too little";
+    if (const auto range = TailsLeft(sweep_.camera.psf, fit_, evidence_)) {
+      for (const double tails : {range->x(), range->y()}) {
+        if (tails == 0) continue;
+        BlurSamples moved = FitSamples(evidence_, evidence_.blur, evidence_.region);
+        moved.variances_px2 += tails * evidence_.blur.variance_by_tails;
+        if (const auto trial = With(moved, evidence_.spectrum)) Include(*trial, &part);
+      }
+    }
+    const bool is_possible = optics.sigma_mm <= model::kWidestPupil * optics.image_distance_mm;
+    if (evidence_.edges >= 0 && is_possible) {
+      const Eigen::Vector2d ratios = EdgeRatiosOfPupilLaws(optics);
+      part.blur_ratio.x() = std::min(part.blur_ratio.x(), kappa * (1 / ratios.y() - 1));
+      part.blur_ratio.y() = std::max(part.blur_ratio.y(), kappa * (1 / ratios.x() - 1));
+    }
+    if (part.blur_ratio.isZero() && part.focus_depth_mm.isZero()) return;
+    result_.systematic_parts.push_back(part);
+  }
+
+  // Each meter alone, where there are two.
+  void AddMeter() {
+    if (evidence_.setup.meters.size() < 2) return;
+    SystematicPart part;
+    part.name = "edges against texture";
+    part.remedy = "check that edge and texture lie in one plane";
+    for (std::size_t m = 0; m < evidence_.setup.meters.size(); ++m) {
+      BlurFitSetup setup = evidence_.setup;
+      setup.meters = {evidence_.setup.meters[m]};
+      // What one meter says of the floor holds for the other too.
+      if (!setup.floor_variance_px2)
+        setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
+      Include(Try(setup), &part);
+    }
+    result_.systematic_parts.push_back(part);
+  }
+
+  // The numbers of the camera file that state a tolerance.
+  void AddTolerances() {
+    for (const auto& [field, statement] : sweep_.camera.statements) {
+      if (!(statement.tolerance > 0)) continue;
+      SystematicPart part;
+      part.name = field;
+      part.remedy = fmt::format("measure {} better than +- {:.3g}", field, statement.tolerance);
+      bool is_used = false;
+      for (const double change : {-statement.tolerance, statement.tolerance}) {
+        BlurFitSetup setup = evidence_.setup;
+        if (!Change(field, change, &setup)) continue;
+        is_used = true;
+        Include(Try(setup), &part);
+      }
+      if (is_used) result_.systematic_parts.push_back(part);
+    }
+  }
+
+  // Moves a number of the camera file; false for those that the fit does not use, or an impossible
+  // value.
+  static bool Change(const std::string& field, double change, BlurFitSetup* setup) {
+    double* number = field == "lens.front_focal_length_mm"  ? &setup->lens.front_focal_length_mm
+                     : field == "lens.rear_focal_length_mm" ? &setup->lens.rear_focal_length_mm
+                     : field == "lens.lens_thickness_mm"    ? &setup->lens.lens_thickness_mm
+                     : field == "lens.aperture_radius_mm"   ? &setup->lens.aperture_radius_mm
+                     : field == "sensor.pixel_pitch_mm"     ? &setup->pixel_pitch_mm
+                                                            : nullptr;
+    if (number == nullptr) return false;
+    *number += change;
+    return setup->lens.IsValid(nullptr) && setup->pixel_pitch_mm > 0;
+  }
+
+  // The floor's ends are as likely as its middle, so they add; the rest adds in quadrature.
+  void SetIntervals(const FloorInterval& floor) {
+    const auto total = [&](Eigen::Vector2d SystematicPart::*of) {
+      Eigen::Vector2d ends(0, 0), squares(0, 0);
+      for (const SystematicPart& part : result_.systematic_parts) {
+        if (floor && part.name == "lens floor") {
+          ends += part.*of;
+        } else {
+          squares += (part.*of).cwiseAbs2();
+        }
+      }
+      return Eigen::Vector2d(ends.x() - std::sqrt(squares.x()), ends.y() + std::sqrt(squares.y()));
+    };
+    const auto set = [](std::optional<Result>* result, const Eigen::Vector2d& moves) {
+      (*result)->systematic = moves.array() + (*result)->value;
+    };
+    set(&result_.focus_depth_mm, total(&SystematicPart::focus_depth_mm));
+    set(&result_.image_distance_mm, total(&SystematicPart::image_distance_mm));
+    set(&result_.blur_ratio, total(&SystematicPart::blur_ratio));
+  }
+
+  const FocusSweep& sweep_;
+  const BlurEvidence& evidence_;
+  const BlurFitResult& fit_;
+  Calibration& result_;
+  double d1_mm_ = 0;
+};
+
+}  // namespace
+
+void AddSystematicParts(const FocusSweep& sweep, const BlurEvidence& evidence,
+                        const BlurFitResult& fit, const FloorInterval& floor,
+                        Calibration* calibration) {
+  Parts(sweep, evidence, fit, calibration).Run(floor);
+}
+
+}  // namespace thicklens::calib

@@ -1,0 +1,28 @@
+#ifndef THICKLENS_CALIB_UNCERTAINTY_SYSTEMATIC_PARTS_H_
+#define THICKLENS_CALIB_UNCERTAINTY_SYSTEMATIC_PARTS_H_
+
+#include <optional>
+#include <string>
+
+#include "calib/fit/blur_measurement.h"
+#include "thicklens/calib/calibration.h"
+#include "thicklens/calib/focus_sweep.h"
+
+namespace thicklens::calib {
+
+// What is not known of the floor: an interval of S0, px^2, or nothing.
+using FloorInterval = std::optional<Eigen::Vector2d>;
+
+// Fits each side of focus alone, with what the target's softness came out as: the self-test.
+void FitSides(const BlurEvidence& evidence, const BlurFitResult& fit, Calibration* calibration);
+
+// Tries every choice that another person might have made (floor, side, band, shape, meter, the
+// camera's stated tolerances) and notes how far it moves each result; fills in the systematic
+// intervals, the table of parts and the advice.
+void AddSystematicParts(const FocusSweep& sweep, const BlurEvidence& evidence,
+                        const BlurFitResult& fit, const FloorInterval& floor,
+                        Calibration* calibration);
+
+}  // namespace thicklens::calib
+
+#endif  // THICKLENS_CALIB_UNCERTAINTY_SYSTEMATIC_PARTS_H_

@@ -1,0 +1,70 @@
+// A calibration has errors, but they do not lean to one side.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using namespace thicklens::testing;
+
+struct Errors {
+  bool found = false;
+  double image_distance_mm = 0, blur_ratio = 0;
+};
+
+// The mean error is within two of its own standard errors.
+void ExpectNoBias(const std::string& name, const std::vector<double>& errors) {
+  const auto count = static_cast<double>(errors.size());
+  double mean = 0, variance = 0;
+  for (const double error : errors) mean += error / count;
+  for (const double error : errors) variance += std::pow(error - mean, 2) / (count - 1);
+  const double standard_error = std::sqrt(variance / count);
+  EXPECT_GT(standard_error, 0) << name;
+  EXPECT_LT(std::abs(mean), 2 * standard_error) << name << ": mean " << mean;
+  ::testing::Test::RecordProperty(name + "_mean", std::to_string(1e6 * mean) + "e-6");
+  ::testing::Test::RecordProperty(name + "_standard_error",
+                                  std::to_string(1e6 * standard_error) + "e-6");
+}
+
+// A hundred sweeps of leaves, floors drawn from their stated error. Of a calibration without bias
+// two results pass two standard errors for one in ten choices of seeds.
+void ExpectNoBiasOfSweeps(const std::string& case_name) {
+  constexpr int kSweeps = 100, kSizePx = 96;
+  CalibrationOptions how;
+  how.map_field = false;
+  how.threads = 1;
+  std::vector<Errors> errors(kSweeps);
+  ParallelFor(kSweeps, 0, [&](int i) {
+    const auto seed = static_cast<std::uint64_t>(20000 + i);
+    SimulatedSweep s = Simulate(SweepCase(case_name, kSizePx, seed));
+    GiveDrawnFloor(&s, seed);
+    const Calibration c = Calibrate(s.sweep, how);
+    if (!c.image_distance_mm || !c.blur_ratio) return;
+    errors[static_cast<std::size_t>(i)] = {true,
+                                           c.image_distance_mm->value - s.truth.image_distance_mm,
+                                           c.blur_ratio->value - s.truth.blur_ratio};
+  });
+  std::vector<double> image_distance_mm, blur_ratio;
+  for (const Errors& error : errors) {
+    if (!error.found) continue;
+    image_distance_mm.push_back(error.image_distance_mm);
+    blur_ratio.push_back(error.blur_ratio);
+  }
+  ASSERT_GE(image_distance_mm.size(), 98U);
+  ExpectNoBias("image_distance_mm", image_distance_mm);
+  ExpectNoBias("blur_ratio", blur_ratio);
+}
+
+TEST(BiasSlow, MacroLens) { ExpectNoBiasOfSweeps("ii"); }
+
+}  // namespace
+}  // namespace thicklens::calib

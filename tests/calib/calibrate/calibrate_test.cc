@@ -1,0 +1,357 @@
+#include "thicklens/calib/calibrate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "support/error_message.h"
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/model/camera_file.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using thicklens::testing::ErrorOf;
+using thicklens::testing::GiveFloor;
+using thicklens::testing::Simulate;
+using thicklens::testing::SimulatedSweep;
+using thicklens::testing::SweepCase;
+
+constexpr int kSizePx = 160;
+
+// A copy of a sweep whose frames may be damaged.
+SimulatedSweep CopyOf(const SimulatedSweep& original) {
+  SimulatedSweep copy = original;
+  copy.stored = std::make_shared<std::vector<cv::Mat>>();
+  for (const cv::Mat& frame : *original.stored) copy.stored->push_back(frame.clone());
+  copy.sweep.read_frame = [stored = copy.stored](std::size_t i) { return (*stored)[i]; };
+  return copy;
+}
+
+// Case iii on a small field, dead leaves, floor and bench zero given.
+SimulatedSweep Good() {
+  static const SimulatedSweep rendered = [] {
+    SimulatedSweep sweep = Simulate(SweepCase("iii", kSizePx, 1));
+    GiveFloor(&sweep);
+    return sweep;
+  }();
+  return CopyOf(rendered);
+}
+
+void Keep(SimulatedSweep* simulated, std::size_t first, std::size_t count) {
+  auto& frames = simulated->sweep.frames;
+  frames = {frames.begin() + static_cast<std::ptrdiff_t>(first),
+            frames.begin() + static_cast<std::ptrdiff_t>(first + count)};
+  auto& stored = *simulated->stored;
+  stored = {stored.begin() + static_cast<std::ptrdiff_t>(first),
+            stored.begin() + static_cast<std::ptrdiff_t>(first + count)};
+}
+
+Calibration Calibrated(const SimulatedSweep& simulated) {
+  Calibration c = Calibrate(simulated.sweep, {});
+  return c;
+}
+
+void ExpectRefused(const Calibration& c, const std::string& why) {
+  EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
+  EXPECT_THAT(c.reason, HasSubstr(why));
+  EXPECT_FALSE(c.image_distance_mm);
+  EXPECT_FALSE(c.focus_depth_mm);
+  EXPECT_FALSE(c.blur_ratio);
+}
+
+// Right within its own errors, and those are small.
+void ExpectRight(const Calibration& c, const model::SweepTruth& truth) {
+  ASSERT_TRUE(c.focus_depth_mm) << c.reason;
+  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+  EXPECT_LT(std::abs(c.focus_depth_mm->value - truth.focus_depth_mm), 3 * c.focus_depth_mm->sigma);
+  EXPECT_LT(c.focus_depth_mm->sigma, 0.15);
+  EXPECT_NEAR(c.blur_ratio->value / truth.blur_ratio, 1, 0.005);
+  EXPECT_NEAR(c.image_distance_mm->value, truth.image_distance_mm, 3 * c.image_distance_mm->sigma);
+}
+
+TEST(Calibrate, AGoodSweepIsRight) { ExpectRight(Calibrated(Good()), Good().truth); }
+
+TEST(Calibrate, OneAndTwoThreadsGiveTheSameBits) {
+  const SimulatedSweep good = Good();
+  CalibrationOptions options;
+  options.threads = 1;
+  const Calibration one = Calibrate(good.sweep, options);
+  options.threads = 2;
+  const Calibration two = Calibrate(good.sweep, options);
+  ASSERT_TRUE(one.focus_depth_mm && two.focus_depth_mm);
+  EXPECT_EQ(one.focus_depth_mm->value, two.focus_depth_mm->value);
+  EXPECT_EQ(one.focus_depth_mm->sigma, two.focus_depth_mm->sigma);
+  EXPECT_EQ(one.blur_ratio->value, two.blur_ratio->value);
+  EXPECT_EQ(one.scale.offset_mm.value, two.scale.offset_mm.value);
+  EXPECT_EQ(one.source.blur_ratio, two.source.blur_ratio);
+  EXPECT_TRUE(one.covariance == two.covariance);
+}
+
+TEST(Calibrate, TheSourcesRecipeAndThePeakNeedNoFit) {
+  const SimulatedSweep good = Good();
+  const Calibration whole = Calibrated(good);
+  CalibrationOptions options;
+  options.fit_blur = false;
+  const Calibration alone = Calibrate(good.sweep, options);
+  EXPECT_EQ(alone.outcome, Outcome::kPartial);
+  EXPECT_EQ(alone.reason, "the blur was not to be fitted");
+  ASSERT_TRUE(alone.source.done && alone.sharpness.done);
+  EXPECT_EQ(alone.source.focus_depth_mm, whole.source.focus_depth_mm);
+  EXPECT_EQ(alone.source.blur_ratio, whole.source.blur_ratio);
+  EXPECT_EQ(alone.sharpness.focus_depth_mm, whole.sharpness.focus_depth_mm);
+  EXPECT_FALSE(alone.image_distance_mm || alone.blur_ratio || alone.blur.done || alone.field.done);
+  EXPECT_FALSE(alone.scale.done);  // the bench zero is given
+}
+
+TEST(Calibrate, WithoutFitAnUnknownBenchZeroIsStillFound) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  CalibrationOptions options;
+  options.fit_blur = false;
+  const Calibration alone = Calibrate(s.sweep, options);
+  ASSERT_TRUE(alone.scale.done && alone.bench_offset_mm);
+  EXPECT_NEAR(alone.bench_offset_mm->value, s.truth.bench_offset_mm,
+              4 * alone.bench_offset_mm->sigma);
+  EXPECT_NEAR(alone.sharpness.focus_depth_mm, Calibrated(s).sharpness.focus_depth_mm, 0.1);
+}
+
+TEST(Calibrate, ThreeFramesAreTooFew) {
+  SimulatedSweep s = Good();
+  Keep(&s, 18, 3);
+  ExpectRefused(Calibrated(s), "at least 5 frames, this one has 3");
+}
+
+TEST(Calibrate, EqualReadingsAreNamed) {
+  SimulatedSweep s = Good();
+  for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm = 412;
+  ExpectRefused(Calibrated(s), "different readings, this one has 1 (all are 412 mm)");
+}
+
+TEST(Calibrate, ABlankTargetShowsNoTexture) {
+  SimulatedSweep s = Good();
+  cv::RNG random(4);
+  for (cv::Mat& frame : *s.stored) {
+    cv::Mat noise(frame.size(), CV_32F);
+    random.fill(noise, cv::RNG::NORMAL, 110, 3);
+    noise.convertTo(frame, CV_8U);
+  }
+  ExpectRefused(Calibrated(s), "no texture above the noise");
+}
+
+TEST(Calibrate, ADarkSweepIsNamedDark) {
+  SimulatedSweep s = Good();
+  for (cv::Mat& frame : *s.stored) frame.setTo(1);
+  ExpectRefused(Calibrated(s), "under-exposed: raise the exposure");
+}
+
+TEST(Calibrate, AFrameOfAnotherSizeIsAnErrorThatNamesIt) {
+  SimulatedSweep s = Good();
+  s.frame(7) = cv::Mat(kSizePx, kSizePx + 1, CV_8U, cv::Scalar(100));
+  EXPECT_THAT(ErrorOf([&] { Calibrated(s); }), HasSubstr("frame-7: the picture is 161 x 160 px"));
+}
+
+TEST(Calibrate, AReversedDirectionIsRefusedByItsName) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  s.sweep.direction = model::BenchDirection::kToward;
+  ExpectRefused(Calibrated(s), "direction must be 'away'");
+}
+
+TEST(Calibrate, AnUnknownBenchZeroIsFound) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm -= 45;
+  const Calibration c = Calibrated(s);
+  ASSERT_TRUE(c.bench_offset_mm) << c.reason;
+  EXPECT_NEAR(c.bench_offset_mm->value, 45, 3 * c.bench_offset_mm->sigma);
+  ASSERT_TRUE(c.focus_depth_mm);
+  EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma);
+  // The bench zero's error is in the focus' error.
+  EXPECT_GE(c.focus_depth_mm->sigma, 0.8 * c.bench_offset_mm->sigma);
+}
+
+TEST(Calibrate, OnePictureRepeatedIsRefused) {
+  SimulatedSweep s = Good();
+  for (cv::Mat& frame : *s.stored) frame = s.frame(16).clone();
+  {
+    SCOPED_TRACE("bench zero given");
+    const Calibration c = Calibrated(s);
+    EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
+    EXPECT_FALSE(c.blur_ratio);
+  }
+  s.sweep.offset_mm.reset();
+  ExpectRefused(Calibrated(s), "does not change with the reading");
+}
+
+TEST(Calibrate, AFocusBeyondTheSweepIsSaidToBeBeyondIt) {
+  for (const bool nearer : {false, true}) {
+    SCOPED_TRACE(nearer);
+    // The focus at 400 mm lies 20 steps into the sweep; 11 frames that stay 25 mm clear of it.
+    SimulatedSweep s = Good();
+    Keep(&s, nearer ? 27 : 2, 11);
+    const Calibration c = Calibrated(s);
+    if (c.outcome == Outcome::kRefused) {
+      EXPECT_THAT(c.reason, HasSubstr(nearer ? "lies nearer" : "lies farther"));
+    } else {
+      EXPECT_THAT(c.warnings, Contains(HasSubstr("is extrapolated")));
+      EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
+    }
+  }
+}
+
+TEST(Calibrate, AWrongFocalLengthIsRefusedAsUnphysical) {
+  SimulatedSweep s = Simulate(SweepCase("ii", kSizePx, 1));
+  GiveFloor(&s);
+  s.sweep.camera.lens.front_focal_length_mm = s.sweep.camera.lens.rear_focal_length_mm = 35;
+  // The aperture's radius follows from the f-number.
+  s.sweep.camera.lens.aperture_radius_mm *= 35.0 / 50;
+  ExpectRefused(Calibrated(s), "which no lens has");
+}
+
+TEST(Calibrate, StopsWhenProgressSaysSo) {
+  const SimulatedSweep s = Good();
+  CalibrationOptions options;
+  int calls = 0, last = 0;
+  options.progress = [&](int done, int total) {
+    EXPECT_GT(done, last);
+    EXPECT_LE(done, total);
+    last = done;
+    return ++calls < 10;
+  };
+  EXPECT_THROW(Calibrate(s.sweep, options), Interrupted);
+  EXPECT_LT(calls, 14);  // other threads may finish a frame meanwhile
+}
+
+// Whatever step it is at, nothing takes the end for a frame or a fit that failed.
+TEST(Calibrate, IsCancelledAtEachStep) {
+  const SimulatedSweep s = Good();
+  CalibrationOptions options;
+  options.threads = 1;
+  int steps = 0;
+  options.progress = [&](int, int) {
+    ++steps;
+    return true;
+  };
+  Calibrate(s.sweep, options);
+  for (int at = 1; at <= steps; at += 1 + steps / 4) {
+    CancelToken token;
+    const CancelScope scope(&token);
+    int step = 0;
+    options.progress = [&](int, int) {
+      if (++step == at) token.Cancel();
+      return true;
+    };
+    EXPECT_THROW(Calibrate(s.sweep, options), Interrupted) << "at step " << at << " of " << steps;
+    EXPECT_LE(step, at + 1);
+  }
+}
+
+// d1 = rho + f2 zf/(zf - f1): a tolerance of f2 goes into it times zf/(zf - f1), one of the pitch
+// into kappa in proportion.
+TEST(Calibrate, StatedTolerancesWidenTheSystematicInterval) {
+  SimulatedSweep s = Good();
+  const Calibration exact = Calibrated(s);
+  s.sweep.camera.statements["lens.rear_focal_length_mm"] = {0.1, false};
+  s.sweep.camera.statements["sensor.pixel_pitch_mm"] = {0.02 * s.sweep.camera.sensor.pixel_pitch_mm,
+                                                        false};
+  const Calibration c = Calibrated(s);
+  ASSERT_TRUE(exact.image_distance_mm && c.image_distance_mm);
+  EXPECT_EQ(c.image_distance_mm->value, exact.image_distance_mm->value);
+  const double zf = c.focus_depth_mm->value;
+  const double half_mm = 0.1 * zf / (zf - s.sweep.camera.lens.front_focal_length_mm);
+  EXPECT_NEAR(c.image_distance_mm->systematic->y() - exact.image_distance_mm->systematic->y(),
+              half_mm, 1e-3);
+  // With what the meter itself is good for, and whatever else there is, in quadrature.
+  const double before = exact.blur_ratio->systematic->y() - exact.blur_ratio->value;
+  const double after = c.blur_ratio->systematic->y() - c.blur_ratio->value;
+  EXPECT_NEAR(std::sqrt(after * after - before * before), 0.02 * c.blur_ratio->value,
+              0.001 * c.blur_ratio->value);
+}
+
+TEST(Calibrate, ABlackAndAnOverexposedFrameAreRejectedByName) {
+  SimulatedSweep s = Good();
+  s.frame(5).setTo(0);
+  s.frame(30).convertTo(s.frame(30), CV_8U, 4);
+  const Calibration c = Calibrated(s);
+  ExpectRight(c, s.truth);
+  EXPECT_THAT(c.frames[5].rejection, HasSubstr("dark"));
+  EXPECT_THAT(c.frames[30].rejection, HasSubstr("saturated"));
+  EXPECT_EQ(std::count_if(c.frames.begin(), c.frames.end(),
+                          [](const FrameMeasurement& f) { return !f.rejection.empty(); }),
+            2);
+  EXPECT_EQ(c.frames_used, c.blur.frames_used);
+  EXPECT_GE(c.frames_used, 37);
+}
+
+TEST(Calibrate, SwappedReadingsAreNamedAndDoNoHarm) {
+  SimulatedSweep s = Good();
+  std::swap(s.sweep.frames[4].reading_mm, s.sweep.frames[12].reading_mm);
+  const Calibration c = Calibrated(s);
+  ExpectRight(c, s.truth);
+  EXPECT_THAT(c.frames[4].rejection, HasSubstr("swapped with frame-12"));
+  EXPECT_THAT(c.frames[12].rejection, HasSubstr("swapped with frame-4"));
+  for (const std::size_t i : {4U, 12U}) EXPECT_FALSE(c.frames[i].in_blur_fit) << i;
+}
+
+TEST(Calibrate, AnUnknownFloorLeavesItUnwrittenAndTheTruthInsideTheInterval) {
+  SimulatedSweep s = Good();
+  s.sweep.floor = {};
+  const Calibration c = Calibrated(s);
+  EXPECT_EQ(c.outcome, Outcome::kPartial);
+  EXPECT_THAT(c.reason, HasSubstr("blur_floor_px"));
+  ASSERT_TRUE(c.focus_depth_mm && c.focus_depth_mm->systematic);
+  const Eigen::Vector2d interval = *c.focus_depth_mm->systematic;
+  EXPECT_GT(s.truth.focus_depth_mm, interval.x() - 3 * c.focus_depth_mm->sigma);
+  EXPECT_LT(s.truth.focus_depth_mm, interval.y() + 3 * c.focus_depth_mm->sigma);
+  EXPECT_GT(interval.y() - interval.x(), 0.5);
+}
+
+TEST(CalibratedCamera, KeepsTheMakersValuesAndSurvivesItsFile) {
+  SimulatedSweep s = Good();
+  const Calibration c = Calibrated(s);
+  model::Camera typed_in = s.sweep.camera;
+  typed_in.statements["lens.aperture_radius_mm"] = {0.1, true};
+  const model::Camera camera = CalibratedCamera(typed_in, c, false);
+  EXPECT_EQ(camera.lens.front_focal_length_mm, typed_in.lens.front_focal_length_mm);
+  EXPECT_EQ(camera.lens.rear_focal_length_mm, typed_in.lens.rear_focal_length_mm);
+  EXPECT_EQ(camera.lens.lens_thickness_mm, typed_in.lens.lens_thickness_mm);
+  EXPECT_EQ(camera.lens.aperture_radius_mm, typed_in.lens.aperture_radius_mm);
+  EXPECT_EQ(camera.sensor.pixel_pitch_mm, typed_in.sensor.pixel_pitch_mm);
+  EXPECT_EQ(camera.statements.size(), 1U);
+
+  const model::Camera read = model::ParseCamera(model::CameraToYaml(camera), "written");
+  ASSERT_TRUE(read.calibration);
+  EXPECT_EQ(read.image_distance_mm(), c.image_distance_mm->value);
+  EXPECT_EQ(read.blur_ratio(), c.blur_ratio->value);
+  EXPECT_EQ(read.calibration->covariance_order, c.covariance_order);
+  EXPECT_TRUE(read.calibration->covariance == c.covariance);
+  EXPECT_EQ(read.calibration->blur_floor_px->value, c.blur_floor_px->value);
+  EXPECT_EQ(read.calibration->bench_offset_mm->value, c.bench_offset_mm->value);
+  EXPECT_NEAR(std::sqrt(c.covariance(0, 0)), c.image_distance_mm->sigma,
+              1e-9 * c.image_distance_mm->sigma);
+}
+
+TEST(CalibratedCamera, DoesNotWriteWhatTheDataDidNotFix) {
+  SimulatedSweep s = Good();
+  s.sweep.floor = {};
+  const model::Camera camera = CalibratedCamera(s.sweep.camera, Calibrated(s), false);
+  ASSERT_TRUE(camera.calibration);
+  EXPECT_FALSE(camera.calibration->blur_floor_px);
+  EXPECT_TRUE(camera.calibration->image_distance_mm);
+  EXPECT_THAT(camera.calibration->covariance_order, Not(Contains("blur_floor_px")));
+  EXPECT_EQ(camera.calibration->covariance.rows(), 3);
+  EXPECT_EQ(model::CameraToYaml(camera).find("blur_floor_px"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace thicklens::calib

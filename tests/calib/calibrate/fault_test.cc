@@ -1,0 +1,252 @@
+// What goes wrong on a bench must not go into the result unnoticed: damaged frames are named and do
+// no harm, sweeps that would give a confident wrong answer are refused, harmless things are.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <regex>
+#include <string>
+
+#include "tests/calib/damaged_sweep.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using namespace thicklens::testing;
+using ::testing::ContainsRegex;
+
+constexpr int kSizePx = 192;
+
+// Dead leaves with the floor and the bench zero given, rendered once.
+const SimulatedSweep& Clean(const std::string& name) {
+  static std::map<std::string, SimulatedSweep> rendered;
+  const auto found = rendered.find(name);
+  if (found != rendered.end()) return found->second;
+  SimulatedSweep sweep = Simulate(SweepCase(name, kSizePx, 1));
+  GiveFloor(&sweep);
+  return rendered.emplace(name, sweep).first->second;
+}
+
+Calibration Calibrated(const SimulatedSweep& simulated) {
+  CalibrationOptions options;
+  options.map_field = false;
+  return Calibrate(simulated.sweep, options);
+}
+
+// Of the clean sweep of a case, calibrated once.
+const Calibration& CleanResult(const std::string& name) {
+  static std::map<std::string, Calibration> results;
+  const auto found = results.find(name);
+  if (found != results.end()) return found->second;
+  return results.emplace(name, Calibrated(Clean(name))).first->second;
+}
+
+// "frame-3" and not "frame-31".
+bool NamesFrame(const std::string& text, const std::string& name) {
+  return std::regex_search(text, std::regex(name + "([^0-9]|$)"));
+}
+
+// All that is said of one frame.
+std::string Said(const Calibration& c, std::size_t frame) {
+  std::string said = c.frames[frame].rejection;
+  for (const std::string& warning : c.warnings) {
+    if (NamesFrame(warning, c.frames[frame].image)) said += " | " + warning;
+  }
+  return said;
+}
+
+void ExpectRefused(const Calibration& c, const std::string& why) {
+  EXPECT_EQ(c.outcome, Outcome::kRefused) << c.reason;
+  EXPECT_THAT(c.reason, ContainsRegex(why));
+  EXPECT_FALSE(c.image_distance_mm);
+  EXPECT_FALSE(c.focus_depth_mm);
+  EXPECT_FALSE(c.blur_ratio);
+}
+
+// "reading off by 15.1 mm": the amount, without its sign.
+std::optional<double> AmountOff(const std::string& said) {
+  static const std::regex amount(R"(reading off by (?:about )?([-+]?[0-9]+\.?[0-9]*) mm)");
+  std::smatch found;
+  if (!std::regex_search(said, found, amount)) return std::nullopt;
+  return std::abs(std::stod(found[1]));
+}
+
+void ExpectReadingOffBy(const Calibration& c, std::size_t frame, double amount_mm) {
+  SCOPED_TRACE(c.frames[frame].image + ": " + Said(c, frame));
+  const std::optional<double> off_mm = AmountOff(Said(c, frame));
+  ASSERT_TRUE(off_mm);
+  EXPECT_NEAR(*off_mm, std::abs(amount_mm), 0.1 * std::abs(amount_mm) + 0.3);
+}
+
+void ExpectRightInSpiteOfFaults(const std::string& name) {
+  SimulatedSweep damaged = DeepCopy(Clean(name));
+  const PlantedFaults faults = PlantFaults(&damaged);
+  const Calibration& clean = CleanResult(name);
+  ASSERT_TRUE(clean.focus_depth_mm) << clean.reason;
+  const Calibration c = Calibrated(damaged);
+  ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio && c.image_distance_mm) << c.reason;
+  const model::SweepTruth& truth = damaged.truth;
+  const auto within = [](const Result& r, double true_value) {
+    EXPECT_LT(std::abs(r.value - true_value), 2.5 * r.sigma);
+  };
+  within(*c.focus_depth_mm, truth.focus_depth_mm);
+  within(*c.image_distance_mm, truth.image_distance_mm);
+  within(*c.blur_ratio, truth.blur_ratio);
+  EXPECT_LT(c.focus_depth_mm->sigma, 1.5 * clean.focus_depth_mm->sigma);
+  EXPECT_LT(c.blur_ratio->sigma, 1.5 * clean.blur_ratio->sigma);
+  for (const std::size_t frame : {faults.black, faults.white, faults.overexposed, faults.smeared}) {
+    EXPECT_NE(Said(c, frame), "") << "nothing is said of " << c.frames[frame].image;
+  }
+  ExpectReadingOffBy(c, faults.shifted, faults.shift_mm);
+  ExpectReadingOffBy(c, faults.swapped_first, faults.swap_mm);
+  ExpectReadingOffBy(c, faults.swapped_second, faults.swap_mm);
+  // And hardly a sound one is called off.
+  EXPECT_LE(std::count_if(c.frames.begin(), c.frames.end(),
+                          [&](const FrameMeasurement& frame) { return !frame.rejection.empty(); }),
+            7 + static_cast<int>(c.frames.size()) / 20);
+}
+
+TEST(PlantedFaults, AreNamedAndDoNoHarmInStrongDefocus) { ExpectRightInSpiteOfFaults("ii"); }
+TEST(PlantedFaults, AreNamedAndDoNoHarmBehindAThickLens) { ExpectRightInSpiteOfFaults("iii"); }
+TEST(PlantedFaults, SlowAreNamedAndDoNoHarmInWeakDefocus) { ExpectRightInSpiteOfFaults("i"); }
+TEST(PlantedFaults, SlowAreNamedAndDoNoHarmAtASmallAperture) { ExpectRightInSpiteOfFaults("iv"); }
+
+class WrongSweep : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(WrongSweep, TheSamePictureRepeatedIsRefusedForItsScale) {
+  SimulatedSweep s = DeepCopy(Clean(GetParam()));
+  for (cv::Mat& frame : *s.stored) frame = s.frame(12).clone();
+  ExpectRefused(Calibrated(s), "scale|repeated|does not change");
+}
+
+// Noise of their own does not make pictures different.
+TEST_P(WrongSweep, TheSameSceneWithFreshNoiseIsRefusedForItsScale) {
+  SimulatedSweep s = DeepCopy(Clean(GetParam()));
+  cv::RNG random(3);
+  const cv::Mat repeated = s.frame(12).clone();
+  for (cv::Mat& frame : *s.stored) {
+    cv::Mat noise(repeated.size(), CV_16S), sum;
+    random.fill(noise, cv::RNG::NORMAL, 0, 2);
+    cv::add(repeated, noise, sum, cv::noArray(), CV_8U);
+    frame = sum;
+  }
+  ExpectRefused(Calibrated(s), "scale|repeated|does not change");
+}
+
+TEST_P(WrongSweep, ReversedReadingsAreRefusedNamingTheDirection) {
+  SimulatedSweep s = DeepCopy(Clean(GetParam()));
+  ReverseReadings(&s);
+  ExpectRefused(Calibrated(s), "direction");
+}
+
+TEST_P(WrongSweep, ReadingsInCentimetresAreRefused) {
+  SimulatedSweep s = DeepCopy(Clean(GetParam()));
+  ScaleReadings(&s, 0.1);
+  s.sweep.reading_sigma_mm *= 0.1;
+  ExpectRefused(Calibrated(s), "unit");
+}
+
+TEST_P(WrongSweep, ReadingsOfCentimetresInMillimetresAreRefused) {
+  SimulatedSweep s = DeepCopy(Clean(GetParam()));
+  ScaleReadings(&s, 10);
+  s.sweep.reading_sigma_mm *= 10;
+  ExpectRefused(Calibrated(s), "unit");
+}
+
+INSTANTIATE_TEST_SUITE_P(LongLens, WrongSweep, ::testing::Values("ii"));
+INSTANTIATE_TEST_SUITE_P(SlowThickLens, WrongSweep, ::testing::Values("iii"));
+
+// By the blur law a focal length of 35 mm in place of 50 asks for kappa = 0.975, and to be seen so
+// wide behind so short a lens, whose rim fall-off darkens more, for 1.00: as a Gaussian, more light
+// than an aperture passes.
+TEST(WrongSweepOfALongLens, AWrongFocalLengthIsRefusedOrWarnedOf) {
+  SimulatedSweep s = DeepCopy(Clean("ii"));
+  model::ThickLens& lens = s.sweep.camera.lens;
+  lens.front_focal_length_mm = lens.rear_focal_length_mm = 35;
+  lens.aperture_radius_mm *= 35.0 / 50;  // it follows from the f-number
+  const Calibration c = Calibrated(s);
+  std::string said = c.outcome == Outcome::kRefused ? c.reason : "";
+  for (const std::string& warning : c.warnings) said += " | " + warning;
+  EXPECT_THAT(said, ContainsRegex("0\\.9[0-9]|1\\.0[0-9]"));
+  EXPECT_THAT(said, ContainsRegex("no lens|not physical|kappa|blur ratio"));
+}
+
+// Not confidently wrong: refused, or the truth within 3 sigma of what is stated.
+void ExpectHonest(const Calibration& c, const model::SweepTruth& truth) {
+  if (c.outcome == Outcome::kRefused) {
+    EXPECT_FALSE(c.focus_depth_mm);
+    return;
+  }
+  ASSERT_TRUE(c.focus_depth_mm) << c.reason;
+  const Result& zf = *c.focus_depth_mm;
+  const Eigen::Vector2d interval = zf.systematic.value_or(Eigen::Vector2d(zf.value, zf.value));
+  EXPECT_GT(truth.focus_depth_mm, std::min(interval.x(), zf.value) - 3 * zf.sigma);
+  EXPECT_LT(truth.focus_depth_mm, std::max(interval.y(), zf.value) + 3 * zf.sigma);
+}
+
+TEST(PeriodicTarget, SlowIsNeverConfidentlyWrong) {
+  for (const std::string name : {"ii", "iii", "v"}) {
+    SCOPED_TRACE(name);
+    model::SweepSimulationOptions options = SweepCase(name, kSizePx, 1);
+    options.target.kind = model::TargetKind::kCheckerboard;
+    SimulatedSweep s = Simulate(options);
+    GiveFloor(&s);
+    ExpectHonest(Calibrated(s), s.truth);
+  }
+}
+
+// What must do no harm: zf stays within 2.5 of its sigmas of the truth or within 5 % of a step, and
+// moves by less than 2 of them, or by 5 % of a step, from where it was; kappa likewise, or by 1 %;
+// sigma stays what it was. (Where sigma is 1 % of a step, no eye would see what JPEG does.)
+void ExpectHarmless(const SimulatedSweep& touched, const std::string& name) {
+  const Calibration& clean = CleanResult(name);
+  ASSERT_TRUE(clean.focus_depth_mm) << clean.reason;
+  const Calibration c = Calibrated(touched);
+  ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio) << c.reason;
+  const Result& zf = *c.focus_depth_mm;
+  const double step_mm =
+      std::abs(touched.sweep.frames[1].reading_mm - touched.sweep.frames[0].reading_mm);
+  EXPECT_LT(std::abs(zf.value - touched.truth.focus_depth_mm),
+            std::max(2.5 * zf.sigma, 0.05 * step_mm));
+  EXPECT_LT(std::abs(zf.value - clean.focus_depth_mm->value),
+            std::max(2 * zf.sigma, 0.05 * step_mm));
+  EXPECT_LT(zf.sigma, 1.5 * clean.focus_depth_mm->sigma);
+  const Result& ratio = *c.blur_ratio;
+  EXPECT_LT(std::abs(ratio.value - touched.truth.blur_ratio),
+            std::max(2.5 * ratio.sigma, 0.01 * ratio.value));
+  EXPECT_LT(std::abs(ratio.value - clean.blur_ratio->value),
+            std::max(2 * ratio.sigma, 0.01 * ratio.value));
+}
+
+class Harmless : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Harmless, FlickerOfAFifth) {
+  model::SweepSimulationOptions options = SweepCase(GetParam(), kSizePx, 1);
+  options.flicker = 0.2;
+  options.light_level *= 0.7;  // flicker that is bright enough to clip is another thing
+  SimulatedSweep s = Simulate(options);
+  GiveFloor(&s);
+  ExpectHarmless(s, GetParam());
+}
+
+TEST_P(Harmless, JpegOfQuality90) {
+  SimulatedSweep s = DeepCopy(Clean(GetParam()));
+  StoreAsJpeg(&s, 90);
+  ExpectHarmless(s, GetParam());
+}
+
+TEST_P(Harmless, DustOnTheSensor) {
+  SimulatedSweep s = DeepCopy(Clean(GetParam()));
+  AddDust(&s);
+  ExpectHarmless(s, GetParam());
+}
+
+INSTANTIATE_TEST_SUITE_P(LongLens, Harmless, ::testing::Values("ii"));
+INSTANTIATE_TEST_SUITE_P(SlowThickLens, Harmless, ::testing::Values("iii"));
+
+}  // namespace
+}  // namespace thicklens::calib

@@ -1,0 +1,236 @@
+// When a solution is refused, and with what reason.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/calib/focus_case.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using thicklens::testing::BlurBench;
+using thicklens::testing::ExactBench;
+using thicklens::testing::FocusCase;
+
+void ExpectRefused(const Calibration& c, const std::string& why) {
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, HasSubstr(why));
+  EXPECT_FALSE(c.image_distance_mm);
+  EXPECT_FALSE(c.focus_depth_mm);
+  EXPECT_FALSE(c.blur_ratio);
+  EXPECT_FALSE(c.blur_floor_px);
+  EXPECT_THAT(c.covariance_order, IsEmpty());
+}
+
+FocusCase Solved(const BlurBench& bench, double error_px2, double offset_sigma_mm = 0) {
+  FocusCase c = FocusCase(bench, offset_sigma_mm).WithTexture(error_px2).WithTrueFloor();
+  c.Solve();
+  return c;
+}
+
+// The meter's error that makes the answer's sigma, proportional to it, so large. (The data are
+// exact, so that the answer stays where it is.)
+double ErrorFor(const BlurBench& bench, BlurParameter parameter, double sigma) {
+  constexpr double kTrialPx2 = 1e-3;
+  const FocusCase c = Solved(bench, kTrialPx2);
+  return kTrialPx2 * sigma / std::sqrt(c.fit.covariance(parameter, parameter));
+}
+
+TEST(SolveFocus, WithoutAMeterTheMeasurementSaysWhy) {
+  FocusCase c;
+  c.evidence.message = "neither edges nor texture";
+  c.Solve();
+  ExpectRefused(c.calibration, "neither edges nor texture");
+  EXPECT_FALSE(c.calibration.blur.done);
+}
+
+TEST(SolveFocus, FourFramesAreTooFewAndFiveAreNot) {
+  for (const int count : {4, 5}) {
+    BlurBench bench = ExactBench();
+    bench.first_mm = 360;
+    bench.last_mm = 440;
+    bench.count = count;
+    bench.reference = 2;
+    FocusCase c = FocusCase(bench).WithTexture(0.01).WithTrueFloor();
+    c.Solve();
+    if (count == 4) {
+      ExpectRefused(c.calibration, "the blur of 4 frames follows one law, 5 are needed");
+    } else {
+      EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+    }
+  }
+}
+
+// The larger of two meters counts.
+TEST(SolveFocus, AFewEdgesBesideEnoughTextureDoNoHarm) {
+  for (const bool edges_first : {false, true}) {
+    FocusCase c;
+    if (!edges_first) c.WithTexture(0.01);
+    c.WithKnifeEdge(0.01);
+    BlurSamples& edges = c.evidence.setup.meters[static_cast<std::size_t>(c.evidence.edges)];
+    edges.frames = {12, 13, 14};
+    edges.variances_px2 = Eigen::VectorXd(edges.variances_px2.segment(12, 3));
+    edges.covariance = Eigen::MatrixXd(edges.covariance.block(12, 12, 3, 3));
+    if (edges_first) c.WithTexture(0.01);
+    c.Solve();
+    EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+  }
+}
+
+TEST(SolveFocus, AFloorAboveTheBlursCurvatureIsRefused) {
+  FocusCase c = FocusCase().WithTexture(0.01).WithFloor(12, 0);  // A uf^2 = 116.6 px^2
+  c.Solve();
+  ExpectRefused(c.calibration, "no minimum in depth above the lens floor");
+  EXPECT_THAT(c.calibration.blur.message, HasSubstr("no minimum"));
+  EXPECT_FALSE(c.calibration.blur.done);
+}
+
+TEST(SolveFocus, AScaleThatDoesNotChangeIsSaidWithTheReason) {
+  FocusCase c = FocusCase().WithTexture(0.01).WithFloor(12, 0);
+  c.calibration.scale.kind = ScaleKind::kConstant;
+  c.calibration.scale.message = "the image scale is constant";
+  c.Solve();
+  ExpectRefused(c.calibration, "no minimum in depth");
+  EXPECT_THAT(c.calibration.reason, EndsWith("; the image scale is constant"));
+}
+
+TEST(SolveFocus, ABlurWithinItsErrorsIsRefused) {
+  const BlurBench bench = ExactBench();
+  const double a_third_px2 = ErrorFor(bench, kBlurRatio, bench.ratio / 3);
+  ExpectRefused(Solved(bench, 1.08 * a_third_px2).calibration,
+                "the blur does not change over the sweep by more than its errors");
+  const FocusCase passes = Solved(bench, 0.92 * a_third_px2);
+  EXPECT_EQ(passes.calibration.outcome, Outcome::kOk) << passes.calibration.reason;
+}
+
+// The blur fixes where focus lies in the sweep; what is missing is where the sweep lies.
+TEST(SolveFocus, ABenchZeroThatIsNotKnownIsNotBlamedOnTheBlur) {
+  BlurBench bench = ExactBench();
+  bench.first_mm = 380;  // so short that the blur ratio is known better than zf
+  bench.last_mm = 425;
+  const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
+  // The bench zero's error goes nearly whole into zf.
+  const FocusCase trial = Solved(bench, 0.001, 10);
+  const double per_zero = trial.calibration.focus_depth_mm->sigma / 10;
+  EXPECT_NEAR(per_zero, 1, 0.1);
+  const FocusCase c = Solved(bench, 0.001, 1.1 * half_mm / per_zero);
+  ExpectRefused(c.calibration, "the bench zero is not known well enough: the sweep is 45 mm long");
+  EXPECT_THAT(c.calibration.reason, HasSubstr("State offset_mm"));
+  ASSERT_TRUE(c.calibration.focus_reading_mm) << "the reading of focus is determined";
+  EXPECT_NEAR(c.calibration.focus_reading_mm->value, 400 - bench.offset_mm, 0.2);
+  EXPECT_LT(c.calibration.focus_reading_mm->sigma, 1);
+  const FocusCase passes = Solved(bench, 0.001, 0.9 * half_mm / per_zero);
+  EXPECT_EQ(passes.calibration.outcome, Outcome::kOk) << passes.calibration.reason;
+}
+
+TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {
+  BlurBench bench = ExactBench();
+  bench.first_mm = 380;
+  bench.last_mm = 425;
+  const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
+  const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.1 * half_mm));
+  // Where the blur ratio is known worse still, that is the reason.
+  EXPECT_EQ(c.calibration.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.calibration.reason, AnyOf(HasSubstr("the depth of focus is not fixed by the blur"),
+                                          HasSubstr("the blur does not change over the sweep")));
+  EXPECT_FALSE(c.calibration.focus_reading_mm) << "it is not determined";
+}
+
+// Sweeps that end short of the focus at 400 mm, in steps of 3 mm.
+BlurBench Beyond(bool focus_is_nearer) {
+  BlurBench bench = ExactBench();
+  bench.count = 21;
+  bench.first_mm = focus_is_nearer ? 412.5 : 327.5;
+  bench.last_mm = bench.first_mm + 60;
+  bench.reference = focus_is_nearer ? 0 : 20;
+  return bench;
+}
+
+TEST(SolveFocus, AFocusBeyondTheSweepThatIsKnownToAStepIsWarnedOf) {
+  for (const bool nearer : {false, true}) {
+    for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
+      BlurBench bench = Beyond(nearer);
+      bench.direction = direction;
+      const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 0.9 * 3));
+      EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+      EXPECT_THAT(c.calibration.warnings,
+                  Contains(AllOf(HasSubstr("is extrapolated"), HasSubstr("12.50 mm"),
+                                 HasSubstr(nearer ? "nearer than" : "farther than"))));
+      EXPECT_NEAR(c.calibration.blur.outside_mm, 12.5, 1e-2);
+    }
+  }
+}
+
+TEST(SolveFocus, AFocusBeyondTheSweepThatIsNotKnownToAStepIsRefused) {
+  for (const bool nearer : {false, true}) {
+    const BlurBench bench = Beyond(nearer);
+    const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.1 * 3));
+    ExpectRefused(c.calibration, "sharpness is monotone");
+    EXPECT_THAT(c.calibration.reason,
+                AllOf(HasSubstr(nearer ? "lies nearer than" : "lies farther than"),
+                      HasSubstr("extend the sweep"), HasSubstr("about 400")));
+  }
+}
+
+// Within the sweep the same error would do.
+TEST(SolveFocus, AFocusInsideNeedNotBeKnownToAStep) {
+  const BlurBench bench = ExactBench();
+  const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.5 * 5));
+  EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+  EXPECT_THAT(c.calibration.warnings, Not(Contains(HasSubstr("extrapolated"))));
+}
+
+// A gap in the readings, and readings that were taken twice, do not make the step longer or 0.
+TEST(SolveFocus, TheStepIsTheUsualOne) {
+  const BlurBench bench = Beyond(true);
+  FocusCase c = FocusCase(bench).WithTexture(ErrorFor(bench, kFocusDepth, 0.9 * 3)).WithTrueFloor();
+  FrameMeasurement again = c.calibration.frames.back();
+  again.rejection = "blank";
+  for (int i = 0; i < 30; ++i) c.calibration.frames.push_back(again);
+  again.reading_mm += 500;
+  c.calibration.frames.push_back(again);
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+}
+
+// A blur ratio that no lens has: the stated aperture is wrong. kappa r is what is measured.
+TEST(SolveFocus, AnImplausibleBlurRatioIsRefusedAndAnUnusualOneWarnedOf) {
+  struct Case {
+    double ratio;
+    bool refused, warned;
+  };
+  const Case cases[] = {{0.19, true, false},  {0.21, false, true},  {0.34, false, true},
+                        {0.36, false, false}, {0.64, false, false}, {0.66, false, true},
+                        {0.79, false, true},  {0.81, true, false}};
+  for (const Case& k : cases) {
+    SCOPED_TRACE(k.ratio);
+    FocusCase c = FocusCase().WithTexture(0.01).WithTrueFloor();
+    const double factor = c.bench.ratio / k.ratio;
+    c.evidence.setup.lens.aperture_radius_mm *= factor;
+    c.sweep.camera.lens.aperture_radius_mm *= factor;
+    c.Solve();
+    if (k.refused) {
+      ExpectRefused(c.calibration, "which no lens has");
+      EXPECT_THAT(c.calibration.reason, HasSubstr("check focal lengths"));
+      continue;
+    }
+    EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+    EXPECT_NEAR(c.calibration.blur_ratio->value, k.ratio, 1e-3);
+    EXPECT_EQ(!c.calibration.warnings.empty(), k.warned);
+    if (k.warned) {
+      EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr("is unusual")));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace thicklens::calib

@@ -1,0 +1,365 @@
+// What a solution states: what is known of the floor, the values, their errors.
+#include "calib/calibrate/focus_solution.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/calib/focus_case.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using thicklens::testing::BlurBench;
+using thicklens::testing::ExactBench;
+using thicklens::testing::FocusCase;
+using thicklens::testing::LinearTwin;
+
+constexpr double kErrorPx2 = 0.01;
+
+void ExpectTrueFocus(const FocusCase& c, double within_mm) {
+  const Calibration& found = c.calibration;
+  ASSERT_TRUE(found.focus_depth_mm && found.image_distance_mm && found.blur_ratio) << found.reason;
+  EXPECT_NEAR(found.focus_depth_mm->value, c.bench.focus_mm, within_mm);
+  EXPECT_NEAR(found.blur_ratio->value, c.bench.ratio, 0.01 * within_mm);
+  EXPECT_EQ(found.image_distance_mm->value,
+            model::ImageDistanceMm(c.bench.lens, found.focus_depth_mm->value));
+}
+
+// d1 by the imaging equation's own difference, not by the formula of its slope.
+void ExpectImageDistanceSigma(const FocusCase& c) {
+  const Result& zf = *c.calibration.focus_depth_mm;
+  const double h = 1e-3;
+  const double slope = (model::ImageDistanceMm(c.bench.lens, zf.value + h) -
+                        model::ImageDistanceMm(c.bench.lens, zf.value - h)) /
+                       (2 * h);
+  ASSERT_GT(zf.sigma, 0);
+  EXPECT_NEAR(c.calibration.image_distance_mm->sigma, std::abs(slope) * zf.sigma,
+              1e-6 * std::abs(slope) * zf.sigma);
+}
+
+// Against linear error propagation, in the order that is stated: rows of the twin.
+void ExpectCovariance(const Calibration& c, const Eigen::Matrix4d& twin,
+                      const std::vector<int>& rows) {
+  ASSERT_EQ(c.covariance.rows(), static_cast<Eigen::Index>(rows.size()));
+  ASSERT_EQ(c.covariance.cols(), c.covariance.rows());
+  const Eigen::MatrixXd expected = twin(rows, rows);
+  for (Eigen::Index a = 0; a < expected.rows(); ++a) {
+    for (Eigen::Index b = 0; b < expected.cols(); ++b) {
+      EXPECT_NEAR(c.covariance(a, b), expected(a, b),
+                  2e-3 * std::sqrt(expected(a, a) * expected(b, b)))
+          << a << ", " << b;
+    }
+  }
+  EXPECT_NEAR(c.image_distance_mm->sigma, std::sqrt(c.covariance(0, 0)),
+              1e-9 * c.image_distance_mm->sigma);
+  EXPECT_NEAR(c.blur_ratio->sigma, std::sqrt(c.covariance(1, 1)), 1e-9 * c.blur_ratio->sigma);
+}
+
+// ---- a floor that is given ----
+
+TEST(SolveFocus, AGivenFloorIsWrittenWithItsError) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor(0.03);
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  EXPECT_EQ(c.calibration.reason, "");
+  EXPECT_THAT(c.calibration.warnings, IsEmpty());
+  EXPECT_THAT(c.calibration.blur.undetermined, IsEmpty());
+  ExpectTrueFocus(c, 1e-3);
+  ExpectImageDistanceSigma(c);
+  ASSERT_TRUE(c.calibration.blur_floor_px);
+  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
+  // A texture says next to nothing of the floor: its error stays what it was.
+  EXPECT_NEAR(c.calibration.blur_floor_px->sigma, 0.03, 1e-4);
+  EXPECT_FALSE(c.calibration.blur_floor_px->systematic);
+  EXPECT_THAT(c.calibration.covariance_order,
+              ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
+  LinearTwin twin{kErrorPx2, true, 0.03};
+  ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
+  // No interval of the floor, and so no part of it.
+  EXPECT_EQ(c.Part("lens floor"), nullptr);
+}
+
+// What is not known of the floor is in zf: dzf = zf dS0/(A uf^2), S0 the floor squared.
+TEST(SolveFocus, AGivenFloorsErrorIsInTheFocus) {
+  FocusCase c = FocusCase().WithTexture(1e-4).WithTrueFloor(0.05);
+  c.Solve();
+  const double by_floor_mm = c.bench.focus_mm * 2 * 0.5 * 0.05 / c.bench.Curvature();
+  EXPECT_NEAR(c.calibration.focus_depth_mm->sigma, by_floor_mm, 0.01 * by_floor_mm);
+}
+
+TEST(SolveFocus, AFloorWithoutErrorStaysWhatItIs) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  ExpectTrueFocus(c, 1e-3);
+  ASSERT_TRUE(c.calibration.blur_floor_px);
+  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-12);
+  EXPECT_EQ(c.calibration.blur_floor_px->sigma, 0);
+  LinearTwin twin{kErrorPx2, true, 0, true};
+  ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
+}
+
+TEST(SolveFocus, APerfectLensMayBeStated) {
+  BlurBench bench = ExactBench();
+  bench.floor_px2 = 0;
+  FocusCase c = FocusCase(bench).WithTexture(kErrorPx2).WithFloor(0, 0);
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  ExpectTrueFocus(c, 1e-3);
+  EXPECT_EQ(c.calibration.blur_floor_px->value, 0);
+  EXPECT_EQ(c.calibration.blur_floor_px->sigma, 0);
+  EXPECT_TRUE(c.calibration.covariance.allFinite());
+}
+
+// ---- a knife edge measures it ----
+
+TEST(SolveFocus, AKnifeEdgeMeasuresTheFloor) {
+  FocusCase c = FocusCase().WithKnifeEdge(kErrorPx2);
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
+  ExpectTrueFocus(c, 1e-3);
+  ExpectImageDistanceSigma(c);
+  ASSERT_TRUE(c.calibration.blur_floor_px);
+  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
+  const Eigen::Matrix4d twin = LinearTwin{kErrorPx2}.Covariance(c.bench);
+  EXPECT_NEAR(c.calibration.blur_floor_px->sigma, std::sqrt(twin(2, 2)),
+              1e-3 * std::sqrt(twin(2, 2)));
+  EXPECT_THAT(c.calibration.covariance_order,
+              ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
+  ExpectCovariance(c.calibration, twin, {0, 1, 2, 3});
+  EXPECT_EQ(c.calibration.blur.meter, "edges");
+  EXPECT_EQ(c.Part("lens floor"), nullptr);
+}
+
+TEST(SolveFocus, AKnifeEdgeBesideATextureFixesTheTexturesFloorToo) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2).WithKnifeEdge(kErrorPx2);
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kOk);
+  ExpectTrueFocus(c, 1e-3);
+  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
+  EXPECT_EQ(c.calibration.blur.meter, "edges and relative spectrum");
+  // Frames, not samples.
+  EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count);
+}
+
+TEST(SolveFocus, WhatIsGivenCountsMoreThanTheKnifeEdge) {
+  FocusCase c = FocusCase().WithKnifeEdge(0.3).WithFloor(0.6, 0.001);
+  c.Solve();
+  EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.6, 0.01);
+  EXPECT_LT(c.calibration.blur_floor_px->sigma, 0.0011);
+}
+
+// A lens so sharp that the edge cannot tell its floor from none.
+TEST(SolveFocus, AFloorBelowItsOwnErrorIsLeftOpen) {
+  BlurBench bench = ExactBench();
+  bench.floor_px2 = 1e-4;
+  FocusCase c = FocusCase(bench).WithKnifeEdge(kErrorPx2);
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kPartial);
+  EXPECT_THAT(c.calibration.blur.undetermined, ElementsAre("blur_floor_px"));
+  EXPECT_FALSE(c.calibration.blur_floor_px);
+  EXPECT_THAT(c.calibration.covariance_order,
+              ElementsAre("image_distance_mm", "blur_ratio", "bench_offset_mm"));
+  EXPECT_EQ(c.calibration.covariance.rows(), 3);
+  ExpectTrueFocus(c, 1e-2);
+}
+
+// ---- an interval ----
+
+// Everything that is stated of an interval (px), given or found.
+void ExpectInterval(const FocusCase& c, double from_px, double to_px, double within_px) {
+  const Calibration& found = c.calibration;
+  EXPECT_EQ(found.outcome, Outcome::kPartial);
+  EXPECT_THAT(found.reason, HasSubstr("blur_floor_px"));
+  EXPECT_THAT(found.blur.undetermined, ElementsAre("blur_floor_px"));
+  ASSERT_TRUE(found.blur_floor_px && found.blur_floor_px->systematic);
+  EXPECT_TRUE(std::isnan(found.blur_floor_px->value));
+  EXPECT_TRUE(std::isnan(found.blur_floor_px->sigma));
+  EXPECT_NEAR(found.blur_floor_px->systematic->x(), from_px, within_px);
+  EXPECT_NEAR(found.blur_floor_px->systematic->y(), to_px, within_px);
+  EXPECT_THAT(found.covariance_order,
+              ElementsAre("image_distance_mm", "blur_ratio", "bench_offset_mm"));
+  EXPECT_EQ(found.covariance.rows(), 3);
+  EXPECT_TRUE(found.covariance.allFinite());
+}
+
+// zf for a floor, from the vertex of the parabola that the blur follows on the target, whatever
+// floor is assumed: vertex = zf (1 - S0/(A uf^2 + S0)).
+double FocusWithFloor(const BlurBench& bench, double floor_px2) {
+  const double a_px2 = bench.Curvature() + bench.floor_px2;
+  const double vertex_mm = bench.focus_mm * bench.Curvature() / a_px2;
+  return vertex_mm * a_px2 / (a_px2 - floor_px2);
+}
+
+TEST(SolveFocus, AnIntervalIsAnIntervalOfTheFocus) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2);
+  c.sweep.floor.from_px = 0.3;
+  c.sweep.floor.to_px = 0.8;
+  c.Solve();
+  ExpectInterval(c, 0.3, 0.8, 1e-12);
+  // The middle of the squares is what is assumed.
+  const double middle_px2 = 0.5 * (0.09 + 0.64);
+  EXPECT_NEAR(c.calibration.focus_depth_mm->value, FocusWithFloor(c.bench, middle_px2), 1e-3);
+  ASSERT_TRUE(c.calibration.focus_depth_mm->systematic);
+  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->x(), FocusWithFloor(c.bench, 0.09), 1e-2);
+  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->y(), FocusWithFloor(c.bench, 0.64), 1e-2);
+  ASSERT_NE(c.Part("lens floor"), nullptr);
+  // Nothing to warn of: it was stated.
+  EXPECT_THAT(c.calibration.warnings, IsEmpty());
+  // The rows left are those of the twin that holds the floor.
+  BlurBench assumed = c.bench;
+  assumed.floor_px2 = middle_px2;
+  assumed.focus_mm = c.calibration.focus_depth_mm->value;
+  assumed.ratio = c.calibration.blur_ratio->value;
+  ExpectCovariance(c.calibration, LinearTwin{kErrorPx2, true, 0, true}.Covariance(assumed),
+                   {0, 1, 3});
+}
+
+// Nothing is known of this texture's fine detail, that would exclude a soft lens.
+TEST(SolveFocus, AnUnknownFloorIsUpToASoftLens) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2);
+  c.Solve();
+  ExpectInterval(c, 0, 3, 1e-12);
+  EXPECT_NEAR(c.calibration.focus_depth_mm->value, FocusWithFloor(c.bench, 4.5), 1e-2);
+  EXPECT_THAT(c.calibration.warnings,
+              ElementsAre(AllOf(HasSubstr("cannot be found from this target"),
+                                HasSubstr("0 to 3.0 px"), HasSubstr("state blur_floor_px"))));
+}
+
+// Lens and ink together are what the edges show: sqrt(.25 + .39) px.
+constexpr double kInkPx2 = 0.39;
+
+TEST(SolveFocus, PrintedEdgesBoundTheFloor) {
+  FocusCase c = FocusCase().WithPrintedEdge(kErrorPx2, kInkPx2);
+  c.Solve();
+  ExpectInterval(c, 0, 0.8, 0.02);  // ink is fitted as if it were lens
+  EXPECT_THAT(c.calibration.warnings,
+              ElementsAre(AllOf(HasSubstr("px soft at focus"), HasSubstr("knife edge"))));
+  const Eigen::Vector2d& zf = *c.calibration.focus_depth_mm->systematic;
+  EXPECT_LT(zf.x(), c.bench.focus_mm - 0.2);
+  EXPECT_GT(zf.y(), c.bench.focus_mm + 0.2);
+}
+
+TEST(SolveFocus, EdgesOfATextureBoundTheFloor) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2);
+  // Nine frames about focus, as the measurement chooses them, one of them spoilt.
+  BlurSamples edges = c.bench.Absolute(kErrorPx2, kInkPx2, &c.random);
+  const std::vector<Eigen::Index> about = {10, 11, 12, 13, 14, 15, 16, 17, 18};
+  c.evidence.unstated_edges = BlurSamples{};
+  for (const Eigen::Index i : about)
+    c.evidence.unstated_edges->frames.push_back(static_cast<std::size_t>(i));
+  c.evidence.unstated_edges->variances_px2 = edges.variances_px2(about);
+  c.evidence.unstated_edges->variances_px2[2] += 5;
+  c.Solve();
+  ExpectInterval(c, 0, 0.8, 0.02);
+  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("px soft at focus")));
+  EXPECT_EQ(c.calibration.blur.meter, "relative spectrum");
+}
+
+// Off focus and off the reference's scale they say the same, if less well.
+TEST(SolveFocus, EdgesOfATextureBoundTheFloorOnOneSideToo) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2);
+  const BlurSamples edges = c.bench.Absolute(kErrorPx2, kInkPx2, &c.random);
+  const std::vector<Eigen::Index> nearer = {1, 2, 3, 4, 5, 6, 7};
+  c.evidence.unstated_edges = BlurSamples{};
+  c.evidence.unstated_edges->frames = {1, 2, 3, 4, 5, 6, 7};
+  c.evidence.unstated_edges->variances_px2 = edges.variances_px2(nearer);
+  c.Solve();
+  ExpectInterval(c, 0, 0.8, 0.1);
+}
+
+// Edges that seem sharper than sharp are no bound.
+TEST(SolveFocus, EdgesWithoutSoftnessAreNoBound) {
+  FocusCase c = FocusCase().WithPrintedEdge(kErrorPx2, -0.6);
+  c.Solve();
+  ExpectInterval(c, 0, 1, 1e-12);
+  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("0 to 1.0 px")));
+}
+
+TEST(SolveFocus, EdgesOfATextureWithoutSoftnessAreNoBoundEither) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2);
+  c.evidence.unstated_edges = c.bench.Absolute(kErrorPx2, -0.6, &c.random);
+  c.Solve();
+  EXPECT_EQ(c.calibration.outcome, Outcome::kPartial);
+  EXPECT_THAT(c.calibration.warnings, ElementsAre(HasSubstr("is allowed for")));
+}
+
+// ---- the bench zero ----
+
+TEST(SolveFocus, TheBenchZerosErrorIsInTheCovariance) {
+  constexpr double kZeroSigmaMm = 0.6;
+  FocusCase c = FocusCase(ExactBench(), kZeroSigmaMm).WithTexture(kErrorPx2).WithTrueFloor(0.03);
+  c.Solve();
+  ASSERT_EQ(c.calibration.covariance.rows(), 4);
+  EXPECT_NEAR(c.calibration.covariance(3, 3), kZeroSigmaMm * kZeroSigmaMm, 1e-9);
+  LinearTwin twin{kErrorPx2, true, 0.03};
+  twin.offset_sigma_mm = kZeroSigmaMm;
+  ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
+  // A zero that is too large makes zf too large, d1 too small.
+  EXPECT_LT(c.calibration.covariance(0, 3), 0);
+  EXPECT_GT(c.calibration.focus_depth_mm->sigma, 0.9 * kZeroSigmaMm);
+}
+
+// ---- what is told of the blur ----
+
+TEST(SolveFocus, TellsWhatTheMetersSaid) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+  c.evidence.gaussian_misfit = 1.2;
+  c.evidence.disc_misfit = 1.3;
+  c.evidence.examples.resize(3);
+  c.Solve();
+  EXPECT_TRUE(c.calibration.blur.done);
+  EXPECT_EQ(c.calibration.blur.meter, "relative spectrum");
+  EXPECT_EQ(c.calibration.blur.message, "converged");
+  EXPECT_EQ(c.calibration.blur.gaussian_misfit, 1.2);
+  EXPECT_EQ(c.calibration.blur.disc_misfit, 1.3);
+  EXPECT_EQ(c.calibration.blur.better_psf, model::Psf::kGaussian);
+  EXPECT_EQ(c.calibration.examples.size(), 3U);
+  EXPECT_EQ(c.calibration.blur.outside_mm, 0);
+  EXPECT_EQ(c.calibration.blur.chi2_per_dof, c.fit.chi2_per_dof);
+  EXPECT_NE(c.calibration.blur.weak_direction, "");
+  EXPECT_TRUE(c.calibration.nearer.done && c.calibration.farther.done);
+}
+
+TEST(SolveFocus, AnotherShapeIsWarnedOfWhereItFitsClearlyBetter) {
+  struct Case {
+    model::Psf stated;
+    double gaussian, disc;
+    const char* warning;  // nothing: none
+  };
+  const Case cases[] = {
+      {model::Psf::kGaussian, 1.21, 1.0,
+       "the blur is a disc, not the gaussian that the camera file states"},
+      {model::Psf::kGaussian, 1.05, 1.0, nullptr},
+      {model::Psf::kGaussian, 1.0, 1.5, nullptr},
+      {model::Psf::kDisc, 1.0, 1.3,
+       "the blur is a gaussian, not the disc that the camera file states"},
+      {model::Psf::kDisc, 1.3, 1.0, nullptr},
+  };
+  for (const Case& k : cases) {
+    FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+    c.sweep.camera.psf = k.stated;
+    c.evidence.gaussian_misfit = k.gaussian;
+    c.evidence.disc_misfit = k.disc;
+    c.evidence.other_psf = c.evidence.setup.meters[0];
+    c.evidence.better_psf = k.gaussian <= k.disc ? model::Psf::kGaussian : model::Psf::kDisc;
+    c.Solve();
+    if (k.warning != nullptr) {
+      EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr(k.warning)));
+    } else {
+      EXPECT_THAT(c.calibration.warnings, Not(Contains(HasSubstr("the blur is a"))));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace thicklens::calib

@@ -1,0 +1,210 @@
+// Whole sweeps that went wrong in ways that look like something else: the reason must be the cause,
+// and what was determined in spite of it must be told.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <string>
+
+#include "tests/calib/damaged_sweep.h"
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+using namespace thicklens::testing;
+
+constexpr int kSizePx = 192;
+
+Calibration Measured(const SimulatedSweep& s) {
+  CalibrationOptions options;
+  options.map_field = false;
+  return Calibrate(s.sweep, options);
+}
+
+// 50 mm f/2.8, in focus at 300 mm, 31 frames of 1 mm.
+SimulatedSweep Good() {
+  static const SimulatedSweep rendered = [] {
+    SimulatedSweep sweep = Simulate(SweepCase("ii", kSizePx, 1));
+    GiveFloor(&sweep);
+    return sweep;
+  }();
+  return DeepCopy(rendered);
+}
+
+void ExpectSharpestAt(const Calibration& c, double reading_mm, double within_mm) {
+  ASSERT_TRUE(c.sharpest.done) << c.sharpest.message;
+  EXPECT_NEAR(c.sharpest.reading_mm.value, reading_mm, within_mm);
+  EXPECT_NEAR(c.sharpest.reading_mm.value, reading_mm, 4 * c.sharpest.reading_mm.sigma);
+  EXPECT_LT(c.sharpest.reading_mm.sigma, within_mm);
+}
+
+TEST(Reason, ReadingsInInchesWithAStatedErrorAreStillAskedAbout) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  for (model::SweepFrame& frame : s.sweep.frames)
+    frame.reading_mm = (frame.reading_mm - 190) / 25.4;
+  s.sweep.reading_sigma_mm = 0.05;  // 4 % of the readings' range
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at 1"),
+                              HasSubstr("are the readings in mm? With readings in inches"),
+                              Not(HasSubstr("does not follow"))));
+  ExpectSharpestAt(c, 110 / 25.4, 0.03);
+}
+
+// As a focus stacker brings the frames to one scale, with mirrored borders.
+TEST(Reason, AlignedFramesAreNotCalledDistorted) {
+  SimulatedSweep s = Good();
+  for (std::size_t i = 0; i < s.stored->size(); ++i) {
+    cv::Mat& frame = (*s.stored)[i];
+    const double scale = s.truth.frames[i].depth_mm / 300;
+    const double centre = 0.5 * (frame.cols - 1);
+    const cv::Matx23d map(scale, 0, centre * (1 - scale), 0, scale, centre * (1 - scale));
+    cv::warpAffine(frame.clone(), frame, map, frame.size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
+  }
+  const Calibration c = Measured(s);
+  std::string said = c.reason;
+  for (const std::string& warning : c.warnings) said += " | " + warning;
+  EXPECT_THAT(said, AllOf(HasSubstr("the image scale does not change with the reading, although "
+                                    "offset_mm says by 11 %"),
+                          HasSubstr("aligned"), HasSubstr("telecentric"),
+                          Not(HasSubstr("distorted")), Not(HasSubstr("undistort"))));
+  EXPECT_FALSE(c.scale.distortion_at_corner);
+  ExpectSharpestAt(c, 300, 0.7);
+}
+
+// The target of the sweeps below: blots of all sizes, so that every frame sees the same ones.
+model::LinearPicture Blots() {
+  constexpr int kSide = 900;
+  cv::Mat picture(kSide, kSide, CV_32F, cv::Scalar(0.5));
+  std::mt19937 engine(4);
+  const auto uniform = [&engine] { return static_cast<double>(engine()) / 4294967296.0; };
+  for (int i = 0; i < 6000; ++i) {
+    const double radius = std::min(60.0, 3 / std::sqrt(0.002 + uniform()));
+    cv::circle(picture, {static_cast<int>(kSide * uniform()), static_cast<int>(kSide * uniform())},
+               static_cast<int>(radius), cv::Scalar(0.2 + 0.5 * uniform()), -1);
+  }
+  model::LinearPicture result;
+  result.width_px = result.height_px = kSide;
+  result.channels = 1;
+  result.values.assign(picture.begin<float>(), picture.end<float>());
+  return result;
+}
+
+// The target stands at 300 mm, the sensor moves by +-0.6 mm about 60 mm behind the lens.
+SimulatedSweep FocusRing() {
+  const model::LinearPicture target = Blots();
+  SimulatedSweep sweep;
+  sweep.stored = std::make_shared<std::vector<cv::Mat>>();
+  for (int k = -12; k <= 12; ++k) {
+    model::SweepSimulationOptions options = SweepCase("ii", kSizePx, 1);
+    options.target.kind = model::TargetKind::kPicture;
+    options.target.feature_size_mm = 14;
+    options.first_depth_mm = 300;
+    options.frame_count = 1;
+    options.drift_sigma_px = 0;
+    options.flicker = 0;
+    options.light_level = 0.4;
+    options.lamp_falloff = false;
+    options.camera.calibration->image_distance_mm = model::Estimate{60 + 0.05 * k, 0};
+    SimulatedSweep one = Simulate(options, target);
+    sweep.stored->push_back(one.frame(0));
+    if (k == -12) sweep.sweep = one.sweep;
+  }
+  sweep.sweep.frames.clear();
+  for (int k = -12; k <= 12; ++k) sweep.sweep.frames.push_back({"frame", 0.05 * k});
+  sweep.sweep.offset_mm.reset();
+  sweep.sweep.reading_sigma_mm = 0.001;
+  sweep.sweep.read_frame = [stored = sweep.stored](std::size_t i) { return (*stored)[i]; };
+  return sweep;
+}
+
+TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
+  SimulatedSweep s = FocusRing();
+  for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
+    s.sweep.direction = direction;
+    const Calibration c = Measured(s);
+    EXPECT_EQ(c.outcome, Outcome::kRefused);
+    EXPECT_THAT(c.reason,
+                AllOf(StartsWith("the image scale follows the lens, not the target"),
+                      Not(HasSubstr("direction must be")), Not(HasSubstr("are the readings in mm")),
+                      Not(HasSubstr("no lens has"))));
+    ExpectSharpestAt(c, 0, 0.03);
+    ASSERT_TRUE(c.scale.change_over_sweep);
+    EXPECT_NEAR(c.scale.change_over_sweep->value, -0.02, 0.001);
+  }
+}
+
+// 1:1, 3 mm of sweep at 200 mm: the scale fixes the zero to some millimetres only.
+TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusTold) {
+  model::SweepSimulationOptions options = SweepCase("ii", 384, 1);
+  options.camera.lens = {100, 100, 0, 17.86};
+  options.camera.sensor.pixel_pitch_mm = 0.0043;
+  options.camera.calibration->image_distance_mm = model::Estimate{200, 0};
+  options.first_depth_mm = 198.53;
+  options.step_mm = 0.1;
+  options.bench_offset_mm = 100;
+  options.reading_sigma_mm = 0.002;
+  options.bits = 16;
+  const SimulatedSweep simulated = Simulate(options);
+  for (const bool is_stated : {false, true}) {
+    SimulatedSweep s = simulated;
+    s.sweep.offset_mm.reset();
+    if (is_stated) s.sweep.offset_mm = model::Estimate{100, 2};
+    const Calibration c = Measured(s);
+    ASSERT_EQ(c.outcome, Outcome::kRefused) << c.reason;
+    EXPECT_THAT(c.reason,
+                AllOf(StartsWith("the bench zero is not known well enough"),
+                      HasSubstr("State offset_mm"), HasSubstr("at the reading 100"),
+                      Not(HasSubstr("are the readings in mm")), Not(HasSubstr("blur does not"))))
+        << c.reason;
+    ASSERT_TRUE(c.focus_reading_mm);
+    EXPECT_NEAR(c.focus_reading_mm->value, 100, 0.01);
+    EXPECT_LT(c.focus_reading_mm->sigma, 0.01);
+    ExpectSharpestAt(c, 100, 0.1);
+  }
+}
+
+// Bands that keep most frames from being registered to one another.
+TEST(Reason, AFlickeringLampIsNamedWhereFramesDoNotRegister) {
+  SimulatedSweep s = Good();
+  std::mt19937 engine(2);
+  for (cv::Mat& frame : *s.stored) {
+    const double phase = static_cast<double>(engine()) / 4294967296.0 * 2 * CV_PI;
+    for (int y = 0; y < frame.rows; ++y) {
+      const double gain = 1 + 0.4 * std::sin(2 * CV_PI * y / 30 + phase);
+      cv::Mat row = frame.row(y);
+      row.convertTo(row, CV_8U, gain);
+    }
+  }
+  const Calibration c = Measured(s);
+  std::string said = c.reason;
+  for (const std::string& warning : c.warnings) said += " | " + warning;
+  EXPECT_THAT(said, AllOf(HasSubstr("whole rows brighten together"), HasSubstr("rolling shutter"),
+                          Not(HasSubstr("knife-edge or"))));
+}
+
+TEST(Reason, AGoodSweepIsToldNoCause) {
+  const Calibration c = Measured(Good());
+  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+  EXPECT_THAT(c.warnings, Each(Not(AnyOf(HasSubstr("bands"), HasSubstr("darker"),
+                                         HasSubstr("moves"), HasSubstr("distort")))));
+  ExpectSharpestAt(c, 300, 0.7);
+  ASSERT_TRUE(c.focus_reading_mm);
+  EXPECT_NEAR(c.focus_reading_mm->value, 300, 4 * c.focus_reading_mm->sigma);
+}
+
+}  // namespace
+}  // namespace thicklens::calib

@@ -1,0 +1,149 @@
+// Sweeps that fail for something plain: the reason must say that, not what follows from it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "tests/calib/damaged_sweep.h"
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+using thicklens::testing::DeepCopy;
+using thicklens::testing::GiveFloor;
+using thicklens::testing::Simulate;
+using thicklens::testing::SimulatedSweep;
+using thicklens::testing::SweepCase;
+
+constexpr int kSizePx = 160;
+
+SimulatedSweep Good() {
+  static const SimulatedSweep rendered = [] {
+    SimulatedSweep sweep = Simulate(SweepCase("iii", kSizePx, 1));
+    GiveFloor(&sweep);
+    return sweep;
+  }();
+  return DeepCopy(rendered);
+}
+
+SimulatedSweep KnifeEdge() {
+  model::SweepSimulationOptions options = SweepCase("iii", kSizePx, 1);
+  options.target.kind = model::TargetKind::kKnifeEdge;
+  SimulatedSweep sweep = Simulate(options);
+  sweep.sweep.target = model::SweepTarget::kKnifeEdge;
+  return sweep;
+}
+
+Calibration Measured(const SimulatedSweep& s) {
+  CalibrationOptions options;
+  options.map_field = false;
+  return Calibrate(s.sweep, options);
+}
+
+// All but the frames from `first` to `last`.
+void Expose(SimulatedSweep* s, double gain, int first, int last) {
+  for (int i = 0; i < static_cast<int>(s->stored->size()); ++i) {
+    if (i < first || i > last) s->frame(i).convertTo(s->frame(i), CV_8U, gain);
+  }
+}
+
+TEST(Exposure, AnOverExposedSweepIsToldToLowerIt) {
+  for (const bool zero_is_known : {true, false}) {
+    for (const int last : {-1, 2, 6}) {  // none, three or seven good frames, away from focus
+      SCOPED_TRACE(last);
+      SimulatedSweep s = Good();
+      if (!zero_is_known) s.sweep.offset_mm.reset();
+      Expose(&s, 6, 0, last);
+      const Calibration c = Measured(s);
+      const std::string told =
+          c.outcome == Outcome::kRefused || c.warnings.empty() ? c.reason : c.warnings.front();
+      EXPECT_THAT(told, AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
+                              Not(StartsWith("offset_mm"))));
+    }
+  }
+}
+
+// Thirteen frames about focus are enough for a result; that it is one of few is still told.
+TEST(Exposure, AResultFromTheFewGoodFramesSaysSo) {
+  SimulatedSweep s = Good();
+  Expose(&s, 6, 14, 26);
+  const Calibration c = Measured(s);
+  ASSERT_NE(c.outcome, Outcome::kRefused) << c.reason;
+  ASSERT_FALSE(c.warnings.empty());
+  EXPECT_THAT(c.warnings.front(),
+              AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
+                    HasSubstr("the results come from the others alone")));
+}
+
+TEST(Exposure, ADarkSweepIsToldToRaiseIt) {
+  SimulatedSweep s = Good();
+  Expose(&s, 0.01, 0, 1);
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, StartsWith("39 of 41 frames are under-exposed: raise the exposure"));
+}
+
+TEST(Exposure, AFewBadFramesAreNotTheCause) {
+  SimulatedSweep s = Good();
+  Expose(&s, 6, 4, 40);
+  const Calibration c = Measured(s);
+  EXPECT_NE(c.outcome, Outcome::kRefused) << c.reason;
+  EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("exposed"))));
+}
+
+// Half of the sweep is missing because of the light: no other advice beside it.
+TEST(Exposure, WhatFollowsFromItIsNotAdvisedOn) {
+  SimulatedSweep s = Good();
+  Expose(&s, 6, 0, 6);
+  const Calibration c = Measured(s);
+  ASSERT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, AllOf(StartsWith("34 of 41 frames are over-exposed"),
+                              EndsWith("take the sweep again")));
+}
+
+TEST(Unit, ReadingsInInchesAreAskedAbout) {
+  SimulatedSweep s = Good();
+  s.sweep.offset_mm.reset();
+  for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm /= 25.4;
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at "),
+                              HasSubstr("are the readings in mm?")));
+}
+
+TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {
+  SimulatedSweep s = Good();
+  s.sweep.roi = {60, 60, 80, 23};
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) is 80 x 23 px"));
+  EXPECT_EQ(c.frames[0].statistics.mean_stored, 0);
+}
+
+TEST(Region, TooSmallForATextureIsNamedAsTheCause) {
+  SimulatedSweep s = Good();
+  s.sweep.roi = {60, 60, 40, 40};
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) is 40 x 40 px: an edge needs"));
+}
+
+TEST(Region, ASmallOneThatIsEnoughIsLeftAlone) {
+  SimulatedSweep s = KnifeEdge();
+  s.sweep.roi = {60, 60, 40, 40};
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+  EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("roi_px"))));
+}
+
+}  // namespace
+}  // namespace thicklens::calib

@@ -1,0 +1,115 @@
+// What a calibration says of the image scale: a lone edge that has none, readings that bend.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "tests/calib/damaged_sweep.h"
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using thicklens::testing::DeepCopy;
+using thicklens::testing::GiveFloor;
+using thicklens::testing::Simulate;
+using thicklens::testing::SimulatedSweep;
+using thicklens::testing::SweepCase;
+using thicklens::testing::Thinned;
+
+constexpr int kSizePx = 160;
+
+SimulatedSweep Good() {
+  static const SimulatedSweep rendered = [] {
+    SimulatedSweep sweep = Simulate(SweepCase("iii", kSizePx, 1));
+    GiveFloor(&sweep);
+    return sweep;
+  }();
+  return DeepCopy(rendered);
+}
+
+SimulatedSweep KnifeEdge() {
+  model::SweepSimulationOptions options = SweepCase("iii", kSizePx, 1);
+  options.target.kind = model::TargetKind::kKnifeEdge;
+  static const SimulatedSweep rendered = Thinned(Simulate(options), 2);
+  SimulatedSweep sweep = rendered;
+  sweep.sweep.target = model::SweepTarget::kKnifeEdge;
+  return sweep;
+}
+
+Calibration Measured(const SimulatedSweep& s) {
+  CalibrationOptions options;
+  options.map_field = false;
+  return Calibrate(s.sweep, options);
+}
+
+TEST(LoneEdge, ItsMissingScaleIsANoteNotAWarning) {
+  const SimulatedSweep s = KnifeEdge();
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+  EXPECT_FALSE(c.scale.done);
+  EXPECT_EQ(c.scale.message, "a lone edge shows no image scale: offset_mm is taken as given");
+  EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("offset_mm"))));
+}
+
+TEST(LoneEdge, NeedsAGivenOffset) {
+  SimulatedSweep s = KnifeEdge();
+  s.sweep.offset_mm.reset();
+  const Calibration c = Measured(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_THAT(c.reason,
+              AllOf(HasSubstr("a lone edge shows no image scale;"), HasSubstr("state offset_mm")));
+}
+
+// What nobody said to be a lone edge may be a printed one, as soft as that comes out.
+TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
+  SimulatedSweep s = KnifeEdge();
+  s.sweep.target = model::SweepTarget::kAuto;
+  const Calibration c = Measured(s);
+  ASSERT_EQ(c.outcome, Outcome::kPartial) << c.reason;
+  const double reach_mm = 2 * c.focus_depth_mm->sigma;
+  EXPECT_LT(c.focus_depth_mm->systematic->x() - reach_mm, s.truth.focus_depth_mm);
+  EXPECT_GT(c.focus_depth_mm->systematic->y() + reach_mm, s.truth.focus_depth_mm);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("the given offset_mm could not be checked")));
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("photograph a knife edge")));
+}
+
+class StraightLaw : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(StraightLaw, SlowIsNotSaidToBend) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    SimulatedSweep s = Simulate(SweepCase(GetParam(), 256, seed));
+    GiveFloor(&s);
+    const Calibration c = Measured(s);
+    EXPECT_TRUE(c.scale.done) << c.scale.message;
+    EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("bend")))) << seed;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Cases, StraightLaw, ::testing::Values("i", "ii", "iii", "iv", "v"));
+
+// Readings of a rail whose screw is not even: +0.8 mm at both ends against the middle.
+TEST(BentLaw, IsWarnedOfWithItsSize) {
+  SimulatedSweep s = Good();
+  for (model::SweepFrame& frame : s.sweep.frames) {
+    const double u = (frame.reading_mm - 400) / 80;
+    frame.reading_mm += 0.8 * u * u;
+  }
+  const Calibration c = Measured(s);
+  const auto warning =
+      std::find_if(c.warnings.begin(), c.warnings.end(), [](const std::string& text) {
+        return text.find("readings bend against the image scale") != std::string::npos;
+      });
+  ASSERT_NE(warning, c.warnings.end());
+  EXPECT_THAT(*warning, AllOf(HasSubstr("they lie -0."), HasSubstr("less certain")));
+  const std::string before = "they lie ";
+  EXPECT_NEAR(std::stod(warning->substr(warning->find(before) + before.size())), -0.8, 0.2);
+}
+
+}  // namespace
+}  // namespace thicklens::calib

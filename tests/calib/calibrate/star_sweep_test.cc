@@ -1,0 +1,106 @@
+// Whole calibrations with a star of spokes, which looks the same at every scale.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using thicklens::testing::GiveFloor;
+using thicklens::testing::Simulate;
+using thicklens::testing::SimulatedSweep;
+using thicklens::testing::SweepCase;
+
+SimulatedSweep StarSweep(const std::string& name, std::uint64_t seed) {
+  model::SweepSimulationOptions options = SweepCase(name, 160, seed);
+  options.target.kind = model::TargetKind::kSiemensStar;
+  SimulatedSweep simulated = Simulate(options);
+  GiveFloor(&simulated);
+  return simulated;
+}
+
+Calibration Calibrated(const SimulatedSweep& simulated) {
+  CalibrationOptions options;
+  options.map_field = false;
+  return Calibrate(simulated.sweep, options);
+}
+
+void ExpectRight(const Calibration& c, const model::SweepTruth& truth, double step_mm) {
+  ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio && c.image_distance_mm) << c.reason;
+  EXPECT_NEAR(c.focus_depth_mm->value, truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma);
+  EXPECT_NEAR(c.focus_depth_mm->value, truth.focus_depth_mm, 0.07 * step_mm);
+  EXPECT_NEAR(c.image_distance_mm->value, truth.image_distance_mm, 3 * c.image_distance_mm->sigma);
+  EXPECT_NEAR(c.blur_ratio->value, truth.blur_ratio, 3 * c.blur_ratio->sigma);
+  EXPECT_NEAR(c.blur_ratio->value / truth.blur_ratio, 1, 0.01);
+}
+
+TEST(StarSweep, CalibratesWithinItsErrors) {
+  const SimulatedSweep iii = StarSweep("iii", 3);
+  const Calibration c = Calibrated(iii);
+  EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+  ExpectRight(c, iii.truth, 4);
+  EXPECT_EQ(c.blur.meter, "relative spectrum");
+  EXPECT_FALSE(c.scale.done);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("the given offset_mm could not be checked: the target "
+                                             "looks the same at every scale")));
+}
+
+TEST(StarSweep, StrongDefocusCalibratesToo) {
+  const SimulatedSweep ii = StarSweep("ii", 4);
+  ExpectRight(Calibrated(ii), ii.truth, 1);
+}
+
+// No scale says so, but the blur does.
+TEST(StarSweep, AWrongReadingIsNamedByItsBlur) {
+  for (const double error_mm : {12.0, -25.0}) {
+    SimulatedSweep s = StarSweep("iii", 3);
+    s.sweep.frames[9].reading_mm += error_mm;
+    const Calibration c = Calibrated(s);
+    ExpectRight(c, s.truth, 4);
+    EXPECT_THAT(c.frames[9].rejection, HasSubstr("reading off by"));
+    int rejected = 0;
+    for (const FrameMeasurement& frame : c.frames) rejected += frame.rejection.empty() ? 0 : 1;
+    EXPECT_EQ(rejected, 1);
+  }
+}
+
+// All others are compared with the sharpest frame. If that one is wrong, another takes its place.
+TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
+  SimulatedSweep s = StarSweep("iii", 3);
+  const Calibration clean = Calibrated(s);
+  const auto sharpest = static_cast<std::size_t>(
+      std::max_element(clean.frames.begin(), clean.frames.end(),
+                       [](const FrameMeasurement& a, const FrameMeasurement& b) {
+                         return a.normalised_edge_slope < b.normalised_edge_slope;
+                       }) -
+      clean.frames.begin());
+  s.sweep.frames[sharpest].reading_mm += 40;
+  const Calibration c = Calibrated(s);
+  ExpectRight(c, s.truth, 4);
+  EXPECT_THAT(c.frames[sharpest].rejection, HasSubstr("reading off by"));
+  EXPECT_FALSE(c.frames[sharpest].in_blur_fit);
+  // Bands and shapes could be compared, which needs a reference.
+  EXPECT_EQ(clean.systematic_parts.size(), c.systematic_parts.size());
+  EXPECT_TRUE(c.blur.disc_misfit);
+}
+
+TEST(StarSweep, WithoutAnOffsetItSaysWhatToDo) {
+  SimulatedSweep s = StarSweep("iii", 3);
+  s.sweep.offset_mm.reset();
+  const Calibration c = Calibrated(s);
+  EXPECT_EQ(c.outcome, Outcome::kRefused);
+  EXPECT_FALSE(c.focus_depth_mm);
+  EXPECT_THAT(c.reason, HasSubstr("offset_mm is unknown"));
+  EXPECT_THAT(c.reason, HasSubstr("looks the same at every scale"));
+  EXPECT_THAT(c.reason, HasSubstr("state offset_mm, or use a texture"));
+}
+
+}  // namespace
+}  // namespace thicklens::calib

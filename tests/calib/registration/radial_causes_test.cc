@@ -1,0 +1,129 @@
+// What is named where the frames lie against one another like distorted images, or the readings
+// bend against the image scale.
+#include "calib/registration/radial_causes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "calib/registration/radial_distortion.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+Calibration Distorted(double value, double sigma) {
+  Calibration c;
+  c.scale.distortion_at_corner = model::Estimate{value, sigma};
+  c.structure.measured = true;
+  c.structure.vignetting = model::Estimate{-0.01, 0.01};
+  c.structure.fixed_structure = model::Estimate{0, 0.0005};
+  return c;
+}
+
+TEST(CheckDistortion, IsSilentWithoutASignificantOne) {
+  Calibration none;
+  EXPECT_FALSE(CheckDistortion(&none));
+  Calibration small = Distorted(-0.14, 0.05);
+  EXPECT_FALSE(CheckDistortion(&small));
+  EXPECT_TRUE(small.warnings.empty() && none.warnings.empty() && small.diagnoses.empty());
+}
+
+// A flat target and a lens that distorts look like a straight lens and a target that is not flat.
+TEST(CheckDistortion, NamesLensAndTargetWhereNothingElseIsSeen) {
+  Calibration c = Distorted(0.02, 0.001);
+  EXPECT_FALSE(CheckDistortion(&c));
+  ASSERT_EQ(c.warnings.size(), 1U);
+  EXPECT_THAT(c.warnings[0],
+              AllOf(HasSubstr("+2.0 +- 0.1 % at the corner (pincushion)"),
+                    HasSubstr("the lens distorts, or the target is not flat"),
+                    HasSubstr("a flat target tells them apart"), Not(HasSubstr("vignetting"))));
+  ASSERT_EQ(c.diagnoses.size(), 1U);
+  EXPECT_TRUE(c.diagnoses[0].Names(kLensDistorts) && c.diagnoses[0].Names(kTargetIsNotFlat));
+  EXPECT_FALSE(c.diagnoses[0].Names(kVignettingShifts) ||
+               c.diagnoses[0].Names(kFixedStructureShifts));
+}
+
+// What a small sweep cannot show stays among the causes.
+TEST(CheckDistortion, WhatIsNotExcludedIsNamedToo) {
+  Calibration c = Distorted(0.02, 0.001);
+  c.structure.vignetting->sigma = 0.2;
+  EXPECT_FALSE(CheckDistortion(&c));
+  EXPECT_TRUE(c.diagnoses.at(0).Names(kVignettingShifts));
+  EXPECT_THAT(c.warnings.at(0), HasSubstr("Vignetting would do the same, and this sweep does not "
+                                          "show whether there is any"));
+}
+
+TEST(CheckDistortion, RefusesWhatCannotBeAllowedFor) {
+  Calibration c = Distorted(-0.14, 0.03);
+  EXPECT_THAT(CheckDistortion(&c).value_or(""),
+              AllOf(HasSubstr("-14.0 +- 3.0 % at the corner (barrel)"), HasSubstr("undistort")));
+}
+
+// A gear in steps on a stage came out as "+158.8 % pincushion".
+TEST(CheckDistortion, WhatNoLensDoesIsNotBlamedOnTheLens) {
+  Calibration c = Distorted(1.588, 0.05);
+  EXPECT_THAT(CheckDistortion(&c).value_or(""),
+              AllOf(HasSubstr("no lens distorts so much: the target is not flat"),
+                    Not(HasSubstr("undistort"))));
+  EXPECT_TRUE(c.diagnoses[0].NamesOnly(kTargetIsNotFlat));
+}
+
+TEST(CheckDistortion, WhatIsSeenInTheFramesIsNamedFirst) {
+  Calibration dust = Distorted(0.007, 0.001);
+  dust.structure.fixed_structure = model::Estimate{0.01, 0.001};
+  EXPECT_FALSE(CheckDistortion(&dust));
+  ASSERT_EQ(dust.warnings.size(), 1U);
+  EXPECT_THAT(dust.warnings[0],
+              AllOf(HasSubstr("fine structure of 1 %"), HasSubstr("dust on the sensor"),
+                    HasSubstr("If it is not the cause, the lens distorts")));
+  EXPECT_TRUE(dust.diagnoses[0].Names(kFixedStructureShifts));
+  Calibration vignetted = Distorted(0.007, 0.001);
+  vignetted.structure.vignetting = model::Estimate{std::log(0.5), 0.02};
+  EXPECT_FALSE(CheckDistortion(&vignetted));
+  EXPECT_THAT(vignetted.warnings.at(0),
+              AllOf(HasSubstr("the corners are 50 % darker"), HasSubstr("evenly lit white sheet")));
+}
+
+TEST(Bend, NamesWhatTheFramesShow) {
+  const Bend bend{{0.18, 0.03}, -7.1};
+  Calibration c;
+  c.structure = Distorted(0, 1).structure;
+  EXPECT_THAT(BendInWords(bend, c), AllOf(HasSubstr("The rail's scale is not linear"),
+                                          HasSubstr("look alike"), HasSubstr("micrometer screw")));
+  EXPECT_THAT(BendRemedy(c.structure), HasSubstr("check the rail's scale"));
+  c.structure.vignetting = model::Estimate{std::log(0.5), 0.02};
+  EXPECT_THAT(BendInWords(bend, c),
+              AllOf(HasSubstr("+0.18 +- 0.03 mm"), HasSubstr("the corners are 50 % darker"),
+                    HasSubstr("If it is not the cause, the rail's scale is not linear")));
+  EXPECT_THAT(BendRemedy(c.structure),
+              AllOf(HasSubstr("measure offset_mm"), Not(HasSubstr("rail"))));
+}
+
+// Frames of one scale show no distortion, whatever their registrations' cubic terms are.
+TEST(FitRadialDistortion, IsNothingWhereTheScaleDoesNotChange) {
+  std::vector<ScaleSample> samples(31);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    ScaleSample& sample = samples[i];
+    const double change = i % 2 == 0 ? 1e-5 : -2e-5;
+    sample.scale = sample.registration.scale = 1 + change;
+    sample.registration.scale_sigma = 1e-5;
+    sample.registration.cubic = -1e-10;
+    sample.registration.cubic_sigma = 1e-11;
+  }
+  EXPECT_FALSE(FitRadialDistortion(samples));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].scale = 1 + 0.003 * (static_cast<double>(i) - 15);
+    samples[i].registration.cubic = 2e-9 * CubicPerDistortion(samples[i].scale);
+  }
+  ASSERT_TRUE(FitRadialDistortion(samples));
+  EXPECT_NEAR(FitRadialDistortion(samples)->value, 2e-9, 1e-11);
+}
+
+}  // namespace
+}  // namespace thicklens::calib

@@ -1,0 +1,170 @@
+// The map over the field against targets put together from sweeps at known depths.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using thicklens::testing::GiveFloor;
+using thicklens::testing::Simulate;
+using thicklens::testing::SimulatedSweep;
+using thicklens::testing::SweepCase;
+
+constexpr int kSizePx = 256;
+
+// Case iii with the target `farther_mm` beyond where the readings say it is.
+SimulatedSweep SweepAt(double farther_mm, double focus_shift_mm = 0) {
+  model::SweepSimulationOptions options = SweepCase("iii", kSizePx, 3);
+  options.target.kind = model::TargetKind::kWhiteNoise;
+  options.first_depth_mm += farther_mm + focus_shift_mm;
+  options.bench_offset_mm += farther_mm + focus_shift_mm;
+  options.lamp_falloff = false;
+  SimulatedSweep s = Simulate(options);
+  s.sweep.offset_mm = model::Estimate{s.sweep.offset_mm->value - farther_mm - focus_shift_mm, 0};
+  GiveFloor(&s);
+  return s;
+}
+
+// Every part of the field from a sweep of its own; `depth_at` gives how much farther the target
+// stands at a column.
+template <typename DepthAt>
+SimulatedSweep InStrips(int strips, const DepthAt& depth_at) {
+  SimulatedSweep whole = SweepAt(0);
+  const int width = kSizePx / strips;
+  for (int k = 0; k < strips; ++k) {
+    const SimulatedSweep part = SweepAt(depth_at((k + 0.5) * width - 0.5 * kSizePx));
+    const cv::Rect strip(k * width, 0, width, kSizePx);
+    for (std::size_t i = 0; i < part.stored->size(); ++i)
+      (*part.stored)[i](strip).copyTo((*whole.stored)[i](strip));
+  }
+  return whole;
+}
+
+TEST(FieldMap, AFlatTargetHasOneDepthAndNoTilt) {
+  const SimulatedSweep s = SweepAt(0);
+  const Calibration c = Calibrate(s.sweep, {});
+  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
+  EXPECT_EQ(c.field.clusters.size(), 1U);
+  EXPECT_EQ(c.field.tiles.size(), 25U);
+  EXPECT_NEAR(c.field.tilt_right_deg->value, 0, 4 * c.field.tilt_right_deg->sigma);
+  EXPECT_NEAR(c.field.tilt_down_deg->value, 0, 4 * c.field.tilt_down_deg->sigma);
+  EXPECT_LT(c.field.tilt_right_deg->sigma, 1);
+  EXPECT_NEAR(c.field.curvature_mm->value, 0, 4 * c.field.curvature_mm->sigma);
+  EXPECT_NEAR(c.field.astigmatism_mm->value, 0, 4 * c.field.astigmatism_mm->sigma);
+  for (const FieldTile& tile : c.field.tiles) {
+    ASSERT_TRUE(tile.done) << tile.message;
+    EXPECT_NEAR(tile.focus_depth_mm.value, s.truth.focus_depth_mm, 1);
+  }
+  EXPECT_TRUE(c.channels.empty());  // grey frames
+}
+
+TEST(FieldMap, IsLeftOutOnRequest) {
+  CalibrationOptions options;
+  options.map_field = false;
+  const Calibration c = Calibrate(SweepAt(0).sweep, options);
+  EXPECT_TRUE(c.focus_depth_mm);
+  EXPECT_FALSE(c.field.done);
+  EXPECT_TRUE(c.field.tiles.empty());
+}
+
+TEST(FieldMap, SlowATiltIsMeasuredInDegrees) {
+  constexpr double kTiltDeg = 8;
+  const double mm_per_px = 400 * 0.006 / (12.5 * 400 / (400 - 12.5));
+  // Positive: the right side is nearer.
+  const SimulatedSweep s = InStrips(
+      16, [&](double x_px) { return -x_px * mm_per_px * std::tan(kTiltDeg * CV_PI / 180); });
+  const Calibration c = Calibrate(s.sweep, {});
+  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
+  EXPECT_NEAR(c.field.tilt_right_deg->value, kTiltDeg, 1);
+  EXPECT_NEAR(c.field.tilt_down_deg->value, 0, 1);
+  EXPECT_EQ(c.field.clusters.size(), 1U);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("tilted")));
+}
+
+// The same by a target that is simulated as tilted, for a lens whose focus tells depths well: to
+// what the map itself says of its error.
+TEST(FieldMap, FindsTheTiltThatWasSimulated) {
+  for (const double tilt_deg : {1.0, -2.0}) {
+    SCOPED_TRACE(tilt_deg);
+    model::SweepSimulationOptions options =
+        model::ReadSweepSimulation(THICKLENS_SOURCE_DIR "/configs/sweeps/demo.yaml");
+    options.target.tilt_deg = tilt_deg;
+    SimulatedSweep s = Simulate(options);
+    GiveFloor(&s);
+    const Calibration c = Calibrate(s.sweep, {});
+    ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
+    EXPECT_LT(c.field.tilt_right_deg->sigma, 0.05);
+    EXPECT_NEAR(c.field.tilt_right_deg->value, tilt_deg, 3.5 * c.field.tilt_right_deg->sigma);
+    EXPECT_NEAR(c.field.tilt_down_deg->value, 0, 3.5 * c.field.tilt_down_deg->sigma);
+    EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
+  }
+}
+
+TEST(FieldMap, SlowALongSweepIsMappedFromAPartOfItsFrames) {
+  model::SweepSimulationOptions options = SweepCase("iii", 192, 3);
+  options.target.kind = model::TargetKind::kWhiteNoise;
+  options.step_mm *= static_cast<double>(options.frame_count) / 150;
+  options.frame_count = 150;
+  SimulatedSweep s = Simulate(options);
+  GiveFloor(&s);
+  const Calibration c = Calibrate(s.sweep, {});
+  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
+  EXPECT_NEAR(c.field.tilt_right_deg->value, 0, 4 * c.field.tilt_right_deg->sigma);
+  for (const FieldTile& tile : c.field.tiles) {
+    ASSERT_TRUE(tile.done) << tile.message;
+    EXPECT_NEAR(tile.focus_depth_mm.value, s.truth.focus_depth_mm, 1);
+  }
+}
+
+TEST(FieldMap, DepthsOfATargetInStepsAreParted) {
+  constexpr double kStepMm = 12;
+  const SimulatedSweep s = InStrips(2, [](double x_px) { return x_px < 0 ? 0.0 : kStepMm; });
+  const Calibration c = Calibrate(s.sweep, {});
+  ASSERT_TRUE(c.field.done) << c.field.message << c.reason;
+  ASSERT_GE(c.field.clusters.size(), 2U);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("not at one depth")));
+  // What stands farther than its reading says comes into focus at a smaller one.
+  const double truth = s.truth.focus_depth_mm;
+  EXPECT_NEAR(c.field.clusters.front().focus_depth_mm.value, truth - kStepMm, 1.5);
+  EXPECT_NEAR(c.field.clusters.back().focus_depth_mm.value, truth, 1.5);
+  // Both are in the interval.
+  ASSERT_TRUE(c.focus_depth_mm->systematic);
+  EXPECT_LT(c.focus_depth_mm->systematic->x(), truth - kStepMm + 1.5);
+  EXPECT_GT(c.focus_depth_mm->systematic->y(), truth - 1.5);
+}
+
+TEST(FieldMap, EachColourHasItsOwnFocus) {
+  // Red, green and blue come into focus at readings 3 mm apart.
+  const double shifts_mm[] = {-3, 0, 3};
+  SimulatedSweep s = SweepAt(0);
+  std::vector<SimulatedSweep> colours;
+  for (const double shift : shifts_mm) colours.push_back(SweepAt(shift));
+  for (std::size_t i = 0; i < s.stored->size(); ++i) {
+    const std::vector<cv::Mat> channels = {(*colours[0].stored)[i], (*colours[1].stored)[i],
+                                           (*colours[2].stored)[i]};
+    cv::Mat picture;
+    cv::merge(channels, picture);
+    (*s.stored)[i] = picture;
+  }
+  const Calibration c = Calibrate(s.sweep, {});
+  ASSERT_EQ(c.channels.size(), 3U) << c.reason;
+  const char* const names[] = {"red", "green", "blue"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(c.channels[k].name, names[k]);
+    ASSERT_TRUE(c.channels[k].done) << c.channels[k].message;
+    EXPECT_NEAR(c.channels[k].focus_depth_mm.value, s.truth.focus_depth_mm - shifts_mm[k], 0.5);
+  }
+}
+
+}  // namespace
+}  // namespace thicklens::calib

@@ -1,0 +1,114 @@
+#include "calib/uncertainty/floor_choice.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/calib/known_texture.h"
+#include "tests/calib/simulated_sweep.h"
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+constexpr int kSize = 160;
+constexpr double kNoise = 5e-5;
+
+// A meter of one frame, which shows a texture whose power falls with frequency through a Gaussian
+// of `blur_px`.
+struct OneFrame {
+  SpectralMeterSetup meter;
+  MeterRegion region;
+};
+
+OneFrame Photograph(double blur_px, double highest = 0.4, unsigned seed = 5) {
+  const Eigen::Vector2d middle(0.5 * (kSize - 1), 0.5 * (kSize - 1));
+  const testing::KnownTexture texture(seed, highest, 3000);
+  const cv::Mat grey = testing::WithWhiteNoise(
+      texture.Render(kSize, kSize, middle, {}, testing::GaussianOf(blur_px * blur_px)), kNoise, 8);
+  OneFrame one;
+  one.meter.origin_px = middle;
+  one.meter.size_px.setConstant(kSize);
+  one.meter.frames.resize(1);
+  one.meter.frames[0].pixel_noise = kNoise;
+  one.meter.read_grey = [grey](std::size_t) { return grey; };
+  one.region.window.size_px.setConstant(0.98 * (kSize - 1));
+  one.region.samples.resize(1);
+  return one;
+}
+
+double BoundPx(const OneFrame& one) {
+  return std::sqrt(LargestBlurVariance(one.meter, one.region).value());
+}
+
+TEST(LargestBlurVariance, IsNotBelowTheBlurOfATextureWhosePowerFalls) {
+  for (const double blur_px : {0.5, 1.0, 1.6, 2.2}) {
+    const double bound_px = BoundPx(Photograph(blur_px));
+    EXPECT_GT(bound_px, blur_px);
+    EXPECT_LT(bound_px, blur_px + 0.9) << "of " << blur_px;
+  }
+}
+
+TEST(LargestBlurVariance, IsLargeWhereTheTextureHasNoFineDetail) {
+  // Nothing above .06 cycles/px: a lens far softer than any could have taken it.
+  const auto bound = LargestBlurVariance(Photograph(0.4, 0.06).meter, Photograph(0.4, 0.06).region);
+  ASSERT_TRUE(bound);
+  EXPECT_GT(std::sqrt(*bound), 1.3);
+}
+
+TEST(LargestBlurVariance, SaysNothingOfNoiseAlone) {
+  OneFrame one = Photograph(1);
+  const cv::Mat flat =
+      testing::WithWhiteNoise(cv::Mat(kSize, kSize, CV_32F, cv::Scalar(0.4)), kNoise, 3);
+  one.meter.read_grey = [flat](std::size_t) { return flat; };
+  EXPECT_FALSE(LargestBlurVariance(one.meter, one.region));
+  one.meter.read_grey = nullptr;
+  EXPECT_FALSE(LargestBlurVariance(one.meter, one.region));
+}
+
+TEST(ChooseFloor, TakesWhatIsStated) {
+  BlurEvidence evidence;
+  std::vector<std::string> warnings;
+  model::FloorKnowledge known;
+  known.given_px = model::Estimate{0.6, 0.05};
+  FloorChoice choice = ChooseFloor(known, evidence, &warnings);
+  EXPECT_DOUBLE_EQ(choice.variance_px2->value, 0.36);
+  EXPECT_NEAR(choice.variance_px2->sigma, 0.0602, 1e-4);
+  EXPECT_FALSE(choice.interval_px2);
+  // Of a floor that may be nothing at all, the error is that of the square.
+  known.given_px = model::Estimate{0, 0.3};
+  EXPECT_NEAR(ChooseFloor(known, evidence, &warnings).variance_px2->sigma, 0.1273, 1e-4);
+  known = {};
+  known.from_px = 0.3;
+  known.to_px = 0.7;
+  choice = ChooseFloor(known, evidence, &warnings);
+  EXPECT_NEAR((*choice.interval_px2)[0], 0.09, 1e-12);
+  EXPECT_NEAR((*choice.interval_px2)[1], 0.49, 1e-12);
+  EXPECT_NEAR(choice.variance_px2->value, 0.29, 1e-12);
+  EXPECT_TRUE(warnings.empty());
+}
+
+TEST(ChooseFloor, ASofterLensThanUsualIsAllowedForWhereTheTextureDoesNotExcludeIt) {
+  for (const double floor_px : {0.5, 1.7}) {
+    model::SweepSimulationOptions options = testing::SweepCase("iv", 128, 32);
+    options.target.kind = model::TargetKind::kDeadLeaves;
+    options.camera.calibration->blur_floor_px = model::Estimate{floor_px, 0};
+    const testing::SimulatedSweep simulated = testing::Simulate(options);
+    CalibrationOptions how;
+    how.map_field = false;
+    const Calibration c = Calibrate(simulated.sweep, how);
+    ASSERT_TRUE(c.focus_depth_mm) << c.reason;
+    const Eigen::Vector2d zf = *c.focus_depth_mm->systematic;
+    EXPECT_LT(zf[0] - 2 * c.focus_depth_mm->sigma, simulated.truth.focus_depth_mm) << floor_px;
+    EXPECT_GT(zf[1] + 2 * c.focus_depth_mm->sigma, simulated.truth.focus_depth_mm) << floor_px;
+    EXPECT_GE((*c.blur_floor_px->systematic)[1], std::max(1.0, floor_px));
+    EXPECT_THAT(c.warnings, Contains(HasSubstr("floor cannot be found from this target")));
+  }
+}
+
+}  // namespace
+}  // namespace thicklens::calib

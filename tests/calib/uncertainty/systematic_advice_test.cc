@@ -1,0 +1,148 @@
+// Widening an interval afterwards, and the advice.
+#include "calib/uncertainty/systematic_advice.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "calib/uncertainty/systematic_parts.h"
+#include "tests/calib/focus_case.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::StartsWith;
+using thicklens::testing::BlurBench;
+
+// Results without anything systematic but what a test adds.
+Calibration Plain(double zf_mm, double zf_sigma_mm, double zero_sigma_mm,
+                  const model::ThickLens& lens) {
+  Calibration c;
+  c.focus_depth_mm = Result{zf_mm, zf_sigma_mm, Eigen::Vector2d(zf_mm - 1, zf_mm + 2)};
+  const double d1_mm = model::ImageDistanceMm(lens, zf_mm);
+  c.image_distance_mm =
+      Result{d1_mm, std::abs(model::ImageDistanceSlope(lens, zf_mm)) * zf_sigma_mm,
+             Eigen::Vector2d(d1_mm - 0.002, d1_mm + 0.001)};
+  c.bench_offset_mm = Result{0, zero_sigma_mm, std::nullopt};
+  return c;
+}
+
+TEST(WidenFocus, AddsToBothIntervals) {
+  const model::ThickLens lens = BlurBench().lens;
+  Calibration c = Plain(400, 0.1, 0, lens);
+  WidenFocus("a jump", 5, "mend it", lens, &c);
+  EXPECT_NEAR(c.focus_depth_mm->systematic->x(), 400 - 1 - 5, 1e-9);
+  EXPECT_NEAR(c.focus_depth_mm->systematic->y(), 400 + 2 + 5, 1e-9);
+  const double d1_mm = c.image_distance_mm->value;
+  // rho + f2 zf/(zf - f1) at 405 and at 395 mm.
+  const double low_mm = 3 + 12.8 * 405 / 392.5, high_mm = 3 + 12.8 * 395 / 382.5;
+  EXPECT_NEAR(c.image_distance_mm->systematic->x(), d1_mm - 0.002 + (low_mm - d1_mm), 1e-9);
+  EXPECT_NEAR(c.image_distance_mm->systematic->y(), d1_mm + 0.001 + (high_mm - d1_mm), 1e-9);
+  ASSERT_EQ(c.systematic_parts.size(), 1U);
+  EXPECT_EQ(c.systematic_parts[0].name, "a jump");
+  EXPECT_EQ(c.systematic_parts[0].remedy, "mend it");
+  EXPECT_NEAR(c.systematic_parts[0].focus_depth_mm.x(), -5, 1e-12);
+  EXPECT_NEAR(c.systematic_parts[0].focus_depth_mm.y(), 5, 1e-12);
+  EXPECT_EQ(c.systematic_parts[0].blur_ratio.norm(), 0);
+  EXPECT_THAT(c.advice, StartsWith("a jump is "));
+}
+
+// Nearer than the focal point there is no image: one hundredth beyond it d1 is rho + 101 f2.
+TEST(WidenFocus, StopsShortOfTheFocalPoint) {
+  const model::ThickLens lens = BlurBench().lens;
+  for (const double move_mm : {387.4, 390.0, 5000.0}) {
+    Calibration c = Plain(400, 0.1, 0, lens);
+    WidenFocus("a jump", move_mm, "mend it", lens, &c);
+    EXPECT_NEAR(c.systematic_parts[0].image_distance_mm.y(),
+                3 + 101 * 12.8 - c.image_distance_mm->value, 1e-6);
+    EXPECT_NEAR(c.focus_depth_mm->systematic->x(), 399 - (400 - 12.625), 1e-9);
+    EXPECT_NEAR(c.focus_depth_mm->systematic->y() - c.focus_depth_mm->value, move_mm + 2, 1e-9);
+  }
+  Calibration c = Plain(400, 0.1, 0, lens);
+  WidenFocus("a jump", 387, "mend it", lens, &c);
+  EXPECT_NEAR(c.systematic_parts[0].image_distance_mm.y(),
+              3 + 12.8 * 13 / 0.5 - c.image_distance_mm->value, 1e-6);
+}
+
+TEST(WidenFocus, MakesNoIntervalWhereThereIsNone) {
+  const model::ThickLens lens = BlurBench().lens;
+  Calibration c = Plain(400, 0.1, 0, lens);
+  c.focus_depth_mm->systematic.reset();
+  c.image_distance_mm->systematic.reset();
+  WidenFocus("a jump", 5, "mend it", lens, &c);
+  EXPECT_FALSE(c.focus_depth_mm->systematic);
+  EXPECT_FALSE(c.image_distance_mm->systematic);
+  EXPECT_EQ(c.systematic_parts.size(), 1U);
+}
+
+// ---- the advice ----
+
+SystematicPart PartOfImageDistance(const std::string& name, double low_mm, double high_mm) {
+  SystematicPart part;
+  part.name = name;
+  part.image_distance_mm = {low_mm, high_mm};
+  part.remedy = "mend " + name;
+  return part;
+}
+
+// The slope of d1 by hand, f1 f2/(zf - f1)^2 = 12.5 12.8/387.5^2 = 1.0656e-3: the noise of 0.4 mm
+// and the zero of 0.3 mm are each 3.92 times as wide in d1, 1.671e-3 and 1.253e-3 mm.
+TEST(WidenFocus, TheAdviceNamesTheLargestShare) {
+  struct Case {
+    double first_mm, second_mm;  // widths of two parts besides
+    double zero_mm;              // of the bench zero, of 0.5 mm in all
+    const char* advice;
+  };
+  // What WidenFocus adds itself is 2.131e-6 mm.
+  const Case cases[] = {
+      {0.001, 0.004, 0.3, "second is 50 % of the error of d1: mend second"},
+      {0.004, 0.001, 0.3, "first is 50 % of the error of d1: mend first"},
+      {0.001, 0.001, 0.3, "noise and readings are 34 % of the error of d1: more frames"},
+      {0.0016, 0.001, 0.3, "noise and readings are 30 % of the error of d1"},
+      {0.0017, 0.001, 0.3, "first is 30 % of the error of d1"},
+      {0.0014, 0.001, 0.4, "the bench zero is 31 % of the error of d1: measure offset_mm"},
+      {0.0018, 0.001, 0.4, "first is 31 % of the error of d1"},
+      // The zero's share is no larger than zf's whole error.
+      {0.001, 0.001, 7, "the bench zero is 51 % of the error of d1"},
+  };
+  const model::ThickLens lens = BlurBench().lens;
+  for (const Case& k : cases) {
+    SCOPED_TRACE(k.advice);
+    Calibration c = Plain(400, 0.5, k.zero_mm, lens);
+    c.systematic_parts = {PartOfImageDistance("first", -0.25 * k.first_mm, 0.75 * k.first_mm),
+                          PartOfImageDistance("second", -k.second_mm, 0)};
+    WidenFocus("a hair", 0.001, "nothing", lens, &c);
+    EXPECT_THAT(c.advice, StartsWith(k.advice));
+    ASSERT_EQ(c.systematic_parts.size(), 3U);
+    for (std::size_t i = 1; i < 3; ++i) {
+      const auto width = [&](std::size_t p) {
+        return c.systematic_parts[p].image_distance_mm.y() -
+               c.systematic_parts[p].image_distance_mm.x();
+      };
+      EXPECT_GE(width(i - 1), width(i));
+    }
+  }
+}
+
+// Not every caller has fitted a zero: what is not there has no share, and nothing is read of it.
+TEST(WidenFocus, WithoutAZeroItHasNoShare) {
+  const model::ThickLens lens = BlurBench().lens;
+  Calibration c = Plain(400, 0.5, 0, lens);
+  Calibration without = c;
+  without.bench_offset_mm.reset();
+  for (Calibration* each : {&c, &without}) WidenFocus("a hair", 0.001, "nothing", lens, each);
+  EXPECT_THAT(without.advice, StartsWith("noise and readings are 100 %"));
+  EXPECT_EQ(without.advice, c.advice);
+}
+
+TEST(WidenFocus, WithoutAnyErrorThereIsNoAdvice) {
+  const model::ThickLens lens = BlurBench().lens;
+  Calibration c = Plain(400, 0, 0, lens);
+  WidenFocus("nothing", 0, "nothing", lens, &c);
+  EXPECT_EQ(c.advice, "");
+}
+
+}  // namespace
+}  // namespace thicklens::calib

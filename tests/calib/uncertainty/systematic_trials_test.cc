@@ -1,0 +1,200 @@
+// Systematic parts: against calibrating again, and how they add up.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calib/uncertainty/systematic_parts.h"
+#include "tests/calib/focus_case.h"
+
+namespace thicklens::calib {
+namespace {
+
+using ::testing::HasSubstr;
+using thicklens::testing::BlurBench;
+using thicklens::testing::ExactBench;
+using thicklens::testing::FocusCase;
+
+constexpr double kErrorPx2 = 0.01;
+
+// No frame stands in the plane of focus.
+BlurBench Asymmetric() {
+  BlurBench bench = ExactBench();
+  bench.first_mm = 342;
+  bench.last_mm = 490;
+  return bench;
+}
+
+// ---- the oracle of a trial is to calibrate again ----
+
+TEST(AddSystematicParts, AToleranceIsWhatAnotherCameraFileWouldGive) {
+  struct Field {
+    const char* name;
+    double tolerance;
+    double model::ThickLens::*of_lens;  // none: the pixel pitch
+  };
+  const Field fields[] = {
+      {"lens.front_focal_length_mm", 0.1, &model::ThickLens::front_focal_length_mm},
+      {"lens.rear_focal_length_mm", 0.1, &model::ThickLens::rear_focal_length_mm},
+      {"lens.lens_thickness_mm", 0.2, &model::ThickLens::lens_thickness_mm},
+      {"lens.aperture_radius_mm", 0.1, &model::ThickLens::aperture_radius_mm},
+      {"sensor.pixel_pitch_mm", 1e-4, nullptr}};
+  for (const Field& field : fields) {
+    SCOPED_TRACE(field.name);
+    const auto solved = [&](double change, bool is_stated) {
+      BlurBench bench;  // with noise
+      FocusCase c = FocusCase(bench).WithTexture(0.02).WithTrueFloor();
+      model::ThickLens& lens = c.evidence.setup.lens;
+      (field.of_lens != nullptr ? lens.*field.of_lens : c.evidence.setup.pixel_pitch_mm) += change;
+      c.sweep.camera.lens = lens;
+      c.sweep.camera.sensor.pixel_pitch_mm = c.evidence.setup.pixel_pitch_mm;
+      if (is_stated) c.sweep.camera.statements[field.name] = {field.tolerance, false};
+      c.Solve();
+      return c;
+    };
+    const FocusCase c = solved(0, true);
+    const SystematicPart* part = c.Part(field.name);
+    ASSERT_NE(part, nullptr);
+    Eigen::Vector2d zf(0, 0), d1(0, 0), kappa(0, 0);
+    const auto widen = [](double move, Eigen::Vector2d* ends) {
+      *ends = {std::min(ends->x(), move), std::max(ends->y(), move)};
+    };
+    for (const double change : {-field.tolerance, field.tolerance}) {
+      const FocusCase again = solved(change, false);
+      ASSERT_TRUE(again.calibration.focus_depth_mm) << again.calibration.reason;
+      widen(again.calibration.focus_depth_mm->value - c.calibration.focus_depth_mm->value, &zf);
+      widen(again.calibration.image_distance_mm->value - c.calibration.image_distance_mm->value,
+            &d1);
+      widen(again.calibration.blur_ratio->value - c.calibration.blur_ratio->value, &kappa);
+    }
+    for (int end = 0; end < 2; ++end) {
+      EXPECT_NEAR(part->focus_depth_mm[end], zf[end], 1e-5);
+      EXPECT_NEAR(part->image_distance_mm[end], d1[end], 1e-7 + 1e-3 * std::abs(d1[end]));
+      EXPECT_NEAR(part->blur_ratio[end], kappa[end], 1e-6);
+    }
+    EXPECT_GT(d1.norm() + kappa.norm(), 1e-4);
+  }
+}
+
+// An end that is no lens is left out.
+TEST(AddSystematicParts, AToleranceBeyondZeroCountsOnOneSide) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+  c.sweep.camera.statements["lens.aperture_radius_mm"] = {5, false};  // of 4.46 mm
+  c.sweep.camera.statements["sensor.pixel_pitch_mm"] = {0.01, false};
+  c.Solve();
+  const SystematicPart* aperture = c.Part("lens.aperture_radius_mm");
+  ASSERT_NE(aperture, nullptr);
+  EXPECT_NEAR(aperture->blur_ratio.x(), 0.45 * (4.4643 / 9.4643 - 1), 1e-3);
+  EXPECT_EQ(aperture->blur_ratio.y(), 0);
+  const SystematicPart* pitch = c.Part("sensor.pixel_pitch_mm");
+  ASSERT_NE(pitch, nullptr);
+  EXPECT_EQ(pitch->blur_ratio.x(), 0);
+  EXPECT_NEAR(pitch->blur_ratio.y(), 0.45 * 10 / 6, 1e-3);
+}
+
+TEST(AddSystematicParts, TheFloorsEndsAreTwoMoreCalibrations) {
+  const auto solved = [](std::optional<double> floor_px) {
+    BlurBench bench;  // with noise
+    FocusCase c = FocusCase(bench).WithTexture(0.02);
+    if (floor_px) {
+      c.WithFloor(*floor_px, 0);
+    } else {
+      c.sweep.floor.from_px = 0.3;
+      c.sweep.floor.to_px = 0.7;
+    }
+    c.Solve();
+    return c;
+  };
+  const FocusCase c = solved(std::nullopt), low = solved(0.3), high = solved(0.7);
+  const auto zf_mm = [](const FocusCase& k) { return k.calibration.focus_depth_mm->value; };
+  ASSERT_TRUE(c.calibration.focus_depth_mm->systematic);
+  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->x(), zf_mm(low), 1e-4);
+  EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->y(), zf_mm(high), 1e-4);
+  EXPECT_NEAR(c.calibration.image_distance_mm->systematic->x(),
+              high.calibration.image_distance_mm->value, 1e-6);
+  EXPECT_NEAR(c.calibration.image_distance_mm->systematic->y(),
+              low.calibration.image_distance_mm->value, 1e-6);
+}
+
+// Each meter alone has to be told the floor that the other measured.
+TEST(AddSystematicParts, ATextureAloneKeepsTheKnifeEdgesFloor) {
+  BlurBench bench = Asymmetric();
+  FocusCase c = FocusCase(bench).WithTexture(kErrorPx2);
+  BlurBench behind = bench;
+  behind.focus_mm += 1;
+  BlurSamples edges = behind.Absolute(kErrorPx2, 0, &c.random);
+  edges.held_softness_px2 = 0;
+  c.evidence.edges = 1;
+  c.evidence.setup.meters.push_back(edges);
+  c.Solve();
+  const SystematicPart* part = c.Part("edges against texture");
+  ASSERT_NE(part, nullptr);
+  const double zf = c.calibration.focus_depth_mm->value;
+  EXPECT_NEAR(zf + part->focus_depth_mm.x(), bench.focus_mm, 0.1);
+  EXPECT_NEAR(zf + part->focus_depth_mm.y(), behind.focus_mm, 0.1);
+}
+
+// ---- how parts add up ----
+
+// The meters' own part of kappa, with the pitch's, in quadrature, each way.
+TEST(AddSystematicParts, TheMetersOwnErrorIsInKappa) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+  c.sweep.camera.statements["sensor.pixel_pitch_mm"] = {0.004 * c.bench.pitch_mm, false};
+  c.Solve();
+  const SystematicPart* own = c.Part("blur meter");
+  ASSERT_NE(own, nullptr);
+  EXPECT_NEAR(own->blur_ratio.y(), 0.003 * 0.45, 1e-6);
+  EXPECT_NEAR(own->blur_ratio.x(), -0.003 * 0.45, 1e-6);
+  EXPECT_EQ(own->focus_depth_mm.norm() + own->image_distance_mm.norm(), 0);
+  const Result& kappa = *c.calibration.blur_ratio;
+  EXPECT_NEAR(kappa.systematic->y() - kappa.value, 0.005 * 0.45, 1e-5);
+  EXPECT_NEAR(kappa.value - kappa.systematic->x(), 0.005 * 0.45, 1e-5);
+}
+
+TEST(AddSystematicParts, OnEachEndTheFloorAddsToTheRest) {
+  FocusCase c = FocusCase().WithTexture(kErrorPx2);
+  c.sweep.floor.from_px = 0.4;
+  c.sweep.floor.to_px = 0.6;
+  c.sweep.camera.statements["lens.rear_focal_length_mm"] = {3e-4, false};
+  c.sweep.camera.statements["lens.lens_thickness_mm"] = {4e-4, false};
+  c.Solve();
+  const SystematicPart* floor = c.Part("lens floor");
+  ASSERT_NE(floor, nullptr);
+  const double rest_mm = std::hypot(3e-4 * 400 / 387.5, 4e-4);
+  const Result& d1 = *c.calibration.image_distance_mm;
+  EXPECT_NEAR(d1.systematic->x(), d1.value + floor->image_distance_mm.x() - rest_mm, 1e-6);
+  EXPECT_NEAR(d1.systematic->y(), d1.value + floor->image_distance_mm.y() + rest_mm, 1e-6);
+}
+
+// Each end by what reaches to its side.
+TEST(AddSystematicParts, PartsThatMoveOneWayWidenOneEnd) {
+  for (const double sign : {1.0, -1.0}) {
+    FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+    BlurBench band = c.bench, shape = c.bench;
+    band.focus_mm += sign * 0.8;
+    shape.focus_mm += sign * 0.6;
+    c.evidence.narrow_band = band.Relative(kErrorPx2, thicklens::testing::kReferencePx2, &c.random);
+    c.evidence.other_psf = shape.Relative(kErrorPx2, thicklens::testing::kReferencePx2, &c.random);
+    c.Solve();
+    const Result& zf = *c.calibration.focus_depth_mm;
+    ASSERT_TRUE(zf.systematic);
+    EXPECT_NEAR(zf.systematic->x(), zf.value - (sign > 0 ? 0 : 1), 0.01);
+    EXPECT_NEAR(zf.systematic->y(), zf.value + (sign > 0 ? 1 : 0), 0.01);
+  }
+}
+
+TEST(AddSystematicParts, TheShapesRemedyIsToStateTheBetterOne) {
+  for (const model::Psf better : {model::Psf::kGaussian, model::Psf::kDisc}) {
+    FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
+    c.evidence.better_psf = better;
+    c.evidence.other_psf = c.evidence.setup.meters[0];
+    c.Solve();
+    const SystematicPart* part = c.Part("shape of the blur");
+    ASSERT_NE(part, nullptr);
+    EXPECT_THAT(part->remedy, better == model::Psf::kGaussian ? HasSubstr("nothing")
+                                                              : HasSubstr("state psf: disc"));
+  }
+}
+
+}  // namespace
+}  // namespace thicklens::calib
