@@ -38,7 +38,7 @@ const std::set<std::string>& Known() {
       "tools/src/picture_kind.cc",          // libtiff, from memory
       "tools/src/standard_descriptors.cc",  // the null device
       "kernels/opencl/guarded_child.cc",    // the null device
-      "estimator/src/run_cost.cc",          // files of /proc
+      "estimator/base/run_cost.cc",         // files of /proc
       "tools/src/bench_machine.cc",         //
       "tools/src/block_checkpoint.cc",      //
       "tools/src/memory_available.cc",      //

@@ -14,12 +14,12 @@
 #include <memory>
 #include <vector>
 
+#include "estimator/projection/scene_projection.h"
+#include "estimator/scene/scene_data.h"
+#include "estimator/scene/scene_priors.h"
 #include "kernels/opencl/opencl_device.h"
 #include "kernels/opencl/opencl_program.h"
 #include "kernels/opencl/opencl_projection.h"
-#include "scene_data.h"
-#include "scene_priors.h"
-#include "scene_projection.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"

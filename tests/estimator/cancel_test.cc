@@ -11,10 +11,10 @@
 #include <optional>
 #include <random>
 
-#include "scene_projection.h"
+#include "estimator/projection/scene_projection.h"
 #include "thicklens/base/error.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/compare.h"
-#include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/inpaint.h"

@@ -9,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "stored_slope.h"
-#include "thicklens/estimator/estimate.h"
+#include "estimator/scene/stored_slope.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"

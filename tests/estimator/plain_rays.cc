@@ -1,4 +1,4 @@
-#include "estimator/plain_rays.h"
+#include "tests/estimator/plain_rays.h"
 
 #include <algorithm>
 #include <cmath>

@@ -14,11 +14,11 @@
 #include <utility>
 #include <vector>
 
-#include "scene_data.h"
-#include "scene_priors.h"
-#include "scene_projection.h"
-#include "scene_system.h"
-#include "thicklens/estimator/estimate.h"
+#include "estimator/projection/scene_projection.h"
+#include "estimator/scene/scene_data.h"
+#include "estimator/scene/scene_priors.h"
+#include "estimator/scene/scene_system.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"

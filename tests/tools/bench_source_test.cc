@@ -18,7 +18,7 @@
 #include "depth_io.h"
 #include "image_io.h"
 #include "support/temporary_folder.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/thick_lens.h"

@@ -1,7 +1,5 @@
 // thicklens estimate as a person meets it, by blocks, alone and in the protocol with a known light
 // field. The solver of the whole scene: estimate_scene_test.cc.
-#include "thicklens/estimator/estimate.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -27,6 +25,7 @@
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
 

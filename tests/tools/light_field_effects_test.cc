@@ -9,7 +9,7 @@
 #include <string>
 
 #include "option_values.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/model/thick_lens.h"

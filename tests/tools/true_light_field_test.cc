@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "depth_io.h"
+#include "estimator/projection/scene_projection.h"
 #include "light_field_io.h"
-#include "scene_projection.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/model/light_field.h"

@@ -28,8 +28,8 @@
 #include "stopwatch.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/compare.h"
-#include "thicklens/estimator/estimate.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens::tools {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "estimate_plan.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/light_field.h"
 

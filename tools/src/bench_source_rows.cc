@@ -6,7 +6,7 @@
 
 #include "bench_machine.h"
 #include "printable_text.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 #include "whole_time.h"
 
 namespace thicklens::tools {

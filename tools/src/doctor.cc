@@ -20,7 +20,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/blas.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/kernels/device.h"
 
 namespace thicklens::tools {

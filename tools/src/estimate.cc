@@ -1,6 +1,4 @@
 // thicklens estimate: one picture and its depth map become a light field.
-#include "thicklens/estimator/estimate.h"
-
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -37,6 +35,7 @@
 #include "stopwatch.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/inpaint.h"

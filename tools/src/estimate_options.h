@@ -11,8 +11,8 @@
 #include "effect_options.h"
 #include "light_field_options.h"
 #include "plan_wish.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/blur_check.h"
-#include "thicklens/estimator/estimate.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/scene_solver.h"
 

@@ -9,7 +9,7 @@
 #include "blur_proposal.h"
 #include "estimate_input.h"
 #include "estimate_options.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/estimate_checks.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/inpaint.h"

@@ -16,7 +16,7 @@
 #include "light_field_io.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::tools {

@@ -5,7 +5,7 @@
 
 #include "bench_parts.h"
 #include "bench_solvers.h"
-#include "thicklens/estimator/estimate.h"
+#include "thicklens/estimator/block_solver.h"
 
 namespace thicklens::tools {
 namespace {

@@ -1,0 +1,38 @@
+#ifndef THICKLENS_ESTIMATOR_BASE_ITERATION_PROGRESS_H_
+#define THICKLENS_ESTIMATOR_BASE_ITERATION_PROGRESS_H_
+
+#include <algorithm>
+#include <functional>
+#include <mutex>
+
+namespace thicklens::estimator {
+
+// Views and iterations, counted together, from any thread. Of iterations there may be fewer than
+// expected, or more.
+class IterationProgress {
+ public:
+  // `report` may be empty, may throw, and must outlive this.
+  IterationProgress(const std::function<void(int done, int total)>& report, int total)
+      : report_(report), total_(total) {}
+
+  void Tell() { Advance(0); }
+  void Count() { Advance(1); }
+  void CountUpTo(int limit) { Advance(done_ < limit ? 1 : 0); }  // while one thread counts
+  void SkipTo(int done) { Advance(std::max(0, done - done_)); }
+
+ private:
+  void Advance(int steps) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    done_ = std::min(total_, done_ + steps);
+    if (report_) report_(done_, total_);
+  }
+
+  const std::function<void(int, int)>& report_;
+  const int total_;
+  std::mutex mutex_;
+  int done_ = 0;
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_BASE_ITERATION_PROGRESS_H_

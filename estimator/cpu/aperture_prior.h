@@ -1,0 +1,36 @@
+#ifndef THICKLENS_ESTIMATOR_CPU_APERTURE_PRIOR_H_
+#define THICKLENS_ESTIMATOR_CPU_APERTURE_PRIOR_H_
+
+#include <cstddef>
+#include <vector>
+
+namespace thicklens::estimator {
+
+// A = gamma D^T D + mu over the U x V aperture samples of one scene point, D the differences of
+// neighbouring samples across and down, ends free. Its eigenvectors are those of the discrete
+// cosine transform (DCT-II), to
+//   gamma (4 sin^2(pi i/(2 U)) + 4 sin^2(pi j/(2 V))) + mu;
+// derived here: a difference with free ends is one of a sequence that is mirrored at its ends.
+template <typename Real>
+class AperturePrior {
+ public:
+  // gamma >= 0, mu > 0. Throws Error for more than 64 samples of an axis.
+  AperturePrior(int u_count, int v_count, double gamma, double mu);
+
+  // Points that are done together: counts and strides of planes are multiples of this.
+  static constexpr std::size_t kPacket = 16;
+
+  // x = A^-1 x for every point of planes (row by row of the aperture) that are `stride` numbers
+  // apart. The same bits for any number of threads.
+  void ApplyInverse(std::size_t points, std::size_t stride, int threads, Real* planes);
+
+ private:
+  int u_count_, v_count_;
+  std::vector<Real> across_, down_;        // transforms
+  std::vector<Real> inverse_eigenvalues_;  // V x U
+  std::vector<Real> work_;
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_CPU_APERTURE_PRIOR_H_

@@ -1,0 +1,57 @@
+#ifndef THICKLENS_ESTIMATOR_CPU_CELL_ROW_H_
+#define THICKLENS_ESTIMATOR_CPU_CELL_ROW_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "estimator/cpu/cell_disparity.h"
+
+namespace thicklens::estimator {
+
+// A row of pixels of the centre view where they stand in another view. One number a pixel.
+//
+// Places are told from the pixel, so that float holds them, and two cells that share an edge get
+// the same numbers for it: a sample on the wrong side of it for the one is on the right side for
+// the other.
+struct PixelRow {
+  explicit PixelRow(std::size_t width_px);
+
+  Corners corners() const { return {offset_x.data(), offset_y.data(), disparity}; }
+  Bounds bounds() const { return {first_x.data(), last_x.data(), first_y.data(), last_y.data()}; }
+
+  const float* disparity = nullptr;                     // in the unit of the map
+  std::vector<float> offset_x, offset_y;                // px, from the pixel in the centre view
+  std::vector<float> first_x, last_x, first_y, last_y;  // see Bounds
+};
+
+// offset = -disparity * shift, cut to +-limit_px, which must be more than the view is wide and
+// high.
+void PlacePixels(const float* disparity, float shift_x, float shift_y, float limit_px,
+                 PixelRow* row);
+
+// How many samples of the view are in the rectangle around a cell.
+enum class CellSamples : std::int32_t {
+  kNone,
+  kOne,
+  kTwo,
+  kSeveral,
+  kOdd,  // any number but 0, and a part of the cell is turned over or seen edge-on
+};
+
+// The cells between two rows of pixels, one a pixel but for the last.
+struct CellRow {
+  explicit CellRow(std::size_t width_px);
+
+  std::vector<CellSamples> samples;
+  // The first and the last of the samples: its index less that of the cell's top left pixel, and
+  // the disparity of the cell there. Without meaning where there are none and in odd cells.
+  std::vector<std::int32_t> first, last;
+  std::vector<float> first_disparity, last_disparity;
+};
+
+void SampleCells(const PixelRow& upper, const PixelRow& lower, const ViewRow& view, CellRow* cells);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_CPU_CELL_ROW_H_

@@ -1,0 +1,34 @@
+#ifndef THICKLENS_ESTIMATOR_CPU_GRID_LOOPS_H_
+#define THICKLENS_ESTIMATOR_CPU_GRID_LOOPS_H_
+
+#include <cstddef>
+
+namespace thicklens::estimator {
+
+// The innermost loop of D on the grid.
+
+// Neighbouring rays of a view, each linked to the rays of the next view at both sides of the place
+// that shows its point: (D L)_i = (1 - w_i) near[i] + w_i far[i] - here[i],
+// w_i = slope * disparity[i] - whole.
+template <typename Real>
+struct LinkRun {
+  std::size_t count = 0;  // <= kLongestRun
+  const float* disparity = nullptr;
+  Real slope = 0, whole = 0;
+  const Real* here = nullptr;
+  const Real* near = nullptr;
+  const Real* far = nullptr;  // null: w is 0
+  // Of D^T D L, at the same rays. What is near and far may overlap, and nothing else.
+  Real* sum_here = nullptr;
+  Real* sum_near = nullptr;
+  Real* sum_far = nullptr;
+};
+constexpr std::size_t kLongestRun = 256;
+
+// Adds gamma * D^T D L of the links of a run to the sums.
+template <typename Real>
+void AddLinks(Real gamma, const LinkRun<Real>& run);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_CPU_GRID_LOOPS_H_

@@ -1,0 +1,29 @@
+#ifndef THICKLENS_ESTIMATOR_CPU_LANES_H_
+#define THICKLENS_ESTIMATOR_CPU_LANES_H_
+
+#include <cstddef>
+
+namespace thicklens::estimator {
+
+// Numbers that hot loops take together. What is computed with them becomes the vector instructions
+// of the function that it is inlined into.
+constexpr std::size_t kLanes = 8;
+template <typename Real>
+struct LanesOf {
+  typedef Real Type __attribute__((vector_size(kLanes * sizeof(Real))));
+};
+template <typename Real>
+using Lanes = typename LanesOf<Real>::Type;
+
+template <typename Real>
+inline __attribute__((always_inline)) void Load(const Real* from, Lanes<Real>* to) {
+  __builtin_memcpy(to, from, sizeof(Lanes<Real>));
+}
+template <typename Real>
+inline __attribute__((always_inline)) void Store(const Lanes<Real>& from, Real* to) {
+  __builtin_memcpy(to, &from, sizeof(Lanes<Real>));
+}
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_CPU_LANES_H_

@@ -1,0 +1,211 @@
+#include "thicklens/estimator/fill_holes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "estimator/depth/hole_region.h"
+#include "estimator/depth/hole_territories.h"
+#include "thicklens/base/error.h"
+#include "thicklens/estimator/estimate_checks.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Neighbours whose disparities differ by more belong to two surfaces: so many times the noise of
+// the map, within these, px per view step.
+constexpr double kJumpOfNoise = 6;
+constexpr double kLeastJumpPx = 0.2;
+constexpr double kMostJumpPx = 1;
+// Sweeps of successive over-relaxation that a hole needs, for each px of distance to what is known;
+// and what all holes of a map together may have: what is larger is bent near its rims alone.
+constexpr double kSweepsPerPx = 6;
+constexpr double kSweepsOfAll = 16;
+constexpr double kMostUpdates = 1e6;  // besides
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// Within one hole: each pixel's disparity u is the mean over its neighbours of u + (p - q) slope,
+// the slope being the mean of their planes'; there is no neighbour where the surfaces differ. An
+// exact plane solves this, whatever its borders are, and what the planes do not explain is spread
+// between the rims as a membrane.
+class SurfaceRelaxation {
+ public:
+  SurfaceRelaxation(const HoleFinder& finder, const HoleRegion& region, double jump,
+                    double most_sweeps)
+      : finder_(finder), region_(region), jump_(jump), most_sweeps_(most_sweeps) {}
+
+  // `rim_of` and `disparity`: of the region's pixels; the latter is where to start.
+  void Solve(const std::vector<int>& rim_of, std::vector<double>* disparity) {
+    Link(rim_of, *disparity);
+    const double sweeps = std::min(kSweepsPerPx * region_.widest_px, most_sweeps_);
+    // The best for a strip as wide as what so many sweeps can reach.
+    const double reach_px = sweeps / kSweepsPerPx;
+    const double omega = 2 / (1 + std::sin(3.14159265358979 / (2 * reach_px + 1)));
+    for (int sweep = 0; sweep < static_cast<int>(sweeps); ++sweep) {
+      for (std::size_t i = 0; i < links_.size(); ++i) Relax(links_[i], omega, i, disparity);
+    }
+  }
+
+ private:
+  struct Links {
+    std::array<int, 4> others{-1, -1, -1, -1};  // places of pixels without a depth
+    double known = 0;                           // of the rim, and all (p - q) slope
+    double share = 0;                           // one over their number
+  };
+
+  static void Relax(const Links& links, double omega, std::size_t i, std::vector<double>* values) {
+    if (links.share == 0) return;
+    double sum = links.known;
+    for (const int other : links.others) {
+      if (other >= 0) sum += (*values)[Index(other)];
+    }
+    (*values)[i] += omega * (sum * links.share - (*values)[i]);
+  }
+
+  void Link(const std::vector<int>& rim_of, const std::vector<double>& start) {
+    links_.assign(region_.pixels.size(), {});
+    for (std::size_t i = 0; i < links_.size(); ++i) {
+      Links& links = links_[i];
+      const RimPixel& own = region_.rim[Index(rim_of[i])];
+      std::size_t n = 0;
+      int count = 0;
+      finder_.ForNeighbours<4>(region_.pixels[i], [&](int beside, int dx, int dy) {
+        const std::size_t place = Index(finder_.PlaceOf(beside));
+        const bool is_hole = finder_.IsHole(beside);
+        const RimPixel& other = region_.rim[is_hole ? Index(rim_of[place]) : place];
+        const double there = is_hole ? start[place] : finder_.Disparity(beside);
+        const bool same = own.group == other.group && HasPlane(region_, own, jump_);
+        if (!same && !(std::abs(start[i] - there) <= jump_)) return;
+        const Eigen::Vector2d slope = (SlopeOf(own) + SlopeOf(other)) / 2;
+        links.known -= slope.dot(Eigen::Vector2d(dx, dy));
+        ++count;
+        if (is_hole) {
+          links.others[n++] = static_cast<int>(place);
+        } else {
+          links.known += there;
+        }
+      });
+      if (count > 0) links.share = 1.0 / count;
+    }
+  }
+
+  Eigen::Vector2d SlopeOf(const RimPixel& rim) const {
+    if (!HasPlane(region_, rim, jump_)) return {0, 0};
+    return region_.planes[Index(rim.group)].slope;
+  }
+
+  const HoleFinder& finder_;
+  const HoleRegion& region_;
+  const double jump_, most_sweeps_;
+  std::vector<Links> links_;
+};
+
+model::LinearPicture RootsOf(const model::LinearPicture& picture) {
+  model::LinearPicture roots = picture;
+  for (float& value : roots.values) value = value > 0 ? std::sqrt(value) : 0.0F;
+  return roots;
+}
+
+// Planes that lead far beyond all that is known are not believed, and none leads beyond infinity.
+struct Range {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+};
+Range BelievableRange(const DisparityMap& map, double at_infinity) {
+  Range range;
+  for (const float value : map.disparity) {
+    if (std::isnan(value)) continue;
+    range.low = std::min(range.low, static_cast<double>(value));
+    range.high = std::max(range.high, static_cast<double>(value));
+  }
+  const double beyond = range.high - range.low;
+  return {std::max(range.low - beyond, std::min(at_infinity, range.low)), range.high + beyond};
+}
+
+void CheckSizes(const DisparityMap& map, const model::LinearPicture& picture) {
+  const std::size_t pixels = Index(map.width_px) * Index(map.height_px);
+  if (map.width_px < 1 || map.height_px < 1 || map.disparity.size() != pixels) {
+    throw Error(
+        fmt::format("disparity map: {} values for {}x{} px: the count must be the product, "
+                    "and not 0",
+                    map.disparity.size(), map.width_px, map.height_px));
+  }
+  if (picture.width_px != map.width_px || picture.height_px != map.height_px ||
+      picture.channels < 1 || picture.values.size() != pixels * Index(picture.channels)) {
+    throw Error(fmt::format(
+        "disparity map: it is {}x{} px, the picture {}x{} px in {} channel(s) with {} values: the "
+        "sizes must be equal",
+        map.width_px, map.height_px, picture.width_px, picture.height_px, picture.channels,
+        picture.values.size()));
+  }
+  const auto bad = std::find_if_not(picture.values.begin(), picture.values.end(),
+                                    [](float value) { return std::isfinite(value); });
+  if (bad != picture.values.end()) {
+    const auto pixel = (bad - picture.values.begin()) / picture.channels;
+    throw Error(fmt::format("picture: a value of pixel ({}, {}) is {}: it must be finite",
+                            pixel % picture.width_px, pixel / picture.width_px, *bad));
+  }
+}
+
+double JumpOf(const DisparityMap& map) {
+  const double px_per_unit = map.step.cwiseAbs().maxCoeff();
+  const double noise_px = DepthNoisePx(map).value_or(0);
+  return std::clamp(kJumpOfNoise * noise_px, kLeastJumpPx, kMostJumpPx) / px_per_unit;
+}
+
+void Fill(const DisparityMap& map, const model::LinearPicture& picture, std::size_t holes,
+          double at_infinity, DisparityMap* full) {
+  const double jump = JumpOf(map);
+  const Range range = BelievableRange(map, at_infinity);
+  const model::LinearPicture roots = RootsOf(picture);
+  const double most_sweeps = kSweepsOfAll + kMostUpdates / static_cast<double>(holes);
+  HoleFinder finder(map, jump);
+  HoleTerritories territories(finder, roots, jump);
+  HoleRegion region;
+  std::vector<int> rim_of;
+  std::vector<double> disparity;
+  while (finder.Next(&region)) {
+    if (region.planes.size() == 1 && HasPlane(region, region.rim.front(), jump)) {
+      rim_of.assign(region.pixels.size(), 0);
+      disparity.clear();
+      for (const int pixel : region.pixels) {
+        disparity.push_back(SurfaceAt(finder, region, region.rim.front(), pixel, jump));
+      }
+    } else {
+      territories.Find(region, &rim_of, &disparity);
+    }
+    for (double& value : disparity) value = std::clamp(value, range.low, range.high);
+    SurfaceRelaxation(finder, region, jump, most_sweeps).Solve(rim_of, &disparity);
+    for (std::size_t i = 0; i < region.pixels.size(); ++i) {
+      full->disparity[Index(region.pixels[i])] =
+          static_cast<float>(std::clamp(disparity[i], range.low, range.high));
+    }
+  }
+}
+
+}  // namespace
+
+DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
+                       std::size_t* filled, double at_infinity) {
+  CheckSizes(map, picture);
+  DisparityMap full = map;
+  const auto holes = static_cast<std::size_t>(std::count_if(
+      map.disparity.begin(), map.disparity.end(), [](float value) { return std::isnan(value); }));
+  if (filled != nullptr) *filled = holes;
+  if (holes == map.disparity.size()) {
+    throw Error(
+        fmt::format("disparity map: all of its {} values are holes: there is nothing to "
+                    "fill them from",
+                    holes));
+  }
+  if (holes > 0) Fill(map, picture, holes, at_infinity, &full);
+  return full;
+}
+
+}  // namespace thicklens::estimator

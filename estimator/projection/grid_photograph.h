@@ -1,0 +1,72 @@
+#ifndef THICKLENS_ESTIMATOR_PROJECTION_GRID_PHOTOGRAPH_H_
+#define THICKLENS_ESTIMATOR_PROJECTION_GRID_PHOTOGRAPH_H_
+
+#include <cstddef>
+#include <vector>
+
+#include "estimator/cpu/photograph_loops.h"
+#include "thicklens/kernels/kernels.h"
+
+namespace thicklens::estimator {
+
+// The samples of a view that land nearest to a pixel of the picture, as pixels: sample
+// (x - s_shift, y - t_shift).
+struct LandingRect {
+  int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
+};
+LandingRect LandingIn(const kernels::BlockGeometry& picture, int k, int l);
+
+// H on the grid, for a whole picture: from the rays of a light field of one channel, views
+// (l * u_count + k) * t_count * s_count + t * s_count + s, to the photograph,
+//   (H L)(x) = sum over rays of E w g L / sum over rays of w g,
+// w the weight of the view, g the share of the pixel in the ray (bilinear), E the irradiance; the
+// numbers of kernels::Kernels::WeighRays. Rays that land outside of the picture take no part.
+template <typename Real>
+class GridPhotograph {
+ public:
+  // `irradiance`: of each view's samples; empty: 1. The block is the whole picture.
+  GridPhotograph(const kernels::BlockGeometry& picture, std::vector<std::vector<float>> irradiance,
+                 int threads);
+  GridPhotograph(const GridPhotograph&) = delete;
+  GridPhotograph& operator=(const GridPhotograph&) = delete;
+
+  std::size_t pixels() const { return static_cast<std::size_t>(picture_.pixels()); }
+
+  // photograph = H L.
+  void Apply(const Real* rays, Real* photograph) const;
+  // L += H^T photograph.
+  void AddTransposed(const Real* photograph, Real* rays) const;
+
+  double bytes() const;
+
+ private:
+  std::size_t view_size() const {
+    return static_cast<std::size_t>(picture_.s_count) * static_cast<std::size_t>(picture_.t_count);
+  }
+  std::size_t bytes_of_rays() const {
+    return static_cast<std::size_t>(picture_.views()) * view_size() * sizeof(Real);
+  }
+  // Of the photograph with a frame of one pixel.
+  std::size_t framed_width() const { return static_cast<std::size_t>(picture_.width_px) + 2; }
+  void SetTaps();
+  // Adds to rows `first` to `last` - 1 of the photograph what the views of row l send there.
+  void AddViews(int l, int first, int last, const Real* rays, Real* photograph) const;
+  // Adds to the rays of a view, of the samples t from `first` to `last` - 1, what `framed` sends.
+  void AddToView(int view, int first, int last, const Real* framed, Real* rays) const;
+  // Multiplies by 1/(sum of w g), 0 where that is 0.
+  void Normalise(int y, const Real* from, Real* to) const;
+
+  kernels::BlockGeometry picture_;
+  std::vector<std::vector<float>> irradiance_;
+  int threads_;
+  // Which views have rays for a pixel, and 1/(sum of w g), borders of views alone change: of each
+  // run of columns, for every row of views, and for every run of rows.
+  std::vector<int> column_ends_;
+  std::vector<std::vector<std::vector<PixelTap<Real>>>> taps_;
+  std::vector<std::vector<Real>> inverse_sums_;
+  std::vector<std::size_t> run_of_row_;
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_PROJECTION_GRID_PHOTOGRAPH_H_

@@ -1,0 +1,102 @@
+#ifndef THICKLENS_ESTIMATOR_PROJECTION_SCENE_RAYS_H_
+#define THICKLENS_ESTIMATOR_PROJECTION_SCENE_RAYS_H_
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "estimator/cpu/ray_loops.h"
+#include "thicklens/estimator/view_geometry.h"
+
+namespace thicklens::estimator {
+
+// The rays of one view: where in the centre view each of its samples has its source.
+template <typename Real>
+class ViewRays {
+ public:
+  ViewRays() = default;
+  // `lowest` and `highest`: of the disparities of the four pixels from each one to the right and
+  // down.
+  ViewRays(const DisparityMap& map, const std::vector<float>& lowest,
+           const std::vector<float>& highest, const ViewDisparity& view, double a, double b);
+
+  // Numbers that a row of values needs after its last, and a picture too.
+  static constexpr std::size_t kMargin = 2 * kLanes;
+
+  // warped(x) = sum_taps t(x, p) picture(p) of one row, by the taps of SurfaceTaps.
+  void Warp(int row, const Real* picture, Real* warped) const;
+  // The transpose, added to the picture. Leaves other values behind.
+  void Spread(int row, Real* values, Real* picture) const;
+
+  double bytes() const;
+
+ private:
+  // A ray with a source at a border, past an edge, or in a cell of more than one surface.
+  struct OddRay {
+    std::int32_t x = 0;
+    std::array<std::int32_t, 4> pixel{};
+    std::array<Real, 4> weight{};
+  };
+  // A ray of which `rest` is left: it reads another place too.
+  struct MixedRay {
+    OddRay other;
+    Real rest = 0;
+  };
+  OddRay OddRayOf(const DisparityMap& map, double tolerance, std::size_t sample,
+                  const kernels::HiddenSample& source) const;
+  void AddMixed(const DisparityMap& map, double tolerance, const ViewDisparity& view);
+  RayRow<Real> RowOf(int row) const;
+
+  int width_px_ = 0;
+  Real shift_x_ = 0, shift_y_ = 0;
+  std::vector<Real> disparity_;
+  std::vector<RayRun> runs_;
+  std::vector<OddRay> odd_;
+  std::vector<MixedRay> mixed_;
+  std::vector<std::size_t> run_start_, odd_start_, mixed_start_;  // of each row, and the end
+};
+
+// H in scene-ray form: R(p, k) is the radiance of the scene point that the pixel p of the centre
+// view shows, toward the aperture sample k;
+//   (H R)(x) = sum_k w_k sum_taps t_k(x, p) R(p, k),
+// with the rays of SceneProjection and its taps for Between::kLinear: where all R(p, k) of a point
+// are equal, this is its photograph. Derived here.
+// A plane R(., k) stands at k * stride, k row by row of the aperture.
+template <typename Real>
+class SceneRays {
+ public:
+  // `disparity`: px per view step, 0 in the plane of focus, without holes. Weights V x U, sum 1.
+  // `progress` is called for each view, from any thread, and may throw to stop.
+  SceneRays(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
+            const std::function<void()>& progress);
+
+  std::size_t pixels() const {
+    return static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_);
+  }
+  // From plane to plane: the pixels, and what the loops need after them.
+  std::size_t plane_stride() const;
+  std::size_t view_count() const { return views_.size(); }
+
+  // photograph = H R. Stride 0: all planes are that one.
+  void Apply(const Real* planes, std::size_t stride, Real* photograph);
+  // R = H^T photograph; planes at plane_stride(), of which the margins become 0.
+  void ApplyTransposed(const Real* photograph, Real* planes);
+  // What view k shows of its plane (which has a margin), without the weight.
+  void Show(std::size_t k, const Real* plane, float* shown) const;
+
+  double bytes() const;
+
+ private:
+  int width_px_ = 0, height_px_ = 0;
+  int threads_ = 1;
+  std::vector<ViewRays<Real>> views_;
+  std::vector<Real> weights_;
+  std::vector<Real> rows_;  // one with a margin for each piece of work
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_PROJECTION_SCENE_RAYS_H_

@@ -1,0 +1,21 @@
+#ifndef THICKLENS_ESTIMATOR_PROJECTION_SEEN_SHARE_H_
+#define THICKLENS_ESTIMATOR_PROJECTION_SEEN_SHARE_H_
+
+#include <vector>
+
+#include "estimator/projection/view_fan.h"
+#include "thicklens/estimator/view_geometry.h"
+
+namespace thicklens::estimator {
+
+// The share of the aperture, by its weights, that sees each point p of the centre view through the
+// photograph. The ray of the view (a, b) meets it at p - D (a, b); it is the point's if the
+// disparity rendered into that view is the point's at one of the pixels around (a surface's edge
+// may run between them). Rays that miss the photograph by more than half a pixel see nothing.
+// `disparity` is the fan's. Points that are known to be seen by all are not looked at.
+std::vector<float> SeenShare(const ViewFan& fan, const DisparityMap& disparity,
+                             const std::vector<unsigned char>& known, int threads);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_PROJECTION_SEEN_SHARE_H_

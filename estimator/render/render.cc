@@ -1,0 +1,214 @@
+#include "thicklens/estimator/render.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimator/render/shown_views.h"
+#include "estimator/views/catmull_rom.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Positions that differ by less, relatively or in px, are the same but for rounding.
+constexpr double kRounding = 1e-9;
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+void CheckIndex(const char* name, int value, int count) {
+  if (value >= 0 && value < count) return;
+  throw Error(fmt::format("{} is {}: it must be from 0 to {}", name, value, count - 1));
+}
+
+// The samples x of [0, count) for which x - shift_px lies inside the view, and how to read there.
+struct ShiftedAxis {
+  int first = 0, last = -1;
+  int whole = 0;                    // sample at 0 of the four taps: x + whole
+  std::array<float, 4> tap_weight;  // of the taps at -1, 0, 1, 2
+
+  ShiftedAxis(double shift_px, int count) : tap_weight{} {
+    const double source_px = -shift_px;  // of x = 0
+    const double nearest_px = std::round(source_px);
+    const double snapped_px = std::abs(source_px - nearest_px) < kRounding ? nearest_px : source_px;
+    if (!(std::abs(snapped_px) < count)) return;  // all of it is outside
+    whole = static_cast<int>(std::floor(snapped_px));
+    const std::array<double, 4> weights = CatmullRomWeights(snapped_px - whole);
+    for (std::size_t n = 0; n < weights.size(); ++n) tap_weight[n] = static_cast<float>(weights[n]);
+    first = static_cast<int>(std::max(0.0, std::ceil(-snapped_px)));
+    last = static_cast<int>(std::min(count - 1.0, std::floor(count - 1 - snapped_px)));
+  }
+
+  bool Holds(int x) const { return x >= first && x <= last; }
+};
+
+// One view of a refocused picture.
+struct ShiftedView {
+  int k = 0, l = 0;
+  double weight = 0;
+  ShiftedAxis x, y;
+};
+
+// Adds a row of the shifted view to the weighted sums of its samples.
+void AddRow(const float* view, int s_count, int t_count, const ShiftedView& shifted, int y,
+            std::vector<float>* blended, std::vector<double>* sums) {
+  std::fill(blended->begin(), blended->end(), 0.0F);
+  for (int tap = 0; tap < 4; ++tap) {
+    const int t = std::clamp(y + shifted.y.whole + tap - 1, 0, t_count - 1);
+    const float weight = shifted.y.tap_weight[Index(tap)];
+    const float* row = view + Index(t) * Index(s_count);
+    for (int s = 0; s < s_count; ++s) (*blended)[Index(s)] += weight * row[s];
+  }
+  for (int x = shifted.x.first; x <= shifted.x.last; ++x) {
+    double value = 0;
+    for (int tap = 0; tap < 4; ++tap) {
+      const int s = std::clamp(x + shifted.x.whole + tap - 1, 0, s_count - 1);
+      value += static_cast<double>(shifted.x.tap_weight[Index(tap)]) * (*blended)[Index(s)];
+    }
+    (*sums)[Index(x)] += shifted.weight * value;
+  }
+}
+
+// Row y of the mean of the shifted views, all channels.
+void RefocusRow(const model::LightField& light_field, const std::vector<ShiftedView>& views, int y,
+                model::LinearPicture* picture) {
+  const int width = light_field.s_count;
+  std::vector<double> weights(Index(width), 0.0);
+  for (const ShiftedView& view : views) {
+    if (!view.y.Holds(y)) continue;
+    for (int x = view.x.first; x <= view.x.last; ++x) weights[Index(x)] += view.weight;
+  }
+  std::vector<float> blended(Index(width));
+  for (int channel = 0; channel < light_field.channels; ++channel) {
+    std::vector<double> sums(Index(width), 0.0);
+    for (const ShiftedView& view : views) {
+      if (!view.y.Holds(y)) continue;
+      AddRow(light_field.values.data() + light_field.ViewStart(channel, view.k, view.l), width,
+             light_field.t_count, view, y, &blended, &sums);
+    }
+    for (int x = 0; x < width; ++x) {
+      if (weights[Index(x)] == 0) continue;  // no view reaches here: black
+      picture->values[(Index(y) * Index(width) + Index(x)) * Index(light_field.channels) +
+                      Index(channel)] = static_cast<float>(sums[Index(x)] / weights[Index(x)]);
+    }
+  }
+}
+
+// Copies channel values of one sample of a view to a pixel.
+void CopySample(const model::LightField& light_field, int k, int l, int s, int t, int x, int y,
+                model::LinearPicture* picture) {
+  for (int channel = 0; channel < light_field.channels; ++channel) {
+    picture->values[(Index(y) * Index(picture->width_px) + Index(x)) * Index(picture->channels) +
+                    Index(channel)] =
+        light_field.values[light_field.ViewStart(channel, k, l) +
+                           Index(t) * Index(light_field.s_count) + Index(s)];
+  }
+}
+
+void CheckRepeat(int repeat_px) {
+  if (repeat_px >= 1) return;
+  throw Error(fmt::format("repeat_px is {}: it must be >= 1", repeat_px));
+}
+
+}  // namespace
+
+model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,
+                             double disparity_v_px, const Eigen::ArrayXXd& weights, int threads) {
+  CheckLightField(light_field);
+  if (!std::isfinite(disparity_u_px) || !std::isfinite(disparity_v_px)) {
+    throw Error(fmt::format("disparity is ({}, {}) px per view step: both must be finite",
+                            disparity_u_px, disparity_v_px));
+  }
+  const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
+  std::vector<ShiftedView> views;
+  for (int l = 0; l < light_field.v_count; ++l) {
+    for (int k = 0; k < light_field.u_count; ++k) {
+      if (present(l, k) == 0) continue;
+      views.push_back({k, l, present(l, k),
+                       ShiftedAxis(light_field.u_offset(k) * disparity_u_px, light_field.s_count),
+                       ShiftedAxis(light_field.v_offset(l) * disparity_v_px, light_field.t_count)});
+    }
+  }
+  model::LinearPicture picture =
+      BlackPicture(light_field.s_count, light_field.t_count, light_field.channels);
+  ParallelFor(light_field.t_count, threads,
+              [&](int y) { RefocusRow(light_field, views, y, &picture); });
+  return picture;
+}
+
+// d = -m; SlopeOnGrid says m in u, and in v of a grid whose axes are exchanged.
+Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double depth_mm) {
+  if (!light_field.grid) {
+    throw Error(fmt::format(
+        "depth {} mm: this light field has no camera; its planes are named by their disparity",
+        depth_mm));
+  }
+  model::LightFieldGrid exchanged = *light_field.grid;
+  std::swap(exchanged.s_step_mm, exchanged.t_step_mm);
+  std::swap(exchanged.u_step_mm, exchanged.v_step_mm);
+  return {-model::SlopeOnGrid(*light_field.grid, depth_mm),
+          -model::SlopeOnGrid(exchanged, depth_mm)};
+}
+
+model::LinearPicture Mosaic(const model::LightField& light_field, int gap_px) {
+  CheckLightField(light_field);
+  if (gap_px < 0) throw Error(fmt::format("gap_px is {}: it must be >= 0", gap_px));
+  const int step_x = light_field.s_count + gap_px;
+  const int step_y = light_field.t_count + gap_px;
+  model::LinearPicture mosaic =
+      BlackPicture(light_field.u_count * step_x - gap_px, light_field.v_count * step_y - gap_px,
+                   light_field.channels);
+  for (int l = 0; l < light_field.v_count; ++l) {
+    for (int k = 0; k < light_field.u_count; ++k) {
+      for (int t = 0; t < light_field.t_count; ++t) {
+        for (int s = 0; s < light_field.s_count; ++s) {
+          CopySample(light_field, k, l, s, t, k * step_x + s, l * step_y + t, &mosaic);
+        }
+      }
+    }
+  }
+  return mosaic;
+}
+
+model::LinearPicture EpipolarRow(const model::LightField& light_field, int t, int l,
+                                 int repeat_px) {
+  CheckLightField(light_field);
+  CheckIndex("row t", t, light_field.t_count);
+  CheckIndex("view row l", l, light_field.v_count);
+  CheckRepeat(repeat_px);
+  model::LinearPicture picture =
+      BlackPicture(light_field.s_count, light_field.u_count * repeat_px, light_field.channels);
+  for (int y = 0; y < picture.height_px; ++y) {
+    ThrowIfCancelled();
+    for (int s = 0; s < light_field.s_count; ++s) {
+      CopySample(light_field, y / repeat_px, l, s, t, s, y, &picture);
+    }
+  }
+  return picture;
+}
+
+model::LinearPicture EpipolarColumn(const model::LightField& light_field, int s, int k,
+                                    int repeat_px) {
+  CheckLightField(light_field);
+  CheckIndex("column s", s, light_field.s_count);
+  CheckIndex("view column k", k, light_field.u_count);
+  CheckRepeat(repeat_px);
+  model::LinearPicture picture =
+      BlackPicture(light_field.v_count * repeat_px, light_field.t_count, light_field.channels);
+  for (int t = 0; t < light_field.t_count; ++t) {
+    for (int x = 0; x < picture.width_px; ++x) {
+      CopySample(light_field, k, x / repeat_px, s, t, x, t, &picture);
+    }
+  }
+  return picture;
+}
+
+}  // namespace thicklens::estimator

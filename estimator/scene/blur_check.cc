@@ -1,0 +1,216 @@
+#include "thicklens/estimator/blur_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "estimator/base/iteration_progress.h"
+#include "estimator/base/run_cost.h"
+#include "estimator/scene/blur_picture.h"
+#include "estimator/scene/blur_trials.h"
+#include "estimator/scene/scene_radiance.h"
+#include "estimator/views/input_checks.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/estimator/scene_solver.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Of the blocks; fewer are more likely a fault of the depth.
+constexpr double kLeastShare = 0.04;
+constexpr int kLeastBlocks = 4;
+// What a blur that is proposed may leave of what the given one does not explain; and beside one of
+// the two proposals, the other.
+constexpr double kMostLeft = 0.25;
+double MostLeftBeside(double left) { return std::max(kMostLeft, 2 * left); }
+// Left of it by a blur that does about as well as one that leaves so much.
+double AboutAsMuch(double left) { return 1.1 * left + 0.03; }
+constexpr double kAboutTheScore = 1.3;
+
+constexpr int kMostNarrower = 8;  // steps of 2^(-1/4): to a quarter
+// Steps of the offset move the standard deviation of the blur by so much, and so many are tried on
+// either side.
+constexpr double kOffsetSigmaPx = 0.3;
+constexpr int kMostOffsets = 4;
+constexpr int kMostTrials = 1 + kMostNarrower + 2 * kMostOffsets;
+
+// Standard deviation of the places of the views, in view steps, of the wider axis.
+double SpreadOf(const Eigen::ArrayXXd& weights) {
+  const auto of_axis = [](const Eigen::ArrayXd& axis) {
+    const Eigen::ArrayXd places =
+        Eigen::ArrayXd::LinSpaced(axis.size(), -static_cast<double>(axis.size() - 1) / 2,
+                                  static_cast<double>(axis.size() - 1) / 2);
+    return std::sqrt((axis * places.square()).sum());
+  };
+  return std::max(of_axis(weights.colwise().sum().transpose()), of_axis(weights.rowwise().sum()));
+}
+
+// Ever farther from the given blur, until it gets no better; where something better must be there,
+// not before that was found.
+template <typename Next>
+void TryOn(int most, bool must_be_there, const Next& next, BlurTrials* trials, BlurCheck* check,
+           IterationProgress* progress) {
+  constexpr int kPatience = 2;
+  double best = 1, best_score = 1;
+  int worse = 0;
+  for (int i = 1; i <= most && worse < kPatience; ++i) {
+    const auto [scale, offset_px] = next(i);
+    check->trials.push_back(trials->Try(scale, offset_px));
+    progress->Count();
+    const double left = check->trials.back().unexplained;
+    const double score = check->trials.back().score;
+    // Where all is explained, the score alone tells one from the other.
+    const bool better = left < best || (left == best && score < best_score);
+    const bool waits = must_be_there && !(std::min(best, left) < kMostLeft);
+    worse = better || waits ? 0 : worse + 1;
+    best = std::min(best, left);
+    best_score = std::min(best_score, score);
+  }
+}
+
+// Of the trials from `first` on the first that does about as well as the best of them, in what it
+// explains and then in its score.
+std::optional<BlurTrial> BestOf(const std::vector<BlurTrial>& trials, std::size_t first) {
+  double left = 1, score = 0;
+  for (std::size_t i = first; i < trials.size(); ++i) left = std::min(left, trials[i].unexplained);
+  if (!(left < 1)) return std::nullopt;
+  const auto explains = [left](const BlurTrial& trial) {
+    return trial.unexplained <= AboutAsMuch(left) && std::isfinite(trial.score);
+  };
+  for (std::size_t i = first; i < trials.size(); ++i) {
+    if (explains(trials[i]) && (score == 0 || trials[i].score < score)) score = trials[i].score;
+  }
+  const auto widest =
+      std::find_if(trials.begin() + static_cast<std::ptrdiff_t>(first), trials.end(),
+                   [&](const BlurTrial& trial) {
+                     return explains(trial) && trial.score <= kAboutTheScore * score;
+                   });
+  return widest == trials.end() ? std::nullopt : std::optional(*widest);
+}
+
+// Of the best of either kind, what explains enough.
+void KeepProposals(BlurCheck* check) {
+  const auto left = [](const std::optional<BlurTrial>& best) {
+    return best ? best->unexplained : 1;
+  };
+  const double least = std::min(left(check->narrower_blur), left(check->other_focus));
+  for (std::optional<BlurTrial>* best : {&check->narrower_blur, &check->other_focus}) {
+    if (!(least < kMostLeft) || !(left(*best) < MostLeftBeside(least))) best->reset();
+  }
+}
+
+// `spread`: of the views, in view steps.
+void Search(double spread, BlurTrials* trials, BlurCheck* check, IterationProgress* progress) {
+  TryOn(
+      kMostNarrower, true, [](int i) { return std::pair(std::exp2(-0.25 * i), 0.0); }, trials,
+      check, progress);
+  check->narrower_blur = BestOf(check->trials, 1);
+  check->narrower_blur_at_end =
+      check->narrower_blur && check->narrower_blur->blur_scale <= std::exp2(-0.25 * kMostNarrower);
+  for (const double step_px : {-kOffsetSigmaPx / spread, kOffsetSigmaPx / spread}) {
+    const std::size_t first = check->trials.size();
+    TryOn(
+        kMostOffsets, false, [step_px](int i) { return std::pair(1.0, i * step_px); }, trials,
+        check, progress);
+    const std::optional<BlurTrial> focus = BestOf(check->trials, first);
+    if (focus && (!check->other_focus || focus->unexplained < check->other_focus->unexplained)) {
+      check->other_focus = focus;
+      check->other_focus_at_end =
+          std::abs(focus->focus_offset_px) >= (kMostOffsets - 0.5) * std::abs(step_px);
+    }
+  }
+  KeepProposals(check);
+}
+
+// From px of the picture that was looked at to those of the photograph.
+void ToPhotographPx(BlurCheck* check) {
+  const double px = std::exp2(check->halvings);
+  for (BlurTrial& trial : check->trials) trial.focus_offset_px *= px;
+  if (check->other_focus) check->other_focus->focus_offset_px *= px;
+}
+
+std::string MessageOf(const BlurCheck& check) {
+  if (check.blocks == 0) {
+    return "no block tells anything of its blur: all are in focus, or look past edges of the depth";
+  }
+  const std::string blocks = fmt::format("{} of {} blocks are not explained by noise",
+                                         check.unexplained_blocks, check.blocks);
+  if (check.trials.size() <= 1) {
+    return fmt::format(
+        "{}: nothing speaks for a narrower blur; that it is too narrow would not show", blocks);
+  }
+  if (!check.narrower_blur && !check.other_focus) {
+    return fmt::format("{}, and no narrower blur and no other focus explains them", blocks);
+  }
+  return blocks;
+}
+
+}  // namespace
+
+bool BlurCheckOptions::IsValid(std::string* why) const {
+  const auto fail = [why](std::string reason) {
+    if (why != nullptr) *why = std::move(reason);
+    return false;
+  };
+  if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
+  if (memory_limit_mib && !(*memory_limit_mib > 0)) {
+    return fail(fmt::format("memory_limit_mib is {}: it must be > 0", *memory_limit_mib));
+  }
+  return true;
+}
+
+BlurCheck CheckBlur(const EstimateInput& input, const BlurCheckOptions& options) {
+  std::string why;
+  if (!options.IsValid(&why)) throw Error("blur check: " + why);
+  CheckInput(input);
+  const auto start = Clock::now();
+  const double spread = SpreadOf(input.weights);
+  BlurCheck check;
+  if (!(spread > 0)) {
+    check.message = "one view has no blur that could be checked";
+    return check;
+  }
+  const int threads = ResolveThreads(options.threads);
+  IterationProgress progress(options.progress, kMostTrials);
+  progress.Tell();
+  BlurPicture looked = BlurPictureOf(input, options.falloff, threads);
+  check.halvings = looked.halvings;
+  const std::optional<double> noise = StoredNoiseSigma(looked.picture, input.transfer);
+  check.noise_sigma = std::max(noise.value_or(kUsualNoise), kLeastNoise);
+  if (!noise) {
+    check.message = "no part of the photograph tells its noise: the blur cannot be checked";
+    check.seconds = SecondsSince(start);
+    return check;
+  }
+  ProjectionOptions projection;
+  projection.threads = threads;
+  projection.progress = [&progress] { progress.Tell(); };
+  projection.freed = [&options] { ReturnFreedMemory(options.memory_limit_mib); };
+  auto given = std::make_optional(
+      ProjectionWithin(input.weights, options.memory_limit_mib, projection, &looked));
+  check.width_px = looked.picture.width_px;
+  check.height_px = looked.picture.height_px;
+  BlurTrials trials({std::move(looked.picture), std::move(looked.disparity), input.weights,
+                     input.transfer, check.noise_sigma},
+                    *given, projection);
+  given.reset();
+  progress.Count();
+  check.blocks = trials.blocks();
+  check.unexplained_blocks = trials.unexplained_blocks();
+  check.trials.push_back(trials.given());
+  if (check.unexplained_blocks >= std::max<double>(kLeastBlocks, kLeastShare * check.blocks)) {
+    Search(spread, &trials, &check, &progress);
+  }
+  ToPhotographPx(&check);
+  progress.SkipTo(kMostTrials);
+  check.iterations = trials.iterations();
+  check.message = MessageOf(check);
+  check.seconds = SecondsSince(start);
+  return check;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,80 @@
+#ifndef THICKLENS_ESTIMATOR_SCENE_SCENE_BAND_RUN_H_
+#define THICKLENS_ESTIMATOR_SCENE_SCENE_BAND_RUN_H_
+
+#include <optional>
+#include <vector>
+
+#include "estimator/base/iteration_progress.h"
+#include "estimator/scene/scene_bands.h"
+#include "estimator/scene/scene_memory.h"
+#include "estimator/scene/scene_radiance.h"
+#include "thicklens/estimator/scene_solver.h"
+
+namespace thicklens::estimator {
+
+struct SolvedScene {
+  model::LinearPicture radiance;
+  std::vector<Confidence> of_points;  // of the centre view, if it is wanted
+  ViewFan fan;                        // views that were rendered already; perhaps none
+};
+
+// The radiance of a photograph, solved for in as few bands as the memory allows, one after the
+// other.
+template <typename Real>
+class SceneBandRun {
+ public:
+  // All is kept by reference. `iterations` of the progress are for the bands.
+  SceneBandRun(const EstimateInput& input, const SceneOptions& options, kernels::Backend* backend,
+               const SceneMemory& memory, int reach_px, int iterations, IterationProgress* progress,
+               SceneSummary* summary);
+
+  // Of the input's photograph without its fall-off. Sets of the summary what the solution tells,
+  // and adds the times. Throws Error if the memory limit is too low for the lowest bands.
+  SolvedScene Solve(const model::LinearPicture& photograph, bool wants_confidence, SceneMaps* maps);
+
+ private:
+  using Radiance = SceneRadiance<Real>;
+  struct Sample {
+    SignalSum signal;
+    ProjectionBytes per_pixel;
+  };
+
+  int BandsFor(const ProjectionBytes& per_pixel) const;
+  double MostBytes(int count, const ProjectionBytes& per_pixel) const;
+  const Sample& TakenSample(const model::LinearPicture& photograph);
+  double StrengthFor(const model::LinearPicture& photograph, const std::vector<SceneBand>& bands);
+  typename Radiance::Run RunFor(const SceneOptions& options) const;
+  enum class Start { kNone, kFound };
+  // Returns the seconds of the iterations at half the size, where they are asked for. One radiance
+  // at a time: it reads the band's disparity from here.
+  double Prepare(const model::LinearPicture& photograph, const SceneBand& band, Start start,
+                 Radiance* radiance);
+  // Absent if one of them takes more memory than it may.
+  std::optional<SolvedScene> SolveIn(int count, const model::LinearPicture& photograph,
+                                     bool wants_confidence, SceneMaps* maps);
+  bool Fits(const SceneBand& band, const Radiance& radiance);
+  bool IsWithinLimit(double bytes) const;
+  // Of what is needed, `bytes`, and more that it leaves with the process if it may.
+  double PredictedMib(double bytes, int rows, const ProjectionBytes& projection,
+                      double kept_fan_bytes) const;
+  // Whether the views of the photograph's rays are those of the light field.
+  bool MayKeepFan(int bands) const;
+
+  const EstimateInput& input_;
+  const SceneOptions& options_;
+  kernels::Backend* backend_;
+  const SceneMemory& memory_;
+  const int reach_px_, iterations_;
+  IterationProgress* progress_;
+  SceneSummary* summary_;
+  DisparityMap band_disparity_;  // unless it is the input's
+  double relief_slope_ = 0;      // of patches
+  double mean_slope_ = 0;
+  ProjectionBytes per_pixel_;  // the most that is known
+  std::optional<Sample> sample_;
+  int search_iterations_ = 0;
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SCENE_SCENE_BAND_RUN_H_

@@ -1,0 +1,53 @@
+#ifndef THICKLENS_ESTIMATOR_SCENE_SCENE_DATA_H_
+#define THICKLENS_ESTIMATOR_SCENE_SCENE_DATA_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "estimator/projection/scene_projection.h"
+#include "estimator/scene/scene_system.h"
+#include "thicklens/model/scene.h"
+#include "thicklens/model/transfer_curve.h"
+
+namespace thicklens::estimator {
+
+// H and I of a photograph; weights and squared rows are still to be set. `projection` is kept by
+// reference.
+template <typename Real>
+DataTerm<Real> DataTermOf(const SceneProjection<Real>& projection,
+                          const model::LinearPicture& photograph, int threads);
+
+// Channel after channel, from interleaved pixels, and back.
+template <typename Real>
+std::vector<Real> Planar(const model::LinearPicture& picture);
+template <typename Real>
+model::LinearPicture Interleaved(const std::vector<Real>& planes, int width_px, int height_px,
+                                 int channels);
+
+// sum_j H_ij^2 of each pixel i, within a tenth: that of the fan of its own disparity on one
+// surface, linear between pixels, with the products of the sums of the weights over rows and over
+// columns for weights.
+template <typename Real>
+std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
+
+// W of each pixel: s^2/(1 + (20 h)^2), h the share of the aperture that sees past an edge.
+template <typename Real>
+std::vector<Real> DataWeights(const std::vector<Real>& slope_squared,
+                              const std::vector<float>& hidden_share, bool hidden_weights);
+
+// Standard deviation of the blur of each pixel, px: the root mean square of that of both axes.
+std::vector<float> BlurSigmaPx(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
+
+// H r - I in stored values in some rows: the mean of the channels at each pixel (0 in other rows),
+// and the rms of all.
+struct StoredResidual {
+  std::vector<float> mean;
+  double rms = 0;
+};
+template <typename Real>
+StoredResidual StoredResidualOf(const DataTerm<Real>& data, const std::vector<Real>& radiance,
+                                const model::TransferCurve& transfer, int first_row, int last_row);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SCENE_SCENE_DATA_H_

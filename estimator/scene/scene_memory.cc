@@ -1,0 +1,165 @@
+#include "estimator/scene/scene_memory.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "estimator/base/run_cost.h"
+#include "estimator/projection/view_fan.h"
+#include "estimator/scene/scene_relief.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/picture_filter.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr double kFloat = sizeof(float);
+
+// Of a view in the making, for each pixel: its disparity and confidence; and what is hidden, where
+// a third is.
+constexpr double kRenderedBytes = kFloat + 1 + 8;
+// Code that is read in when it runs first, stacks, and all that is not as large as the picture.
+constexpr double kSmallBytes = 8 << 20;
+
+// Of a sample of a view of the fan: what it sees, and where that is hidden or mixed.
+constexpr double kSeenBytes = kFloat, kHiddenBytes = sizeof(CompactView::Hidden),
+                 kMixedBytes = sizeof(CompactView::Mixed);
+
+// While systems are solved: which share of the rays is hidden, and which share sees what.
+constexpr double kSharesBytes = 2 * kFloat;
+
+// Of a system: the data, H^T W I, the radiance, what CG holds and what H holds inside; and planes:
+// weights, slopes, diagonals, the prior. Of those with patches more planes.
+constexpr double kSolvePictures = 12, kSolvePlanes = 7, kMorePlanes = 6;
+
+// Of all views in the making: the surfaces of the disparity.
+constexpr double kRendererBytes = 3;
+
+}  // namespace
+
+SceneMemory::SceneMemory(const EstimateInput& input, const SceneOptions& options,
+                         const Keeps& keeps, int reach_px)
+    : before_(ResidentBytes() + kSmallBytes),
+      width_px_(input.picture.width_px),
+      height_px_(input.picture.height_px),
+      channels_(input.picture.channels),
+      u_count_(static_cast<int>(input.weights.cols())),
+      v_count_(static_cast<int>(input.weights.rows())),
+      seen_views_(static_cast<int>((input.weights > 0).count())),
+      threads_(ResolveThreads(options.threads)),
+      reach_px_(reach_px),
+      real_(options.double_precision ? sizeof(double) : sizeof(float)),
+      patches_(options.prior == Prior::kPatches),
+      keeps_(keeps) {}
+
+double SceneMemory::MostBytes(int rows, const ProjectionBytes& projection, double kept_fan_bytes,
+                              Freed freed) const {
+  const double all = static_cast<double>(width_px_) * height_px_;
+  double kept = all;  // the confidence of its points
+  if (keeps_.photograph) kept += kFloat * all * channels_;
+  if (keeps_.maps) kept += 3 * kFloat * all;
+  // Of a band: copies of its part of the input; and the rows that are done.
+  const double pixels = static_cast<double>(width_px_) * rows;
+  double band = kFloat * pixels;
+  if (rows < height_px_) {
+    kept += kFloat * all * channels_;
+    band += kFloat * pixels * channels_;
+  }
+  return before_ + kept +
+         std::max(band + projection.held +
+                      std::max(SetupBytes(pixels, projection, freed),
+                               kept_fan_bytes + SolveBytes(pixels)),
+                  kept_fan_bytes + ViewsBytes());
+}
+
+double SceneMemory::RowBytes() const {
+  // A ray reads two pixels of each of two rows; what the pixel's rays read in a row of the picture
+  // is held in runs.
+  constexpr double kRun = kernels::kPixelsOfRun;
+  const double around = 2.0 * reach_px_ + 1;
+  const double runs = std::min(2.0 * seen_views_, around * std::ceil(around / kRun));
+  return runs * (kRun * real_ + sizeof(std::int32_t));
+}
+
+ProjectionBytes SceneMemory::LargestPerPixel() const {
+  constexpr double kIndexBytes = sizeof(std::int64_t) + sizeof(std::int32_t);
+  const double products = std::min(u_count_, v_count_);
+  return {RowBytes() + kIndexBytes + products * 2 * real_ * (2.0 * reach_px_ + 3),
+          seen_views_ * (kSeenBytes + kHiddenBytes + kMixedBytes)};
+}
+
+ProjectionBytes SceneMemory::OfRows(int rows, const ProjectionBytes& per_pixel) const {
+  const int at_borders = rows < height_px_ ? std::min(2 * reach_px_, rows) : 0;
+  constexpr double kHiddenShare = 1.0 / 3;  // of views: half of them look away, and not all as far
+  const double width = width_px_;
+  return {width * (rows * per_pixel.held + at_borders * RowBytes()),
+          width * (rows * per_pixel.fan + kHiddenShare * at_borders * seen_views_ * kHiddenBytes)};
+}
+
+// Beside H: the fan of all views, and of it the axes, or the places where rows are gathered and
+// the parts of H that are on their way to the others, one for each thread; the sums of each
+// thread; and which share of the aperture sees what.
+double SceneMemory::SetupBytes(double pixels, const ProjectionBytes& projection,
+                               Freed freed) const {
+  constexpr double kShareBytes = sizeof(double) + kFloat;
+  const double axes = kFloat * (u_count_ + v_count_) + 2 + 2 * kFloat + 1;
+  const double rows = std::max(1.0, pixels / width_px_);
+  const double parts =
+      freed == Freed::kStays ? 1 : std::min(1.0, 1.0 / kPartsOfAThread + threads_ / rows);
+  return projection.fan + parts * projection.held +
+         pixels * (kShareBytes + kFloat + kRendererBytes + std::max(axes, threads_ * real_));
+}
+
+// Beside H, while systems are solved. A device has the same again, and its programs.
+double SceneMemory::SolveBytes(double pixels) const {
+  if (patches_) return std::max(PatchesBytes(pixels), ReliefBytes(pixels));
+  return PlaneBytes(pixels, kSolvePictures * channels_ + kSolvePlanes);
+}
+
+// The last of the systems: in addition the target, here and in the system, the shading of the
+// relief, and the photograph without it; and the strengths, weights in double, and what of the data
+// goes with that photograph.
+double SceneMemory::PatchesBytes(double pixels) const {
+  return PlaneBytes(pixels, (kSolvePictures + 4) * channels_ + kSolvePlanes + kMorePlanes);
+}
+
+// The system of the relief's normals: these in place of colours, and as they are; photograph and
+// radiance; what is smooth, and the prior and weights, which are here twice. Then, without it, the
+// fit of the shading.
+double SceneMemory::ReliefBytes(double pixels) const {
+  const double system = PlaneBytes(
+      pixels, (kSolvePictures + 1) * kNormals + 2 * channels_ + kSolvePlanes + kMorePlanes);
+  const double fit =
+      pixels * (real_ * (4 * channels_ + 2 * kNormals + kSolvePlanes) + kSharesBytes) +
+      ShadingBytes(width_px_, static_cast<int>(pixels / width_px_), channels_, threads_, real_);
+  return std::max(system, fit);
+}
+
+double SceneMemory::PlaneBytes(double pixels, double planes) const {
+  constexpr double kProgramBytes = 16 << 20;
+  const double here = pixels * (real_ * planes + kSharesBytes);
+  return keeps_.device ? 2 * here + kProgramBytes : here;
+}
+
+double SceneMemory::ViewsBytes() const {
+  const double all = static_cast<double>(width_px_) * height_px_;
+  const double view = kFloat * channels_;
+  constexpr double kRanges = 2 * kFloat;
+  constexpr int kFour = 4;  // channels that are read together, if there are several
+  const int read = channels_ == 1 ? 1 : (channels_ + kFour - 1) / kFour * kFour;
+  const double all_views = kFloat * read + kRanges + kRendererBytes;
+  const int at_once = std::min(threads_, u_count_ * v_count_);
+  double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
+  bytes += at_once * keeps_.sink_bytes;
+  // On the device: the picture, its disparity and ranges; and of each view in the making the
+  // values, the disparity and what is hidden, where a third is.
+  if (keeps_.device) bytes += all * (view + 3 * kFloat + at_once * (view + 3 * kFloat));
+  if (keeps_.light_field) {
+    const double ray = view + (keeps_.maps ? 1 : 0);
+    bytes += all * ray * u_count_ * v_count_;
+  }
+  return bytes;
+}
+
+}  // namespace thicklens::estimator

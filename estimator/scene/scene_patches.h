@@ -1,0 +1,50 @@
+#ifndef THICKLENS_ESTIMATOR_SCENE_SCENE_PATCHES_H_
+#define THICKLENS_ESTIMATOR_SCENE_SCENE_PATCHES_H_
+
+#include <memory>
+#include <vector>
+
+#include "estimator/scene/scene_priors.h"
+#include "thicklens/estimator/view_geometry.h"
+#include "thicklens/model/transfer_curve.h"
+
+namespace thicklens::estimator {
+
+struct PatchPrior {
+  double strength = 0;     // lambda of its total variation
+  double noise_sigma = 0;  // of the photograph's stored values
+  model::TransferCurve transfer;
+  const DisparityMap* disparity = nullptr;  // of the data's pixels
+  double relief_slope = 0;                  // c of ReliefOf; the relief counts for nothing below
+                                            // kLeastReliefSlope
+};
+
+// From `radiance` to that of Prior::kPatches:
+//   1. r of total variation of strength lambda;
+//   2. G, the shading of the relief (see FitShading), from r and from what the quadratic that
+//      touches that prior at r makes of a photograph of the relief's normals. From here on u = r -
+//      G is solved for, of which I - H G is the photograph. Where that estimate is not done within
+//      the limit of iterations, which it has for itself, there is no G;
+//   3. u of total variation of strength f lambda, f = (sigma_p/(.7 sigma))^1.5/2, but between 1/2
+//      and 1: sigma_p is the rms of s (H r - I) within 4 px of p. Where H explains the photograph
+//      less of it is needed, as the patches do the rest; where it does not, at hidden things, all;
+//   4. v, of which stored values are s G + FilterPatches of those of r less s G, its threshold
+//      8.1/255 (255 sigma)^.6, and r that minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
+//      rho = .15 (255 sigma)^.8: half-quadratic splitting (Zoran and Weiss 2011) cut short.
+// `system`: of the data, whose backend is `backend`; is used up. The iterations are those of all
+// systems together, the residual is that of the last, in u.
+template <typename Real>
+RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& data,
+                                 const std::vector<Real>& slope_squared,
+                                 const RadianceLimits& limits,
+                                 std::unique_ptr<SceneSystem<Real>> system,
+                                 kernels::Backend* backend, std::vector<Real>* radiance);
+
+// f of each pixel for a radiance.
+template <typename Real>
+std::vector<Real> LocalVariation(const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
+                                 const std::vector<Real>& radiance, double noise_sigma);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SCENE_SCENE_PATCHES_H_

@@ -1,0 +1,200 @@
+#include "thicklens/estimator/scene_solver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "estimator/base/iteration_progress.h"
+#include "estimator/base/run_cost.h"
+#include "estimator/scene/scene_band_run.h"
+#include "estimator/scene/scene_bands.h"
+#include "estimator/scene/scene_memory.h"
+#include "estimator/scene/scene_views.h"
+#include "estimator/views/input_checks.h"
+#include "estimator/views/ray_landing.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+// Of conjugate gradients, for the progress only.
+int UsualIterations(Prior prior) { return prior == Prior::kPatches ? 120 : 60; }
+
+std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, bool noise_known) {
+  std::string message = fmt::format("{} prior of strength {:.3g}, {} iterations",
+                                    PriorName(options.prior), summary.strength, summary.iterations);
+  if (summary.bands > 1) message += fmt::format(", in {} bands", summary.bands);
+  if (!summary.converged) {
+    message +=
+        fmt::format("; stopped at a relative residual of {:.2g}, above the tolerance of {:.2g}",
+                    summary.relative_residual, options.tolerance_or_usual());
+  }
+  if (!noise_known && options.strength_rule != StrengthRule::kGiven) {
+    message += "; no part of the photograph tells its noise: 1/255 is assumed";
+  }
+  return message;
+}
+
+void FillOrigin(const SceneOptions& options, const SceneSummary& summary, bool falloff,
+                model::LightFieldOrigin* origin) {
+  origin->method = "scene";
+  origin->device = summary.device;
+  origin->prior = PriorName(options.prior);
+  origin->strength = summary.strength;
+  origin->noise_sigma = summary.noise_sigma;
+  origin->iterations = summary.iterations;
+  origin->relative_residual = summary.relative_residual;
+  origin->effects = {"defocus"};
+  if (falloff) origin->effects.emplace_back("falloff");
+}
+
+// Without a sink the light field has its views, else not.
+template <typename Real>
+model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& options,
+                             const SceneViewSink* sink, kernels::Backend* backend,
+                             SceneSummary* summary, SceneMaps* maps) {
+  const auto start = Clock::now();
+  summary->threads = ResolveThreads(options.threads);
+  summary->prior = options.prior;
+  summary->device = backend != nullptr ? backend->name() : "cpu";
+  const bool falloff = options.falloff && input.camera.has_value();
+  model::LightField light_field = DescriptionOf(input);
+  const int reach_px =
+      ReachPx(input.disparity, light_field.landing_step_px.y(), light_field.v_count);
+  SceneMemory::Keeps keeps;
+  keeps.photograph = falloff;
+  keeps.maps = maps != nullptr;
+  keeps.light_field = sink == nullptr;
+  keeps.device = backend != nullptr && backend->is_opencl();
+  if (sink != nullptr) keeps.sink_bytes = sink->bytes;
+  ReturnFreedMemory(options.memory_limit_mib);
+  const SceneMemory memory(input, options, keeps, reach_px);
+  const int iterations = std::min(options.max_iterations, UsualIterations(options.prior));
+  IterationProgress progress(options.progress, iterations + static_cast<int>(input.weights.size()));
+
+  const std::optional<double> noise = StoredNoiseSigma(input.picture, input.transfer);
+  summary->noise_sigma = noise.value_or(kUsualNoise);
+  SceneBandRun<Real> run(input, options, backend, memory, reach_px, iterations, &progress, summary);
+  std::optional<model::LinearPicture> without_falloff;
+  if (falloff) {
+    without_falloff = WithoutFalloff(input.picture, *input.grid, input.camera_of_falloff(),
+                                     input.weights, summary->threads);
+  }
+  summary->setup_seconds = SecondsSince(start);
+  const bool wants_confidence = sink != nullptr ? sink->wants_confidence : maps != nullptr;
+  SolvedScene solved =
+      run.Solve(falloff ? *without_falloff : input.picture, wants_confidence, maps);
+  without_falloff.reset();
+  ReturnFreedMemory(options.memory_limit_mib);
+
+  const auto views_start = Clock::now();
+  if (sink == nullptr) {
+    const auto views = static_cast<std::size_t>(input.weights.size());
+    light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
+    if (maps != nullptr) maps->confidence.resize(input.disparity.disparity.size() * views);
+    ShowInAllViews(input, solved, summary->threads, backend, &progress,
+                   {[&](int k, int l, const model::LinearPicture& view,
+                        const std::vector<Confidence>& confidence) {
+                      model::SetView(&light_field, k, l, view);
+                      if (maps != nullptr) {
+                        const int index = l * light_field.u_count + k;
+                        std::copy(confidence.begin(), confidence.end(),
+                                  maps->confidence.begin() +
+                                      index * static_cast<std::ptrdiff_t>(confidence.size()));
+                      }
+                    },
+                    0, maps != nullptr});
+  } else {
+    ShowInAllViews(input, solved, summary->threads, backend, &progress, *sink);
+  }
+  summary->views_seconds = SecondsSince(views_start);
+  summary->message = MessageOf(options, *summary, noise.has_value());
+  FillOrigin(options, *summary, falloff, &light_field.origin);
+  if (maps != nullptr) maps->radiance = std::move(solved.radiance);
+  return light_field;
+}
+
+model::LightField Estimate(const EstimateInput& input, const SceneOptions& options,
+                           const SceneViewSink* sink, kernels::Backend* backend,
+                           SceneSummary* summary, SceneMaps* maps) {
+  std::string why;
+  if (!options.IsValid(&why)) throw Error("scene solver: " + why);
+  if (options.double_precision && backend != nullptr && !backend->has_double()) {
+    throw Error(
+        fmt::format("device {}: it has no double, which double precision asks for; the device must "
+                    "be cpu, or the precision float",
+                    backend->name()));
+  }
+  CheckInput(input);
+  *summary = SceneSummary();
+  return options.double_precision ? EstimateIn<double>(input, options, sink, backend, summary, maps)
+                                  : EstimateIn<float>(input, options, sink, backend, summary, maps);
+}
+
+}  // namespace
+
+Prior PriorFromName(const std::string& name) {
+  if (name == "ridge") return Prior::kRidge;
+  if (name == "gradient") return Prior::kGradient;
+  if (name == "tv") return Prior::kTotalVariation;
+  if (name == "patches") return Prior::kPatches;
+  throw Error(
+      fmt::format("prior \"{}\" is unknown: it must be ridge, gradient, tv or patches", name));
+}
+
+std::string PriorName(Prior prior) {
+  switch (prior) {
+    case Prior::kRidge:
+      return "ridge";
+    case Prior::kGradient:
+      return "gradient";
+    case Prior::kPatches:
+      return "patches";
+    case Prior::kTotalVariation:
+      break;
+  }
+  return "tv";
+}
+
+double UsualTolerance(Prior prior) {
+  return prior == Prior::kTotalVariation || prior == Prior::kPatches ? 1e-4 : 1e-3;
+}
+
+bool SceneOptions::IsValid(std::string* why) const {
+  const auto fail = [why](std::string reason) {
+    if (why != nullptr) *why = std::move(reason);
+    return false;
+  };
+  if (strength_rule == StrengthRule::kGiven && (!(strength > 0) || !std::isfinite(strength))) {
+    return fail(fmt::format("strength is {}: it must be finite and > 0", strength));
+  }
+  if (tolerance && (!(*tolerance > 0) || !(*tolerance < 1))) {
+    return fail(fmt::format("tolerance is {}: it must be > 0 and < 1", *tolerance));
+  }
+  if (max_iterations < 1) {
+    return fail(fmt::format("max_iterations is {}: it must be >= 1", max_iterations));
+  }
+  if (least_bands < 1) return fail(fmt::format("least_bands is {}: it must be >= 1", least_bands));
+  if (threads < 0) return fail(fmt::format("threads is {}: it must be >= 0", threads));
+  if (memory_limit_mib && !(*memory_limit_mib > 0)) {
+    return fail(fmt::format("memory_limit_mib is {}: it must be > 0", *memory_limit_mib));
+  }
+  return true;
+}
+
+model::LightField EstimateScene(const EstimateInput& input, const SceneOptions& options,
+                                SceneSummary* summary, SceneMaps* maps, kernels::Backend* backend) {
+  return Estimate(input, options, nullptr, backend, summary, maps);
+}
+
+model::LightField EstimateSceneViews(const EstimateInput& input, const SceneOptions& options,
+                                     const SceneViewSink& sink, SceneSummary* summary,
+                                     SceneMaps* maps, kernels::Backend* backend) {
+  return Estimate(input, options, &sink, backend, summary, maps);
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,19 @@
+#ifndef THICKLENS_ESTIMATOR_SCENE_SCENE_VIEWS_H_
+#define THICKLENS_ESTIMATOR_SCENE_SCENE_VIEWS_H_
+
+#include "estimator/base/iteration_progress.h"
+#include "estimator/scene/scene_band_run.h"
+#include "thicklens/estimator/scene_solver.h"
+#include "thicklens/kernels/device.h"
+
+namespace thicklens::estimator {
+
+// All views of one radiance, each given to the sink as it is made. Their disparity is rendered on
+// the processor; the radiance is read where the backend is (null: on the processor).
+void ShowInAllViews(const EstimateInput& input, const SolvedScene& solved, int threads,
+                    kernels::Backend* backend, IterationProgress* progress,
+                    const SceneViewSink& sink);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_SCENE_SCENE_VIEWS_H_

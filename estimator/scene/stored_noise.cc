@@ -1,0 +1,67 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "estimator/scene/stored_slope.h"
+#include "thicklens/estimator/scene_solver.h"
+
+namespace thicklens::estimator {
+namespace {
+
+constexpr int kBlockPx = 16;
+constexpr double kDarkestMean = 12.0 / 255;
+constexpr double kBrightestMean = 243.0 / 255;
+constexpr double kPercentile = 0.25;
+
+struct BlockNoise {
+  double mean = 0;
+  double rms = 0;  // of (p00 - p10 - p01 + p11)/2: of white noise its standard deviation
+};
+
+// Of one channel, its values `stride` apart.
+BlockNoise NoiseOf(const model::LinearPicture& picture, const StoredValueTable& table, int x0,
+                   int y0, int channel) {
+  float stored[kBlockPx][kBlockPx];
+  BlockNoise noise;
+  for (int y = 0; y < kBlockPx; ++y) {
+    for (int x = 0; x < kBlockPx; ++x) {
+      stored[y][x] = table.Encode(picture.at(x0 + x, y0 + y, channel));
+      noise.mean += static_cast<double>(stored[y][x]) / (kBlockPx * kBlockPx);
+    }
+  }
+  double sum = 0;
+  for (int y = 0; y + 1 < kBlockPx; ++y) {
+    for (int x = 0; x + 1 < kBlockPx; ++x) {
+      const double difference = 0.5 * static_cast<double>(stored[y][x] - stored[y][x + 1] -
+                                                          stored[y + 1][x] + stored[y + 1][x + 1]);
+      sum += difference * difference;
+    }
+  }
+  noise.rms = std::sqrt(sum / ((kBlockPx - 1) * (kBlockPx - 1)));
+  return noise;
+}
+
+}  // namespace
+
+std::optional<double> StoredNoiseSigma(const model::LinearPicture& picture,
+                                       const model::TransferCurve& transfer) {
+  const StoredValueTable table(transfer);
+  std::vector<double> rms;
+  for (int y = 0; y + kBlockPx <= picture.height_px; y += kBlockPx) {
+    for (int x = 0; x + kBlockPx <= picture.width_px; x += kBlockPx) {
+      for (int channel = 0; channel < picture.channels; ++channel) {
+        const BlockNoise noise = NoiseOf(picture, table, x, y, channel);
+        if (noise.mean >= kDarkestMean && noise.mean <= kBrightestMean) rms.push_back(noise.rms);
+      }
+    }
+  }
+  if (rms.empty()) return std::nullopt;
+  const auto at = rms.begin() + static_cast<std::ptrdiff_t>(
+                                    kPercentile * static_cast<double>(rms.size() - 1) + 0.5);
+  std::nth_element(rms.begin(), at, rms.end());
+  return *at;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,134 @@
+#include "estimator/views/input_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "estimator/views/ray_landing.h"
+#include "thicklens/base/error.h"
+
+namespace thicklens::estimator {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+[[noreturn]] void Fail(const std::string& what) { throw Error("estimate: " + what); }
+
+double LargestDisparityPx(const DisparityMap& map) {
+  double largest = 0;
+  for (const float value : map.disparity) {
+    largest = std::max(largest, static_cast<double>(std::abs(value)));
+  }
+  return largest * map.step.cwiseAbs().maxCoeff();
+}
+
+void CheckPicture(const model::LinearPicture& picture) {
+  if (picture.channels < 1) {
+    Fail(fmt::format("the picture has {} channels: it must have at least 1", picture.channels));
+  }
+  if (picture.width_px < 1 || picture.height_px < 1 ||
+      picture.values.size() !=
+          Index(picture.width_px) * Index(picture.height_px) * Index(picture.channels)) {
+    Fail(fmt::format("the picture is {}x{} px with {} values", picture.width_px, picture.height_px,
+                     picture.values.size()));
+  }
+  for (std::size_t i = 0; i < picture.values.size(); ++i) {
+    if (std::isfinite(picture.values[i])) continue;
+    const std::size_t pixel = i / Index(picture.channels);
+    Fail(fmt::format("the picture has values that are not finite: {} at ({}, {})",
+                     picture.values[i], pixel % Index(picture.width_px),
+                     pixel / Index(picture.width_px)));
+  }
+}
+
+void CheckDisparity(const DisparityMap& map, const model::LinearPicture& picture) {
+  if (map.width_px != picture.width_px || map.height_px != picture.height_px) {
+    Fail(fmt::format("the depth is {}x{} px, the picture {}x{} px: the sizes must be equal",
+                     map.width_px, map.height_px, picture.width_px, picture.height_px));
+  }
+  if (!std::all_of(map.disparity.begin(), map.disparity.end(),
+                   [](float value) { return std::isfinite(value); })) {
+    Fail("the disparity has holes: they must be filled");
+  }
+  const double widest_px = LargestDisparityPx(map);
+  const int size_px = std::max(picture.width_px, picture.height_px);
+  if (!(widest_px <= size_px)) {
+    Fail(
+        fmt::format("the largest disparity is {:.4g} px per view step: it must be at most the "
+                    "picture's size, {} px; is its scale right?",
+                    widest_px, size_px));
+  }
+}
+
+void CheckWeights(const Eigen::ArrayXXd& weights) {
+  if (weights.size() < 2) {
+    Fail(fmt::format("views are {}x{}: a light field needs at least two", weights.cols(),
+                     weights.rows()));
+  }
+  for (Eigen::Index l = 0; l < weights.rows(); ++l) {
+    for (Eigen::Index k = 0; k < weights.cols(); ++k) {
+      if (weights(l, k) >= 0 && std::isfinite(weights(l, k))) continue;
+      Fail(fmt::format("the weight of the view ({}, {}) is {}: it must be finite and >= 0", k, l,
+                       weights(l, k)));
+    }
+  }
+  if (!(std::abs(weights.sum() - 1) < 1e-6)) {
+    Fail(fmt::format("the weights of the views sum to {}: they must be >= 0 with sum 1",
+                     weights.sum()));
+  }
+}
+
+}  // namespace
+
+void CheckInput(const EstimateInput& input) {
+  const model::LinearPicture& picture = input.picture;
+  CheckPicture(picture);
+  CheckDisparity(input.disparity, picture);
+  CheckWeights(input.weights);
+  if (input.grid.has_value() != input.camera.has_value()) {
+    Fail("a camera and a grid come together");
+  }
+  if (input.grid && input.grid->planes.uv_depth_mm != 0) {
+    Fail(fmt::format(
+        "the UV plane lies at depth {} mm: it must be the aperture (0), where a view has one "
+        "transmission for all its rays",
+        input.grid->planes.uv_depth_mm));
+  }
+  if (input.grid &&
+      (input.grid->s_count != picture.width_px || input.grid->t_count != picture.height_px ||
+       input.grid->u_count != input.weights.cols() ||
+       input.grid->v_count != input.weights.rows())) {
+    Fail(fmt::format(
+        "the grid has {}x{} samples and {}x{} views, the picture {}x{} px and the "
+        "weights {}x{}: they must be equal",
+        input.grid->s_count, input.grid->t_count, input.grid->u_count, input.grid->v_count,
+        picture.width_px, picture.height_px, input.weights.cols(), input.weights.rows()));
+  }
+}
+
+model::LightField DescriptionOf(const EstimateInput& input) {
+  model::LightField description;
+  description.s_count = input.picture.width_px;
+  description.t_count = input.picture.height_px;
+  description.u_count = static_cast<int>(input.weights.cols());
+  description.v_count = static_cast<int>(input.weights.rows());
+  description.channels = input.picture.channels;
+  description.weights = input.weights;
+  description.transfer = input.transfer;
+  description.grid = input.grid;
+  description.camera = input.camera;
+  if (input.grid) description.landing_step_px = LandingStepPx(*input.camera, *input.grid);
+  return description;
+}
+
+model::LightField FrameOf(const EstimateInput& input) {
+  model::LightField frame = DescriptionOf(input);
+  frame.values.assign(frame.ViewStart(frame.channels, 0, 0), 0.0F);
+  return frame;
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,203 @@
+#include "estimator/views/mixed_samples.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "estimator/views/surface_taps.h"
+#include "thicklens/base/cancel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+// Of a sample's pixel; what is less is not told from none, nor what leaves less from all.
+constexpr float kLeastShare = 0.01F;
+
+struct Step {
+  int x, y;
+};
+// Those that share a side with the sample before those that share a corner.
+constexpr std::array<Step, 8> kAround{
+    {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+
+struct Candidate {
+  kernels::MixedSample mixed;
+  // Of a hidden sample's surface itself, so much as is seen of it after all.
+  bool is_same_surface = false;
+};
+
+class Mixer {
+ public:
+  Mixer(const DisparityMap& map, const CompactView& view)
+      : map_(map),
+        view_(view),
+        tolerance_(static_cast<float>(SurfaceTolerance(map))),
+        far_px_(static_cast<float>(map.width_px) + static_cast<float>(map.height_px)),
+        is_done_(view.disparity.size(), 0) {}
+
+  // The sample's pixel where one at a jump, of that disparity, lands in it. Of a sample and what is
+  // behind it only once.
+  std::optional<Candidate> At(int x, int y, float landing) {
+    if (!IsInside(x, y)) return std::nullopt;
+    const bool is_hidden = std::isnan(view_.disparity[At(x, y)]);
+    const float shown = is_hidden ? view_.HiddenAt(At(x, y)).disparity : view_.disparity[At(x, y)];
+    if (landing < shown - tolerance_) return std::nullopt;
+    const bool is_same_surface = landing <= shown + tolerance_;
+    if (is_hidden || !is_same_surface) {
+      const kernels::HiddenSample landed = On(x, y, landing);
+      return Mixed(x, y, landed, Cover(x, y, landed), is_same_surface);
+    }
+    // What is behind does not depend on which pixel lands.
+    if (std::exchange(is_done_[At(x, y)], 1) != 0) return std::nullopt;
+    const float cover = Cover(x, y, On(x, y, shown));
+    if (cover > 1 - kLeastShare) return std::nullopt;
+    const std::optional<kernels::HiddenSample> behind = Behind(x, y, shown);
+    return behind ? Mixed(x, y, *behind, 1 - cover, false) : std::nullopt;
+  }
+
+ private:
+  bool IsInside(int x, int y) const {
+    return x >= 0 && y >= 0 && x < view_.width_px && y < view_.height_px;
+  }
+  std::size_t At(int x, int y) const { return Index(y) * Index(view_.width_px) + Index(x); }
+
+  // At a way from a sample, of its pixel the share that the surface of a disparity covers: each of
+  // the centre view's pixels is a square, and so is the sample's.
+  float Cover(int x, int y, const kernels::HiddenSample& from) const {
+    if (!(std::abs(from.source_x) < far_px_ && std::abs(from.source_y) < far_px_)) return 0;
+    // Whole steps and the rest, so that all rows and columns round alike.
+    const float left = std::floor(from.source_x), above = std::floor(from.source_y);
+    const float right_share = from.source_x - left, below_share = from.source_y - above;
+    const int column = x + static_cast<int>(left), row = y + static_cast<int>(above);
+    const auto share_in_row = [&](int of_row) {
+      const float* const pixels =
+          map_.disparity.data() +
+          Index(std::clamp(of_row, 0, map_.height_px - 1)) * Index(map_.width_px);
+      const auto is_on = [&](int of_column) {
+        const float there = pixels[std::clamp(of_column, 0, map_.width_px - 1)];
+        return std::abs(there - from.disparity) <= tolerance_ ? 1.0F : 0.0F;
+      };
+      return (1 - right_share) * is_on(column) + right_share * is_on(column + 1);
+    };
+    return (1 - below_share) * share_in_row(row) + below_share * share_in_row(row + 1);
+  }
+
+  // Where a sample would see a surface.
+  kernels::HiddenSample On(int x, int y, float disparity) const {
+    return {static_cast<std::int32_t>(At(x, y)), static_cast<float>(view_.shift.x() * disparity),
+            static_cast<float>(view_.shift.y() * disparity), disparity};
+  }
+
+  // What the samples around show beyond a surface: what is seen before what is hidden. Where the
+  // centre view does not show that surface here, what it shows there.
+  std::optional<kernels::HiddenSample> Behind(int x, int y, float disparity) const {
+    std::optional<kernels::HiddenSample> beside, hidden;
+    for (const Step& step : kAround) {
+      const int other_x = x + step.x, other_y = y + step.y;
+      if (!IsInside(other_x, other_y)) continue;
+      const std::size_t there = At(other_x, other_y);
+      const bool is_hidden = std::isnan(view_.disparity[there]);
+      kernels::HiddenSample other =
+          is_hidden ? view_.HiddenAt(there) : On(x, y, view_.disparity[there]);
+      if (!(other.disparity < disparity - tolerance_)) continue;
+      const bool is_shown = Cover(x, y, other) >= kLeastShare;
+      if (is_shown && !is_hidden) return other;
+      std::optional<kernels::HiddenSample>& kept = is_hidden ? hidden : beside;
+      if (kept) continue;
+      if (!is_shown) {
+        other.source_x += static_cast<float>(step.x);
+        other.source_y += static_cast<float>(step.y);
+      }
+      kept = other;
+    }
+    return beside ? beside : hidden;
+  }
+
+  std::optional<Candidate> Mixed(int x, int y, const kernels::HiddenSample& other, float share,
+                                 bool is_same_surface) const {
+    if (share < kLeastShare) return std::nullopt;
+    return Candidate{{static_cast<std::int32_t>(At(x, y)), other, share}, is_same_surface};
+  }
+
+  const DisparityMap& map_;
+  const CompactView& view_;
+  const float tolerance_;
+  const float far_px_;
+  std::vector<unsigned char> is_done_;  // of each sample: with what is behind
+};
+
+// Of one sample, another surface before its own; the larger share before others; of the same, the
+// nearer.
+bool IsBefore(const Candidate& a, const Candidate& b) {
+  const auto key = [](const Candidate& candidate) {
+    return std::tuple(candidate.is_same_surface, -candidate.mixed.share,
+                      -candidate.mixed.other.disparity);
+  };
+  return key(a) < key(b);
+}
+
+// The first of the candidates of each sample.
+class FirstCandidates {
+ public:
+  explicit FirstCandidates(std::size_t samples) : place_(samples, kNone) {}
+
+  void Add(const Candidate& candidate) {
+    std::int32_t& place = place_[Index(candidate.mixed.index)];
+    if (place == kNone) {
+      place = static_cast<std::int32_t>(candidates_.size());
+      candidates_.push_back(candidate);
+    } else if (IsBefore(candidate, candidates_[Index(place)])) {
+      candidates_[Index(place)] = candidate;
+    }
+  }
+
+  std::vector<kernels::MixedSample> ByIndex() const {
+    std::vector<kernels::MixedSample> mixed;
+    mixed.reserve(candidates_.size());
+    for (const std::int32_t place : place_) {
+      if (place != kNone) mixed.push_back(candidates_[Index(place)].mixed);
+    }
+    return mixed;
+  }
+
+ private:
+  static constexpr std::int32_t kNone = -1;
+
+  std::vector<std::int32_t> place_;  // among the candidates, of each sample
+  std::vector<Candidate> candidates_;
+};
+
+}  // namespace
+
+std::vector<kernels::MixedSample> FindMixedSamples(const DisparityMap& map,
+                                                   const std::vector<int>& at_jump,
+                                                   const CompactView& view) {
+  if (at_jump.empty()) return {};
+  Mixer mixer(map, view);
+  const std::size_t width = Index(map.width_px);
+  FirstCandidates candidates(view.disparity.size());
+  for (const int index : at_jump) {
+    ThrowIfCancelled();
+    const std::size_t i = Index(index);
+    const float disparity = map.disparity[i];
+    const double x = static_cast<double>(i % width) - view.shift.x() * disparity;
+    const double y = static_cast<double>(i / width) - view.shift.y() * disparity;
+    if (!(x > -1 && y > -1 && x < map.width_px && y < map.height_px)) continue;
+    const int left = static_cast<int>(std::floor(x)), above = static_cast<int>(std::floor(y));
+    for (const Step& step : {Step{0, 0}, Step{1, 0}, Step{0, 1}, Step{1, 1}}) {
+      const auto candidate = mixer.At(left + step.x, above + step.y, disparity);
+      if (candidate) candidates.Add(*candidate);
+    }
+  }
+  return candidates.ByIndex();
+}
+
+}  // namespace thicklens::estimator

@@ -1,0 +1,18 @@
+#ifndef THICKLENS_ESTIMATOR_VIEWS_SAME_POINT_H_
+#define THICKLENS_ESTIMATOR_VIEWS_SAME_POINT_H_
+
+#include <vector>
+
+#include "thicklens/estimator/view_geometry.h"
+
+namespace thicklens::estimator {
+
+// Whether a view shows at (s, t), between its samples, a point of that disparity: every tap of the
+// bilinear neighbourhood that has weight does, to .3 px per view step. `of_view`: the disparity
+// rendered into the view, of the size and in the unit of `map`. False outside of the view.
+bool ShowsSamePoint(const DisparityMap& map, const std::vector<float>& of_view, double s, double t,
+                    double disparity);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_VIEWS_SAME_POINT_H_

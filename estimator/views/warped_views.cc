@@ -1,0 +1,56 @@
+#include "estimator/views/warped_views.h"
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "estimator/views/input_checks.h"
+#include "estimator/views/ray_irradiance.h"
+#include "thicklens/base/parallel.h"
+
+namespace thicklens::estimator {
+namespace {
+
+std::size_t Index(int i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
+                                    const model::LightFieldGrid& grid, const model::Camera& camera,
+                                    const Eigen::ArrayXXd& weights, int threads) {
+  const std::vector<float> share =
+      FalloffOfPicture(grid, camera, weights, photograph.width_px, photograph.height_px, threads);
+  model::LinearPicture radiance = photograph;
+  for (std::size_t i = 0; i < radiance.values.size(); ++i) {
+    radiance.values[i] /= share[i / Index(radiance.channels)];
+  }
+  return radiance;
+}
+
+model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int threads,
+                                 std::vector<std::vector<float>>* disparity) {
+  model::LightField warped = FrameOf(input);
+  const model::LinearPicture radiance =
+      falloff && input.camera ? WithoutFalloff(input.picture, *input.grid,
+                                               input.camera_of_falloff(), input.weights, threads)
+                              : input.picture;
+  const DisparityRenderer renderer(input.disparity);
+  const PictureWarper warper(radiance, input.disparity);
+  const int views = warped.u_count * warped.v_count;
+  if (disparity != nullptr) disparity->resize(Index(views));
+  ParallelFor(views, threads, [&](int view) {
+    const int k = view % warped.u_count;
+    const int l = view / warped.u_count;
+    ViewDisparity shown = renderer.Render(warped.u_offset(k), warped.v_offset(l));
+    model::SetView(&warped, k, l, warper.Warp(shown));
+    if (disparity != nullptr) (*disparity)[Index(view)] = std::move(shown.disparity);
+  });
+  warped.origin.method = "dibr";
+  return warped;
+}
+
+model::LightField WarpedLightField(const EstimateInput& input, bool falloff, int threads) {
+  return WarpToAllViews(input, falloff, threads, nullptr);
+}
+
+}  // namespace thicklens::estimator
