@@ -21,7 +21,7 @@ ReportFolder::ReportFolder(const std::string& path) : path_(path) {
           throw Error(fmt::format("{}: the folder cannot be made: {}", path, failure.message()));
         return path;
       },
-      model::Abandon::kIfEmpty);
+      Abandon::kIfEmpty);
 }
 
 ReportFolder::~ReportFolder() {
