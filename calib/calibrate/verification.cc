@@ -129,8 +129,8 @@ class Verifier {
     return counted;
   }
 
-  // chi^2 = d^T C^-1 d with C = C_stored + C_found + systematic variances, in units of the sigmas
-  // of the differences.
+  // [D90] chi^2 = d^T C^-1 d with C = C_stored + C_found + systematic variances, in units of the
+  // sigmas of the differences.
   void CountJointly() {
     const std::vector<ComparedParameter*> counted = Counted();
     const auto count = static_cast<Eigen::Index>(counted.size());
@@ -206,7 +206,7 @@ class Verifier {
   }
 
   // A change of d1 adds to the blur sigma(z) = kappa r |c(z)|/p, c(z) = f1 D/(f2 z) - (D - f2)/f2,
-  // so that d c/d d1 = -(1 - f1/z)/f2; derived here, taken at z = zf.
+  // so that d c/d d1 = -(1 - f1/z)/f2; derived here [D89], taken at z = zf.
   double BlurPxOf(double d1_change_mm, double blur_ratio) const {
     const model::ThickLens& lens = camera_.lens;
     const double zf = camera_.focus_depth_mm();
@@ -327,7 +327,8 @@ Verification VerifyCalibration(const model::Camera& stored, const FocusSweep& sw
   return Verifier(stored, sweep, found, options).Run();
 }
 
-// Q(1) = erfc(sqrt(x/2)), Q(2) = exp(-x/2), Q(n + 2) = Q(n) + (x/2)^(n/2) exp(-x/2)/Gamma(n/2 + 1).
+// [L10] Q(1) = erfc(sqrt(x/2)), Q(2) = exp(-x/2), Q(n + 2) = Q(n) + (x/2)^(n/2) exp(-x/2)/Gamma(n/2
+// + 1).
 double ChiSquareTail(double x, int degrees_of_freedom) {
   if (!(x > 0)) return 1;
   const double half = x / 2;

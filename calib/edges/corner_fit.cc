@@ -27,7 +27,7 @@ enum Parameter {
   kParameters = kHalf + 3
 };
 
-// The grey around an X corner (derived here):
+// The grey around an X corner (derived here, [D84]):
 //   I = A + B [S1(d1) S2(d2) + 4 c E1'(d1) E2'(d2) + 2 c^2 E1''(d1) E2''(d2)], S = 2 E - 1,
 // A (mean) and B (half the contrast) planes, d the distances from the edges, E their profiles. The
 // product holds for edges at a right angle and blurs that separate; c = n1.n2 (sigma^2 + 1/12) is

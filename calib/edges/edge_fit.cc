@@ -27,7 +27,7 @@ enum Parameter {
   kParameters
 };
 
-// The grey of the pixels of a strip (derived here):
+// The grey of the pixels of a strip (derived here, [D83]):
 //   I = D + C E(d), d = x cos a + y sin a - shift - sag b, b = t^2/T^2 - 1/3,
 // t along the edge, T half its length, E the profile for the direction a and the blur's variance;
 // D (dark) and C (bright less dark) each a plane in x and y and, of an edge that is long in its

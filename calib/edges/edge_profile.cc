@@ -24,7 +24,8 @@ constexpr double kLeastVariancePx2 = 0.02;
 constexpr double kLeastFloorPx = 0.1;
 
 // The normal distribution Phi(x/sigma), its first antiderivative x Phi + sigma phi, px, and its
-// second one [(x^2 + sigma^2) Phi + x sigma phi]/2, px^2, all 0 at -infinity. Derived by parts.
+// second one [(x^2 + sigma^2) Phi + x sigma phi]/2, px^2, all 0 at -infinity. Derived by parts
+// [D33].
 struct Antiderivatives {
   double none = 0, first = 0, second = 0;
 };
@@ -66,7 +67,7 @@ void EdgeProfile::Set(std::size_t node, const Value& value) {
 }
 
 // The pixel's box projected on the normal is the convolution of two boxes, a = |cos| and b = |sin|
-// of its angle wide. With F the second antiderivative of Phi(d/sigma) (derived here)
+// of its angle wide. With F the second antiderivative of Phi(d/sigma) (derived here, [D32])
 //   E(d) = [F(d + (a+b)/2) - F(d + (a-b)/2) - F(d - (a-b)/2) + F(d - (a+b)/2)]/(a b),
 // its slope is the same with F', and dE/d(sigma^2) = E''/2 (the heat equation) half the same with
 // F''. Limit b = 0: E = [F'(d + 1/2) - F'(d - 1/2)].
@@ -92,7 +93,7 @@ void EdgeProfile::TabulateGaussian(double variance_px2, double normal_rad) {
 }
 
 // A disc and a Gaussian together have no closed form. An edge at 0, back at L/2, and so on with
-// period L, behind the transfer T (derived here):
+// period L, behind the transfer T (derived here, [D34]):
 //   E(d) = 1/2 + sum over odd k of 2/(pi k) T(k/L) sin(2 pi k d/L).
 // The two edges do not meet for L > 4 reach. The disc's transfer D = 2 J1(x)/x, x = 2 pi f R, with
 // R^2 = 4 (sigma^2 - floor^2), has dD/d(sigma^2) = -4 (2 pi f)^2 J2(x)/x^2.

@@ -51,8 +51,8 @@ FitQuality JudgeFit(const FeaturePixels& pixels, const Eigen::VectorXd& residual
 bool IsStep(const FitQuality& quality, double contrast);
 
 // Covariance of a least-squares fit's parameters for noise that may differ from pixel to pixel and
-// that neighbours may share: (J^T J)^-1 (J^T diag(r^2) J) (J^T J)^-1 c n/(n - p), after White 1980,
-// c >= 1 the residual's clumping. Empty if a parameter is not determined.
+// that neighbours may share: (J^T J)^-1 (J^T diag(r^2) J) (J^T J)^-1 c n/(n - p), after White 1980
+// [L8], c >= 1 the residual's clumping. Empty if a parameter is not determined.
 Eigen::MatrixXd FitCovariance(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual,
                               double clumping);
 

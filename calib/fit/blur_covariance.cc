@@ -16,7 +16,8 @@ constexpr std::array<const char*, kBlurParameters> kNames = {"focus_depth_mm", "
 // Singular values below this part of the largest: the data leave that combination free.
 constexpr double kLeastSingular = 1e-7;
 
-// chi^2 per degree of freedom that chance exceeds once in a hundred (Wilson and Hilferty 1931).
+// chi^2 per degree of freedom that chance exceeds once in a hundred (Wilson and Hilferty 1931)
+// [L9].
 double LargestByChance(double freedom) {
   const double spread = 2 / (9 * freedom);
   return std::pow(1 - spread + 2.326 * std::sqrt(spread), 3);

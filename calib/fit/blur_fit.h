@@ -13,7 +13,7 @@ namespace thicklens::calib {
 
 // How the blur goes with depth.
 enum class BlurLaw {
-  kPerspective,  // sigma^2 = S0 + A (1/z - 1/zf)^2, (25), (26) of the source
+  kPerspective,  // sigma^2 = S0 + A (1/z - 1/zf)^2, [S25], [S26] [D71]
   // sigma^2 = S0 + A ((z - zf)/zf^2)^2: a telecentric pupil, whose image scale does not change. The
   // same slope at focus, so that kappa means the same.
   kTelecentric,

@@ -158,7 +158,8 @@ Parabola FitParabola(const Eigen::VectorXd& depths_mm, const Eigen::VectorXd& va
   return Search(depths_mm, variances_px2, errors_px2, reading_sigma_mm).Run();
 }
 
-// V = S0 z^2/zr^2 + A (1 - z/zf)^2/zr^2 + c, so that with a the coefficient of z^2 times zr^2:
+// [D73] V = S0 z^2/zr^2 + A (1 - z/zf)^2/zr^2 + c, so that with a the coefficient of z^2 times
+// zr^2:
 //   A/zf^2 = a - S0, zf = vertex a/(a - S0). Telecentric: V = S0 + A ((z - zf)/zf^2)^2 + c.
 std::optional<FocusAndRatio> FromParabola(const Parabola& parabola, const BlurFitSetup& setup,
                                           double reference_depth_mm, double floor_variance_px2) {

@@ -24,7 +24,8 @@ struct BlurWeights {
   Eigen::VectorXd readings, scales;     // of each frame
 };
 
-// The residuals that FitBlur makes small, each in its standard deviations, one below the other:
+// The residuals that FitBlur makes small [D74], each in its standard deviations, one below the
+// other:
 //   of a meter:   B f (V_model + c - V), B its covariance's inverse root, f the weights' factors;
 //   of a scale:   sqrt(w) (scale (l0 + l1 x + l2 x^2) - 1)/sigma, x by the believed reading;
 //   of a reading: sqrt(w) e/sigma; none, and e = 0, where the readings are exact.

@@ -16,7 +16,7 @@ namespace thicklens::calib {
 bool SolveErrors(const BlurResiduals& residuals, BlurParameters* parameters);
 
 // The residuals at `parameters` and their Jacobian by p, J_p less its part in the span of the
-// errors' Jacobian J_e (derived here):
+// errors' Jacobian J_e (derived here, [D75]):
 //   J = J_p + J_e D, D = -(J_e^T J_e)^-1 J_e^T J_p,
 // so that (J^T J)^-1 is the block of p in the inverse of the whole problem's (Schur complement),
 // and, as J_e^T r = 0 at e(p), J^T r the gradient of the cost.

@@ -11,7 +11,7 @@ namespace thicklens::calib {
 // the largest over the laws, the uniform one included.
 
 // The tails of RelativeBlur: (c4 - c4 of the uniform law)/24, c4 the excess kurtosis of the blur
-// per axis. Derived here: ln H = -u + c4 (4 u^2)/24 + .. with u = x^2/2, x = 2 pi sigma nu.
+// per axis. Derived here [D80]: ln H = -u + c4 (4 u^2)/24 + .. with u = x^2/2, x = 2 pi sigma nu.
 Eigen::Vector2d TailsOfPupilLaws(const model::PupilOptics& optics);
 
 // The sigma of the uniform law's edge profile that comes nearest to the law's in the mean square,

@@ -13,9 +13,9 @@ namespace thicklens::calib {
 // the blurs that the registrations saw: good to some 15 %. No reading and no bench zero is in it,
 // so that it holds whatever the readings are.
 //
-// Of frames of scale s against the sharpest (derived here; p the pixel pitch, s near 1):
+// Of frames of scale s against the sharpest (derived here, [D65]; p the pixel pitch, s near 1):
 //   the target moves: sigma = kappa r K |1/z - 1/zf|/p = kappa r f1/(p (zf - f1)) |s - s0|, from
-//     (25), K = f1 zf/(zf - f1) and s = zf/z;
+//     [S25], K = f1 zf/(zf - f1) and s = zf/z;
 //   the lens or the sensor moves: sigma = kappa r |1 - D/D0|/p = kappa r/p |s - s0|, because the
 //     size goes as D, the distance from the aperture to the sensor.
 struct BlurSlope {

@@ -31,7 +31,7 @@ struct FramePlaces {
 //   fixed structure: the fine structure of the nearest frames correlates with that of the farthest
 //     ones at the same place of the sensor, more than 5 px beside and more than at other places,
 //     where the target moved by more than 6 px.
-// Derived here. What the sweep cannot show stays empty.
+// Derived here [D66]. What the sweep cannot show stays empty.
 FrameStructureFinding MeasureStructure(const FramePlaces& places);
 
 // Whether the sweep shows that there is none of it large enough to matter; a small or short one

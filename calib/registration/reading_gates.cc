@@ -182,8 +182,8 @@ void RejectUnregistered(const std::vector<ScaleSample>& samples,
   }
 }
 
-// Least squares of reading = a + b/scale + c (b/scale)^2 + jump H, scanned over where the jump is.
-// The square takes up what a real lens or rail bends smoothly.
+// [D64] Least squares of reading = a + b/scale + c (b/scale)^2 + jump H, scanned over where the
+// jump is. The square takes up what a real lens or rail bends smoothly.
 std::optional<Slip> FindSlip(std::vector<ScaleSample> samples, const ScaleLaw& law) {
   constexpr std::size_t kFewestOnEachSide = 4;
   constexpr double kExplained = 0.6;  // of the squares may be left

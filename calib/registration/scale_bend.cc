@@ -87,7 +87,8 @@ double NeighbourFactor(const Points& points, const Curve& curve) {
 //   in the middle the curve lies -c2 off the chord through its ends;
 //   the chord through the middle and one end has the slope c1 -+ c2 and meets Z = 0, u = -m/h, at
 //   c0 - (c1 -+ c2) m/h, which is -sign times the bench zero: far less near = 2 sign c2 m/h.
-// Derived here; m and h are the middle and half the range of the depths, sign that of direction.
+// Derived here [D63]; m and h are the middle and half the range of the depths, sign that of
+// direction.
 std::optional<Bend> FindBend(const std::vector<ScaleSample>& samples, const ScaleLaw& law,
                              const FocusSweep& sweep) {
   if (!law.done || samples.size() < kFewestSamples) return std::nullopt;

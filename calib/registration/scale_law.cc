@@ -110,8 +110,8 @@ std::optional<Law> SolveLaw(const Points& points, double sign, double reading_si
   return law;
 }
 
-// The straight line 1/scale = intercept + slope reading by repeated medians (Siegel 1982): up to
-// half of the points may be wrong by any amount.
+// The straight line 1/scale = intercept + slope reading by repeated medians (Siegel 1982) [L7]: up
+// to half of the points may be wrong by any amount.
 struct Line {
   double intercept = 0, slope = 0;
   double slope_sigma = 0;  // from the scatter about it, stated errors at least

@@ -108,7 +108,7 @@ struct RefinedLattice {
   Eigen::MatrixXd covariance;
 };
 
-// Of every line that stands out, the phase under each window is c + 2 pi (m df1 + n df2) . r:
+// [D67] Of every line that stands out, the phase under each window is c + 2 pi (m df1 + n df2) . r:
 // linear in the errors of the frequencies, solved by least squares with weights |amplitude|^2. The
 // residuals give the covariance.
 std::optional<RefinedLattice> Refine(const cv::Mat& grey, const LineSpectrum& spectrum,

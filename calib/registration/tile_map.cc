@@ -28,7 +28,7 @@ using RigidDesign = Design<3>;  // shift, turn
 
 // Lengths in units of `unit_px`, so that the columns are of one size. With a weight symmetric about
 // the tile's centre q and of second moment m along each axis, the mean of |p|^2 p over it is
-// (|q|^2 + 4 m) q (derived here).
+// (|q|^2 + 4 m) q (derived here, [D59]).
 FieldDesign FieldDesignAt(const Eigen::Vector2d& place_px, double moment_px2, double unit_px) {
   const Eigen::Vector2d q = place_px / unit_px;
   const Eigen::Vector2d cubic = (q.squaredNorm() + 4 * moment_px2 / (unit_px * unit_px)) * q;

@@ -181,7 +181,8 @@ void TilePhases::SumRings() {
 }
 
 // Of two spectra of coherence c^2, one a filtered copy of the other with noise, a phase has the
-// variance (1/c^2 - 1)/2 times the mean power over the bin's own (derived here; small variances).
+// variance (1/c^2 - 1)/2 times the mean power over the bin's own (derived here [D60]; small
+// variances).
 void TilePhases::Weigh(Tile* tile) const {
   for (std::size_t i = 0; i < frequencies_.size(); ++i) {
     const Ring& ring = rings_[static_cast<std::size_t>(frequencies_[i].ring)];
@@ -199,7 +200,7 @@ void TilePhases::Weigh(Tile* tile) const {
 
 void TilePhases::Summarise() {
   double cross = 0, frame = 0, reference = 0;
-  // ln |H| = -2 pi^2 V k^2, over the frequencies that agree well. The part of
+  // ln |H| = -2 pi^2 V k^2 [D61], over the frequencies that agree well. The part of
   // F that comes from R is R H, so that noise and what the window cut off do not count.
   double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wz = 0, wxz = 0;
   int count = 0;

@@ -39,8 +39,8 @@ std::pair<std::size_t, std::size_t> Around(const std::vector<Sharpness>& samples
   return {first, last};
 }
 
-// ln index = c0 + c1 x + c2 x^2 over samples first to last - 1, x = (reading - middle)/half. The
-// vertex is -c1/(2 c2).
+// [D70] ln index = c0 + c1 x + c2 x^2 over samples first to last - 1, x = (reading - middle)/half.
+// The vertex is -c1/(2 c2).
 std::optional<Peak> FitPeak(const std::vector<Sharpness>& samples, std::size_t first,
                             std::size_t last) {
   const auto n = static_cast<Eigen::Index>(last - first);

@@ -34,7 +34,7 @@ Eigen::Vector2d ModeFrequency(const Mode& mode, const TargetWindow& window);
 // a sixth, and the ones between would add a tenth to what is known.
 std::vector<Mode> ModesBetween(const TargetWindow& window, double low, double high);
 
-// The window's Fourier integral of a frame, relative to its mean:
+// The window's Fourier integral of a frame [D76], relative to its mean:
 //   G(nu) = sum w(X) (I/mu - 1) exp(-2 pi i nu.X) / box(nu),  sum w = 1, mu = sum w I,
 // summed over the frame's own pixels at their target coordinates (no resampling), with the pixel
 // box sinc(nu_x/scale) sinc(nu_y/scale) taken out.

@@ -11,8 +11,8 @@
 
 namespace thicklens::calib {
 
-// Blur of the frames of a sweep relative to each other, whatever the texture: the windowed spectra
-// of all frames at once are fitted by
+// Blur of the frames of a sweep relative to each other [D77], whatever the texture: the windowed
+// spectra of all frames at once are fitted by
 //   G_i(nu) = g_i H_i(nu) exp(-2 pi i nu.t_i) T(nu),
 // T the texture's own spectrum (free at every frequency: variable projection), g_i a gain near 1,
 // t_i a shift that the registration left over, H_i the blur's transfer function:
@@ -46,7 +46,7 @@ struct RelativeBlur {
   Eigen::VectorXd noise_ratio;    // scatter about the fit over what the pixel noise explains
   std::vector<int> modes_used;    // of each sample
   double chi2_per_dof = 0;        // against the pixel noise, all samples
-  // How the shape departs from the family's: H exp(4 tails u^2), u = 2 pi^2 v nu^2 with v the
+  // How the shape departs from the family's [D79]: H exp(4 tails u^2), u = 2 pi^2 v nu^2 with v the
   // defocus alone; the same in all frames, and no change of the second moment. 0: the family
   // itself; a disc is a Gaussian with -1/24 to the first order. One step of the fit from 0, and how
   // V answers.

@@ -144,8 +144,8 @@ cv::Mat WidelySmoothed(const cv::Mat& grey, double sigma_px) {
   cv::copyMakeBorder(grey, padded, top, top + rest(grey.rows), left, left + rest(grey.cols),
                      cv::BORDER_REFLECT_101);
   cv::resize(padded, small, padded.size() / shrink, 0, 0, cv::INTER_AREA);
-  // The mean over a block of n px is a blur of variance (n^2 - 1)/12; straight lines between points
-  // n px apart, taken at n places between them, are on the average one of n^2/6 + 1/12.
+  // [D86] The mean over a block of n px is a blur of variance (n^2 - 1)/12; straight lines between
+  // points n px apart, taken at n places between them, are on the average one of n^2/6 + 1/12.
   const double variance_px2 = sigma_px * sigma_px - 0.25 * shrink * shrink;
   cv::resize(Smoothed(small, std::sqrt(variance_px2) / shrink), wide, padded.size(), 0, 0,
              cv::INTER_LINEAR);

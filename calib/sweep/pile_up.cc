@@ -38,9 +38,9 @@ Histogram HistogramOf(const cv::Mat& stored, int channel) {
                                  : CountValues<std::uint16_t>(stored, channel, 65536);
 }
 
-// The share of a plateau's pixels that have its most frequent value, where the noise is at least
-// what Believed() asks for: erf(0.5/(sqrt(2) 0.41)) = .78 for a standard deviation of .41, which
-// rounding makes .5.
+// [D87] The share of a plateau's pixels that have its most frequent value, where the noise is at
+// least what Believed() asks for: erf(0.5/(sqrt(2) 0.41)) = .78 for a standard deviation of .41,
+// which rounding makes .5.
 constexpr double kMostOfAPlateau = 0.85;
 
 // Clipping anywhere: the brightest value that the channel uses holds many pixels while the values

@@ -16,7 +16,7 @@ namespace {
 // A given bench zero that lies farther off than this part of the depth is no error of measurement.
 constexpr double kGrossOffset = 0.1;
 
-// m = f1 D/(f2 z) on the sensor over the target, so D = m z f2/f1.
+// m = f1 D/(f2 z) [D5] on the sensor over the target, so D = m z f2/f1.
 MagnificationCheck DistanceFromPeriod(const FocusSweep& sweep, const PeriodEstimate& period,
                                       double depth_mm, double offset_sigma_mm) {
   const model::ThickLens& lens = sweep.camera.lens;

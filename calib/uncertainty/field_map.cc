@@ -174,8 +174,8 @@ class Field {
     if (map.done) DescribeSurface(fitted);
   }
 
-  // zf = c + gx X + gy Y + q R^2, X and Y mm on the target. Tilt is seen only beside the curvature:
-  // without the quadratic term an off-centre field would pass for a tilted one.
+  // [D85] zf = c + gx X + gy Y + q R^2, X and Y mm on the target. Tilt is seen only beside the
+  // curvature: without the quadratic term an off-centre field would pass for a tilted one.
   void DescribeSurface(const std::vector<std::size_t>& fitted) {
     FieldMap& map = result_.field;
     const bool with_curvature = fitted.size() >= 6;

@@ -142,7 +142,7 @@ FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& 
   if (known.given_px) {
     const double px = known.given_px->value;
     const double sigma_px = known.given_px->sigma;
-    // Near 0 the square's own term counts: the variance of x^2 is 4 mu^2 s^2 + 2 s^4.
+    // Near 0 the square's own term counts [D82]: the variance of x^2 is 4 mu^2 s^2 + 2 s^4.
     choice.variance_px2 = model::Estimate{
         px * px, std::hypot(2 * px * sigma_px, std::sqrt(2.0) * sigma_px * sigma_px)};
   } else if (known.from_px) {

@@ -28,8 +28,8 @@ FloorChoice ChooseFloor(const model::FloorKnowledge& known, const BlurEvidence& 
 // (variance, px^2): least of
 //   ln(P(a)/P(b)) / (4 pi^2 (b^2 - a^2)) over frequencies a < b,
 // P the mean power in rings, noise taken off, each at the end of its two-sigma interval that makes
-// the bound larger. Derived here: P(nu) = S(nu) exp(-4 pi^2 sigma^2 nu^2), S(a) >= S(b). Nothing
-// where no ring stands out of the noise. Of the reference of the region.
+// the bound larger. Derived here [D81]: P(nu) = S(nu) exp(-4 pi^2 sigma^2 nu^2), S(a) >= S(b).
+// Nothing where no ring stands out of the noise. Of the reference of the region.
 std::optional<double> LargestBlurVariance(const SpectralMeterSetup& meter,
                                           const MeterRegion& region);
 

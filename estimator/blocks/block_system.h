@@ -49,7 +49,7 @@ class RayField {
   model::LightField prior_;
 };
 
-// The linear system of one block.
+// The linear system of one block, [M21] with a ridge.
 struct BlockSystem {
   kernels::BlockGeometry block;
   kernels::CsrMatrix<double> matrix;             // H^T H - gamma G + mu Id

@@ -10,7 +10,8 @@ namespace thicklens::estimator {
 // neighbouring samples across and down, ends free. Its eigenvectors are those of the discrete
 // cosine transform (DCT-II), to
 //   gamma (4 sin^2(pi i/(2 U)) + 4 sin^2(pi j/(2 V))) + mu;
-// derived here: a difference with free ends is one of a sequence that is mirrored at its ends.
+// derived here [D116]: a difference with free ends is one of a sequence that is mirrored at its
+// ends.
 template <typename Real>
 class AperturePrior {
  public:

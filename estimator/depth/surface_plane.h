@@ -26,7 +26,7 @@ struct SurfaceSample {
 // Least squares. In each of its two principal directions the slope b counts (1 - s^2/(b^2 S)) of
 // itself, at least 0: s^2 is the variance of the residuals, S the sum of squares of the positions,
 // so that what noise alone would give is no slope and an exact plane keeps its own (derived here,
-// after James and Stein). A direction in which the samples hardly spread, and fewer than six
+// [D95], after James and Stein). A direction in which the samples hardly spread, and fewer than six
 // samples, have none. There must be one sample.
 SurfacePlane FitSurfacePlane(const std::vector<SurfaceSample>& samples);
 

@@ -11,8 +11,8 @@
 
 namespace thicklens::estimator {
 
-// D on the grid, for a whole picture: the differences between the rays of a view and those of the
-// next view in u, and in v, that show the same points,
+// D on the grid [D111], for a whole picture: the differences between the rays of a view and those
+// of the next view in u, and in v, that show the same points,
 //   (D L)(i, k) = L(i + m, k + 1) - L(i, k),
 // m = -disparity * step in samples, linear between samples; the numbers of
 // kernels::Kernels::WarpDifferences with the slopes of RayField. There is no difference where the

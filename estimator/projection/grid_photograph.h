@@ -16,7 +16,7 @@ struct LandingRect {
 };
 LandingRect LandingIn(const kernels::BlockGeometry& picture, int k, int l);
 
-// H on the grid, for a whole picture: from the rays of a light field of one channel, views
+// H on the grid [M10], for a whole picture: from the rays of a light field of one channel, views
 // (l * u_count + k) * t_count * s_count + t * s_count + s, to the photograph,
 //   (H L)(x) = sum over rays of E w g L / sum over rays of w g,
 // w the weight of the view, g the share of the pixel in the ray (bilinear), E the irradiance; the

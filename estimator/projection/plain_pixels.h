@@ -25,7 +25,7 @@ struct PlainPixels {
 //   e = A G D/(1 - B H)  (down),  then  f = H (1 + B e + C D)/(1 - A G)  (across, a row beside it),
 // and misplaces the ray by at most B e and A f. C is 0, but for an even v_count half a view's step
 // down: there the axis is the mean of the two views beside the middle, which read so far above and
-// below. (Of an even u_count the two lie in the row itself, and e holds.) Derived here.
+// below. (Of an even u_count the two lie in the row itself, and e holds.) Derived here [D92].
 // `tolerance_px` must be below 1.
 PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_count,
                             double tolerance_px);

@@ -15,7 +15,7 @@ namespace thicklens::estimator {
 
 // H of a scene whose points look the same from everywhere: from the radiance r of the points that
 // the centre view shows to the photograph, each pixel a mean of what the views see through it:
-//   (H r)(x) = sum_k w_k r(x + s_k(x)), s_k the way from the view's sample to its source
+//   (H r)(x) = sum_k w_k r(x + s_k(x)) [D100], s_k the way from the view's sample to its source
 // (ViewDisparity), by the bilinear taps of the source that lie on its surface, and of mixed samples
 // by those of both surfaces. Rows sum to 1.
 // A pixel whose fan meets one surface only is computed by filters down and across the picture,
@@ -81,8 +81,8 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
                                           const ProjectionOptions& options);
 
 // That disparity from the one of the samples of a grid, for which a ray of the view a lands q a px
-// beside its sample: D - q per axis, D the displacement per view. Derived here: the sample i = p -
-// D a of the point p lands at i + q a. Throws Error if the axes ask for different offsets.
+// beside its sample: D - q per axis, D the displacement per view. Derived here [D20]: the sample i
+// = p - D a of the point p lands at i + q a. Throws Error if the axes ask for different offsets.
 DisparityMap PhotographDisparity(const DisparityMap& on_grid,
                                  const Eigen::Vector2d& landing_step_px);
 

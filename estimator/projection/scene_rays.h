@@ -63,7 +63,7 @@ class ViewRays {
 // view shows, toward the aperture sample k;
 //   (H R)(x) = sum_k w_k sum_taps t_k(x, p) R(p, k),
 // with the rays of SceneProjection and its taps for Between::kLinear: where all R(p, k) of a point
-// are equal, this is its photograph. Derived here.
+// are equal, this is its photograph. Derived here [D114].
 // A plane R(., k) stands at k * stride, k row by row of the aperture.
 template <typename Real>
 class SceneRays {

@@ -109,8 +109,8 @@ cv::Mat1d WindowMean(const cv::Mat& values) {
   return mean;
 }
 
-// (13) of Wang et al. 2004: (2 mu_a mu_b + C1)(2 s_ab + C2)/((mu_a^2 + mu_b^2 + C1)(s_a^2 + s_b^2 +
-// C2)) of each window, averaged; NaN if no window lies within the picture.
+// [L17], equation 13 of Wang et al. 2004: (2 mu_a mu_b + C1)(2 s_ab + C2)/((mu_a^2 + mu_b^2 +
+// C1)(s_a^2 + s_b^2 + C2)) of each window, averaged; NaN if no window lies within the picture.
 double MeanSsim(const cv::Mat1d& a, const cv::Mat1d& b, int border_px) {
   const cv::Rect inside = Inside(a.cols, a.rows, std::max(border_px, kSsimWindowPx / 2));
   if (inside.empty()) return kNone;
@@ -254,8 +254,8 @@ PictureScores ComparePictures(const StoredValues& reference, const StoredValues&
   return scores;
 }
 
-// CIE 116-1995: sqrt(dL^2 + (dC/(1 + .045 C1))^2 + (dH/(1 + .015 C1))^2), dH^2 = da^2 + db^2 -
-// dC^2, C1 the chroma of the reference.
+// [L18] CIE 116-1995: sqrt(dL^2 + (dC/(1 + .045 C1))^2 + (dH/(1 + .015 C1))^2), dH^2 = da^2 + db^2
+// - dC^2, C1 the chroma of the reference.
 double DeltaE94(const Eigen::Vector3d& reference_lab, const Eigen::Vector3d& lab) {
   const double reference_chroma = std::hypot(reference_lab.y(), reference_lab.z());
   const Eigen::Vector3d change = lab - reference_lab;

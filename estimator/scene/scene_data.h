@@ -30,7 +30,7 @@ model::LinearPicture Interleaved(const std::vector<Real>& planes, int width_px, 
 template <typename Real>
 std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
 
-// W of each pixel: s^2/(1 + (20 h)^2), h the share of the aperture that sees past an edge.
+// W of each pixel [D102]: s^2/(1 + (20 h)^2), h the share of the aperture that sees past an edge.
 template <typename Real>
 std::vector<Real> DataWeights(const std::vector<Real>& slope_squared,
                               const std::vector<float>& hidden_share, bool hidden_weights);

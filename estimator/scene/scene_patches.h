@@ -19,7 +19,7 @@ struct PatchPrior {
                                             // kLeastReliefSlope
 };
 
-// From `radiance` to that of Prior::kPatches:
+// From `radiance` to that of Prior::kPatches [D107]:
 //   1. r of total variation of strength lambda;
 //   2. G, the shading of the relief (see FitShading), from r and from what the quadratic that
 //      touches that prior at r makes of a photograph of the relief's normals. From here on u = r -
@@ -30,7 +30,7 @@ struct PatchPrior {
 //      less of it is needed, as the patches do the rest; where it does not, at hidden things, all;
 //   4. v, of which stored values are s G + FilterPatches of those of r less s G, its threshold
 //      8.1/255 (255 sigma)^.6, and r that minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
-//      rho = .15 (255 sigma)^.8: half-quadratic splitting (Zoran and Weiss 2011) cut short.
+//      rho = .15 (255 sigma)^.8: half-quadratic splitting (Zoran and Weiss 2011) [L14] cut short.
 // `system`: of the data, whose backend is `backend`; is used up. The iterations are those of all
 // systems together, the residual is that of the last, in u.
 template <typename Real>

@@ -16,7 +16,7 @@ constexpr double kVariationEps = 0.004;
 
 // The strength of a prior for a photograph with noise of that standard deviation in stored values.
 // A quadratic prior is to the data term as the variance of the noise is to that of what the prior
-// speaks of (derived here, from the most probable r of normal noise and a normal prior):
+// speaks of (derived here, [D104], from the most probable r of normal noise and a normal prior):
 //   mu = sigma^2/var(s (r - I)), eta = sigma^2/var(s grad r),
 // where the variances come from those of s (I - H I) and s grad I, less their noise. So a picture
 // with little blur gets a strong ridge. That of total variation is an empirical law,
@@ -42,7 +42,7 @@ template <typename Real>
 QuadraticPrior<Real> RidgePrior(const std::vector<Real>& slope_squared, double mu);
 template <typename Real>
 QuadraticPrior<Real> GradientPrior(const std::vector<Real>& slope_squared, double eta);
-// lambda sum (g + eps^2)^(1/2) + kLeastPull |r|^2, g = sum s^2 |dr|^2. Refers to the slopes.
+// [D103] lambda sum (g + eps^2)^(1/2) + kLeastPull |r|^2, g = sum s^2 |dr|^2. Refers to the slopes.
 template <typename Real>
 kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squared, double lambda);
 // The quadratic that touches it at a radiance, all channels of the data.

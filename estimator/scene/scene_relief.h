@@ -10,8 +10,8 @@ namespace thicklens::estimator {
 // The relief of a scene shows in its shading: the light that a surface sends on depends on which
 // way it faces, and where the light comes from far away and the paint does not change, by a linear
 // law of its normal (Lambert). So the depth tells fine folds that the photograph has lost to blur,
-// once what it shows still has told how they are lit. A guided filter (He, Sun and Tang 2010) whose
-// guide are the normals of the depth, and which learns on what both pictures show alike.
+// once what it shows still has told how they are lit. A guided filter (He, Sun and Tang 2010) [L15]
+// whose guide are the normals of the depth, and which learns on what both pictures show alike.
 
 // Which way surfaces face, of each pixel.
 constexpr int kNormals = 3;
@@ -52,8 +52,8 @@ struct ReliefShading {
 // R^2 = sum of a cov over the variance of all colours, the share that the fit explains. What is
 // lost to blur is next to the finest that is left: so the fit looks at that alone, and where the
 // depth has errors as large as its relief there, least squares makes a smaller by itself. The
-// shading is sum_k a_k (n_k - mean of estimated n_k), a averaged over the window. Derived here. The
-// result does not depend on `threads`.
+// shading is sum_k a_k (n_k - mean of estimated n_k), a averaged over the window. Derived here
+// [D108]. The result does not depend on `threads`.
 template <typename Real>
 ReliefShading<Real> FitShading(const Relief<Real>& relief, const std::vector<Real>& estimated,
                                const std::vector<Real>& radiance, int width_px, int height_px,

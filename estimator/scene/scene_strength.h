@@ -7,7 +7,7 @@
 
 namespace thicklens::estimator {
 
-// Generalised cross-validation (Golub, Heath, Wahba 1979):
+// Generalised cross-validation (Golub, Heath, Wahba 1979) [L12]:
 //   V = (|W^(1/2) (H r - I)|^2/n) / (1 - 1.4 tr(B)/n)^2,
 // B the matrix from W^(1/2) I to W^(1/2) H r. The factor 1.4 (Kim and Gu 2004) keeps it from too
 // weak a prior; where it leaves less than nothing, V is infinite. Up to a constant V estimates the

@@ -25,11 +25,11 @@ struct CgOutcome {
   bool converged = false;  // by the recurrence
 };
 
-// (H^T W H + P) r = b, P the matrix of the prior: the normal equations of data term and prior, with
-// b = H^T W I + pull target. Solved by conjugate gradients with the diagonal as preconditioner,
-// vectors in Real, sums in double; all channels together (one polynomial of A for all). The steps
-// are done where the backend is.
-// The result does not depend on the number of threads.
+// [D106] (H^T W H + P) r = b, P the matrix of the prior: the normal equations of data term and
+// prior, with b = H^T W I + pull target. Solved by conjugate gradients with the diagonal as
+// preconditioner, vectors in Real, sums in double; all channels together (one polynomial of A for
+// all). The steps are done where the backend is. The result does not depend on the number of
+// threads.
 template <typename Real>
 class SceneSystem {
  public:

@@ -37,8 +37,9 @@ std::vector<double> StoredSlopes(const model::LinearPicture& picture,
   if (smoothing_px > 0) {
     cv::GaussianBlur(smooth, smooth, {}, smoothing_px, smoothing_px, cv::BORDER_REPLICATE);
   }
-  // By a central difference of the curve: it has no formula for every kind. In the straight piece
-  // of sRGB and beyond it the step stays on one side of the bend but for a hundredth of the light.
+  // [D110] By a central difference of the curve: it has no formula for every kind. In the straight
+  // piece of sRGB and beyond it the step stays on one side of the bend but for a hundredth of the
+  // light.
   const double darkest = transfer.Decode(kDarkest);
   const auto slope = [&](double light) {
     const double at = std::clamp(light, darkest, 1.0);

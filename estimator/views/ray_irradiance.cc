@@ -18,8 +18,8 @@ double IrradianceOf(const model::Camera& camera, const model::LightFieldGrid& gr
   return model::RelativeIrradiance(camera.lens, camera.image_distance_mm(), grid.planes, ray);
 }
 
-// Of the ray of view (k, l) that lands at the principal point: P s = Q u by (16), so s = Q u/P; s =
-// 0 with ST in the plane of focus.
+// Of the ray of view (k, l) that lands at the principal point: P s = Q u by [S16], so s = Q u/P; s
+// = 0 with ST in the plane of focus.
 double IrradianceAtPrincipalPoint(const model::LightFieldGrid& grid, const model::Camera& camera,
                                   int k, int l) {
   const model::ProjectionCoefficients projection =
@@ -69,7 +69,7 @@ SquaredSlopes SlopesOnAxis(const model::LightFieldGrid& grid, const model::Camer
   return slopes;
 }
 
-// (12) for rows of rays. The tangent of an angle to the axis is the hypotenuse of those in the
+// [S12] for rows of rays. The tangent of an angle to the axis is the hypotenuse of those in the
 // planes of the two axes: tables of these are all that is needed.
 class RowIrradiance {
  public:

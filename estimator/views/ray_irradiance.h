@@ -13,11 +13,11 @@ namespace thicklens::estimator {
 // positive sum.
 void CheckViewWeights(const model::LightFieldGrid& grid, const Eigen::ArrayXXd& weights);
 
-// Relative irradiance, dimensionless, of every ray of the view (k, l), T x S row by row:
-// cos(alpha) cos^3(beta) of (12) over the same of the view's ray that lands at the principal point.
-// The calibrated blur is that of a point on the axis with its fall-off, and the weights of the
-// views carry it; so (12) adds only what changes from there. A uniform radiance 1 gives 1 at the
-// principal point. Throws Error for weights of another size than the grid's views (V x U), or
+// Relative irradiance [D29], dimensionless, of every ray of the view (k, l), T x S row by row:
+// cos(alpha) cos^3(beta) of [S12] over the same of the view's ray that lands at the principal
+// point. The calibrated blur is that of a point on the axis with its fall-off, and the weights of
+// the views carry it; so [S12] adds only what changes from there. A uniform radiance 1 gives 1 at
+// the principal point. Throws Error for weights of another size than the grid's views (V x U), or
 // without a positive sum.
 std::vector<float> RelativeFalloff(const model::LightFieldGrid& grid, const model::Camera& camera,
                                    const Eigen::ArrayXXd& weights, int k, int l);

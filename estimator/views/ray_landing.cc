@@ -22,7 +22,7 @@ void SetLanding(double step_px, int count, std::vector<int>* shift, std::vector<
 
 }  // namespace
 
-// x = cx - i_x/p with i_x = P s - Q u (16): the part of u is Q u/p.
+// x = cx - i_x/p with i_x = P s - Q u [S16]: the part of u is Q u/p.
 Eigen::Vector2d LandingStepPx(const model::Camera& camera, const model::LightFieldGrid& grid) {
   const double q = model::ProjectionOf(camera.lens, camera.image_distance_mm(), grid.planes).q;
   const double per_mm = q / camera.sensor.pixel_pitch_mm;

@@ -8,8 +8,8 @@
 
 namespace thicklens::estimator {
 
-// q = Q du/p per axis: px that a ray lands beside its sample, per view step. 0 where ST lies in the
-// plane of focus, also where rounding has left a trace of Q.
+// [D19] q = Q du/p per axis: px that a ray lands beside its sample, per view step. 0 where ST lies
+// in the plane of focus, also where rounding has left a trace of Q.
 Eigen::Vector2d LandingStepPx(const model::Camera& camera, const model::LightFieldGrid& grid);
 
 // The rays of a rectangle of pixels in plain numbers; `weights` (V x U) may be others than the

@@ -141,7 +141,7 @@ class Reference : public Kernels<Real> {
     return rays;
   }
 
-  // H(x, ray) = E(ray) H0(x, ray) / sum over rays of H0(x, ray), H0 = view weight * g.
+  // [M16]: H(x, ray) = E(ray) H0(x, ray) / sum over rays of H0(x, ray), H0 = view weight * g.
   EllMatrix<Real> WeighRays(const BlockGeometry& block, Splat splat,
                             const std::vector<std::int32_t>& rays,
                             const std::vector<Real>& irradiance) override {
@@ -166,7 +166,8 @@ class Reference : public Kernels<Real> {
     return h;
   }
 
-  // (D L)(i, k) = L(i + m, k + 1) - L(i, k) = (1 - w) L(i + n, k + 1) + w L(i + n + 1, k + 1)
+  // [D111] (D L)(i, k) = L(i + m, k + 1) - L(i, k) = (1 - w) L(i + n, k + 1) + w L(i + n + 1, k +
+  // 1)
   // - L(i, k), n = floor(m), w = m - n.
   EllMatrix<Real> WarpDifferences(const BlockGeometry& block, const std::vector<Real>& slope_u,
                                   const std::vector<Real>& slope_v) override {

@@ -28,7 +28,7 @@ Tap<Real> TapOf(Splat splat, double exact_fraction, int tap) {
   return {fraction > 0 ? -1 : 1, std::abs(fraction)};
 }
 
-// H0 = view weight * g for each slot of FindRays: the same for all pixels.
+// H0 = view weight * g of [M16] for each slot of FindRays: the same for all pixels.
 template <typename Real>
 std::vector<Real> SlotWeights(const BlockGeometry& block, Splat splat) {
   std::vector<Real> weights;

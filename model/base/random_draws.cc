@@ -39,7 +39,8 @@ RandomDraws::RandomDraws(std::uint64_t seed, Purpose purpose, std::uint32_t item
 
 double RandomDraws::Uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
 
-// Marsaglia's polar method: two independent normals from a point that is uniform in the unit disc.
+// Marsaglia's polar method [L5]: two independent normals from a point that is uniform in the unit
+// disc.
 double RandomDraws::Normal() {
   if (has_spare_) {
     has_spare_ = false;

@@ -21,7 +21,7 @@ struct AperturePoint {
 const std::vector<AperturePoint>& AperturePoints(Aperture aperture);
 
 // What rays through the points of an aperture bring to a position of the image of a uniform
-// radiance, each by (12) relative to what the same point of the aperture brings to the principal
+// radiance, each by [S12] relative to what the same point of the aperture brings to the principal
 // point: the calibrated blur of a point on the axis contains the fall-off there. Their mean, which
 // is 1 at the principal point, and each over that mean.
 struct Irradiance {

@@ -51,8 +51,8 @@ EffectOptics::Smoothing EffectOptics::SmoothingBy(const EffectSet& effects,
   return smoothing;
 }
 
-// Derived here, k the density of the added displacement d (mean 0, variance v per axis), L the
-// picture with range R, I = k * L:
+// Derived here [D48], k the density of the added displacement d (mean 0, variance v per axis), L
+// the picture with range R, I = k * L:
 //   |I - L| <= R
 //   |I - L| <= 1/2 v sup(|L_xx| + |L_yy|)                 Taylor; the mean of d vanishes
 //   |I - L| <= E|d| sup|grad L|, E|d| <= sqrt(2 v)        Jensen
@@ -84,9 +84,9 @@ double BlurChange(const EffectPlace& place, double variance_px2,
   return change;
 }
 
-// |L(x + d) - L(x)| <= |d| sup|grad L| and, at a jump that a box has made a ramp, sqrt(2) J |d|;
-// after a Gaussian blur of variance g at most R |d|/sqrt(2 pi g), after a disc of radius b R |d|
-// 2/(pi b): the most that an edge has.
+// |L(x + d) - L(x)| <= |d| sup|grad L| and, at a jump [D49] that a box has made a ramp, sqrt(2) J
+// |d|; after a Gaussian blur of variance g at most R |d|/sqrt(2 pi g), after a disc of radius b R
+// |d| 2/(pi b): the most that an edge has.
 double ShiftChange(const EffectPlace& place, double shift_px,
                    const EffectOptics::Smoothing& other) {
   const double range = Range(place);

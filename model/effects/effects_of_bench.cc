@@ -32,8 +32,8 @@ double ChangeByDepth(const EffectOptics& optics, const EffectPlace& place, doubl
 
 }  // namespace
 
-// Lamp fall-off. Formula: a lamp at the camera lights a target at z with (zf/z)^2 of what it does
-// in the plane of focus. Bound: the scaling of the brightest. Enters: a factor of each frame.
+// Lamp fall-off [D55]. Formula: a lamp at the camera lights a target at z with (zf/z)^2 of what it
+// does in the plane of focus. Bound: the scaling of the brightest. Enters: a factor of each frame.
 EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectPlace& place,
                                const EffectSet& /*others*/) {
   const auto& bench = optics.conditions().bench;

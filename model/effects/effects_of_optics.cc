@@ -16,8 +16,8 @@ double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
                   std::abs(optics.DefocusPx(place.other_depth_mm.value_or(place.depth_mm))));
 }
 
-// What weights of the aperture's rays change of a picture, stored: `weights` over the points, less
-// 1, of standard deviation s. It is their covariance with what different rays see, whose own
+// [D50] What weights of the aperture's rays change of a picture, stored: `weights` over the points,
+// less 1, of standard deviation s. It is their covariance with what different rays see, whose own
 // standard deviation is at most sqrt((I - dark)(bright - I)) where they see I in the mean, and at
 // most what their displacement by defocus changes.
 double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aperture aperture,
@@ -72,7 +72,7 @@ double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
 
 }  // namespace
 
-// Thickness. Formula: (13), (25), (26) depend on the lens through f1 and zf alone, since
+// Thickness [D7]. Formula: [S13], [S25], [S26] depend on the lens through f1 and zf alone, since
 // f1 D/f2 = K = f1 zf/(zf - f1): the thin lens f1 that is focused on the same plane puts every ray
 // in the same place. Its image distance is another, K instead of d1, and with it cos(beta).
 // Bound: the ratio of both irradiances, and of their weights of the rays. Enters: the camera is
@@ -93,9 +93,9 @@ EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& plac
                                 WeighingChange(optics, place, aperture, thick.over_mean, others)};
 }
 
-// Defocus. Formula: sigma = kappa r |c(z)|/p, (25), (26). Bound: BlurChange of its variance, and
-// what the whole aperture does to the fall-off. Enters: rays go through the whole aperture instead
-// of its middle.
+// Defocus. Formula: sigma = kappa r |c(z)|/p [D4], [S25], [S26]. Bound: BlurChange of its variance,
+// and what the whole aperture does to the fall-off. Enters: rays go through the whole aperture
+// instead of its middle.
 EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
                            const EffectSet& others) {
   const double sigma_px = SigmaPx(optics, place);
@@ -107,8 +107,8 @@ EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
 }
 
 // Aperture shape. Formula: a disc of radius 2 sigma against a Gaussian of sigma, the same second
-// moments. Bound, derived here, D the difference of both and A(r) that of their light within r,
-// min(r^2/(4 sigma^2), 1) - 1 + exp(-r^2/(2 sigma^2)): with psi' = A/(2 pi r), so that D is the
+// moments. Bound, derived here [D51], D the difference of both and A(r) that of their light within
+// r, min(r^2/(4 sigma^2), 1) - 1 + exp(-r^2/(2 sigma^2)): with psi' = A/(2 pi r), so that D is the
 // Laplacian of psi, the change D * L is at most
 //   1/2 integral |D| R = 0.289 R                      for any picture of range R
 //   integral |psi'| sup|grad L| = 0.222 sigma slope
@@ -133,7 +133,7 @@ EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& 
           of_falloff};
 }
 
-// Fall-off. Formula: (12), cos(alpha) cos^3(beta), 1 at the principal point by exposure. Bound:
+// Fall-off. Formula: [S12], cos(alpha) cos^3(beta), 1 at the principal point by exposure. Bound:
 // its mean over the aperture scales what is seen; its deviations from that mean weigh what
 // different rays see. Enters: a weight of each ray.
 EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
@@ -147,10 +147,10 @@ EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
               WeighingChange(optics, place, aperture, irradiance.over_mean, others)};
 }
 
-// Vignetting. Formula: (10), rays of directional samples at u cross the aperture at
+// Vignetting. Formula: [S10], rays of directional samples at u cross the aperture at
 // a = ((zl + d0) u - zl s)/d0: for zl != 0 the bundle of a pixel at s wanders over the aperture by
 // zl s/d0, in standard deviations of its transmission w. Bound: the light of a Gaussian and the
-// same one displaced by w that they do not share is erf(w/(2 sqrt(2))), which weighs what
+// same one displaced by w that they do not share is erf(w/(2 sqrt(2))) [D52], which weighs what
 // different rays see; the bundle's own weights are normalised. Enters: weights of the views that
 // depend on the pixel.
 EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& place,
@@ -169,7 +169,7 @@ EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& pla
   return {lost, StoredChange(optics, place, lost * (place.bright - place.dark))};
 }
 
-// Occlusion. Formula: the parallax between both sides of an edge of depth, kappa r |c(z1) -
+// Occlusion [D53]. Formula: the parallax between both sides of an edge of depth, kappa r |c(z1) -
 // c(z2)|/p for each standard deviation of the aperture. Bound: rays that are carried past the edge
 // see another surface: as at a jump of the height of the range, BlurChange of that parallax.
 // Enters: each ray is traced to what it meets first.

@@ -18,9 +18,9 @@ double RoundingStep(const EffectOptics& optics) {
 
 }  // namespace
 
-// Pixel box. Formula: mean over a square of one px, of variance 1/12 per axis. Bound: BlurChange;
-// at a jump, which no box has made a ramp yet, up to 3/4 of it (the tip of a right angle has a
-// quarter of its pixel). Enters: where rays land.
+// Pixel box [D54]. Formula: mean over a square of one px, of variance 1/12 per axis. Bound:
+// BlurChange; at a jump, which no box has made a ramp yet, up to 3/4 of it (the tip of a right
+// angle has a quarter of its pixel). Enters: where rays land.
 EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place,
                             const EffectSet& others) {
   EffectPlace smooth = place;
@@ -79,10 +79,10 @@ EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& pl
   return {radius_px, StoredChange(optics, place, std::min(range, change))};
 }
 
-// Shot noise. Formula: Poisson of L n electrons, n at full scale: sd sqrt(L/n) in linear light.
-// Bound: what that is in stored values, which grows where the transfer curve is straight, near
-// black, and falls where it is a power of at most 1/2; looked at where these meet, too. Enters:
-// after the picture is formed.
+// Shot noise [D54]. Formula: Poisson of L n electrons, n at full scale: sd sqrt(L/n) in linear
+// light. Bound: what that is in stored values, which grows where the transfer curve is straight,
+// near black, and falls where it is a power of at most 1/2; looked at where these meet, too.
+// Enters: after the picture is formed.
 EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& /*others*/) {
   const double full_well = optics.conditions().full_well_electrons;
@@ -114,8 +114,8 @@ EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectPlace& plac
   return {sigma, sigma};
 }
 
-// Quantisation. Formula: rounding to 1/(2^bits - 1), an error of standard deviation 1/sqrt(12) of
-// that. Enters: last of all.
+// Quantisation [D54]. Formula: rounding to 1/(2^bits - 1), an error of standard deviation
+// 1/sqrt(12) of that. Enters: last of all.
 EffectImpact QuantisationImpact(const EffectOptics& optics, const EffectPlace& /*place*/,
                                 const EffectSet& /*others*/) {
   const double sigma = RoundingStep(optics) * std::sqrt(kBoxVariance);

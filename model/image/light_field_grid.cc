@@ -59,9 +59,9 @@ double StepMm(double sigma_mm, double second_moment) {
 
 }  // namespace
 
-// (17): P = [zl (D - f2) - f1 D]/(d0 f2). (18): Q = [(zl + d0)(D - f2) - f1 D]/(d0 f2). In terms of
-// c(z): P = -zl c(zl)/d0, Q = -(zl + d0) c(zl + d0)/d0; hence Q = 0 with ST in the plane of focus.
-// The products are kept whole: c itself is infinite at zl = 0, where P is not.
+// [S17]: P = [zl (D - f2) - f1 D]/(d0 f2). [S18]: Q = [(zl + d0)(D - f2) - f1 D]/(d0 f2). In terms
+// of c(z): P = -zl c(zl)/d0, Q = -(zl + d0) c(zl + d0)/d0; hence Q = 0 with ST in the plane of
+// focus. The products are kept whole: c itself is infinite at zl = 0, where P is not.
 ProjectionCoefficients ProjectionOf(const ThickLens& lens, double image_distance_mm,
                                     const LightFieldPlanes& planes) {
   CheckPlanes(planes);
@@ -80,8 +80,8 @@ Eigen::Vector2d LandingPointMm(const ThickLens& lens, double image_distance_mm,
   return {k.p * ray.s_mm - k.q * ray.u_mm, k.p * ray.t_mm - k.q * ray.v_mm};
 }
 
-// (14) gives the crossing x_f with the plane of focus; then, by similar triangles at the nodal
-// points, i_x = -(D - f2 + f1)/(zf - f1 + f2) x_f.
+// [S14] gives the crossing x_f with the plane of focus; then, by similar triangles at the nodal
+// points, i_x = -(D - f2 + f1)/(zf - f1 + f2) x_f [S15].
 Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens, double image_distance_mm,
                                             const LightFieldPlanes& planes, const Ray& ray) {
   const double focus_depth_mm = FocusDepthMm(lens, image_distance_mm);
@@ -96,7 +96,7 @@ Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens, double image_
   return -sensor_to_nodal_mm / object_to_nodal_mm * PositionAtDepthMm(planes, ray, focus_depth_mm);
 }
 
-// (10): a_u = [(zl + d0) u - zl s]/d0, which is the ray's position at depth 0.
+// [S10]: a_u = [(zl + d0) u - zl s]/d0, which is the ray's position at depth 0.
 Eigen::Vector2d ApertureCrossingMm(const LightFieldPlanes& planes, const Ray& ray) {
   return PositionAtDepthMm(planes, ray, 0);
 }
@@ -119,14 +119,14 @@ Eigen::Vector2d PicturePositionPx(const Sensor& sensor, const Eigen::Vector2d& l
   return sensor.principal_point_px - landing_mm / sensor.pixel_pitch_mm;
 }
 
-// (8) has zl/sqrt((a_u - u)^2 + (a_v - v)^2 + zl^2), 0/0 at zl = 0. With (10), a_u - u =
+// [S8] has zl/sqrt((a_u - u)^2 + (a_v - v)^2 + zl^2), 0/0 at zl = 0. With [S10], a_u - u =
 // zl (u - s)/d0: zl cancels.
 double CosAlpha(const LightFieldPlanes& planes, const Ray& ray) {
   CheckPlanes(planes);
   return 1 / std::sqrt(1 + SquaredSlope(planes, ray));
 }
 
-// (9): d1/sqrt((i_x - a_u)^2 + (i_y - a_v)^2 + d1^2). Erratum kept: the ray that meets Ap at
+// [S9]: d1/sqrt((i_x - a_u)^2 + (i_y - a_v)^2 + d1^2). Erratum kept: the ray that meets Ap at
 // (a_u, a_v) leaves the REAR principal plane at that height, D = d1 - rho in front of the sensor.
 // Exact at rho = 0.
 double CosBeta(const ThickLens& lens, double image_distance_mm, const LightFieldPlanes& planes,
@@ -349,7 +349,7 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
 
   const double p = ProjectionOf(camera.lens, image_distance_mm, planes).p;
   // A ray through the point on the axis in focus has s = -u (zl + d0 - zf)/(zf - zl), and so, by
-  // (10), crosses the aperture at a = u zf/(zf - zl). Derived here; zf may be infinite.
+  // [S10], crosses the aperture at a = u zf/(zf - zl). Derived here [D15]; zf may be infinite.
   const double uv_per_aperture = 1 - planes.uv_depth_mm / focus_depth_mm;
 
   LightFieldGrid grid;

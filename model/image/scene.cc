@@ -121,7 +121,7 @@ class DepthConverter {
       case DepthKind::kDisparity:
         break;
     }
-    // 1/z = 1/zf + d p/(da K), from d = da c(z)/p with c = K (1/z - 1/zf).
+    // 1/z = 1/zf + d p/(da K), from d = da c(z)/p [D17] with c = K (1/z - 1/zf).
     const double disparity_px =
         convention_.disparity_scale * value + convention_.disparity_offset_px;
     const double inverse_per_mm = inverse_focus_per_mm_ + disparity_px * inverse_per_px_;
@@ -129,7 +129,7 @@ class DepthConverter {
   }
 
  private:
-  // sqrt(1 + (t p/K)^2): the chief ray of a pixel t px from the principal point has the slope
+  // [D18] sqrt(1 + (t p/K)^2): the chief ray of a pixel t px from the principal point has the slope
   // t p/K in front of the lens.
   double RangeOverDepth(int x, int y) const {
     const Eigen::Vector2d slope = (Eigen::Vector2d(x, y) - principal_point_px_) / focal_scale_px_;

@@ -28,9 +28,9 @@ struct Rule {
   Eigen::ArrayXd at, weight;
 };
 
-// After Golub and Welsch (1969), from the recurrence of the orthogonal polynomials. Half of A^2 of
-// a Gaussian has the density exp(-x): Laguerre's. A^2 of a disc of radius 2 is uniform from 0 to 4:
-// Legendre's.
+// After Golub and Welsch (1969) [L3], from the recurrence of the orthogonal polynomials. Half of
+// A^2 of a Gaussian has the density exp(-x): Laguerre's. A^2 of a disc of radius 2 is uniform from
+// 0 to 4: Legendre's.
 Rule GaussRule(Psf psf, int nodes) {
   Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(nodes), beside(nodes - 1);
   for (int k = 1; k < nodes; ++k)
@@ -242,8 +242,8 @@ double PupilProfile::Sum(double x) const {
   return sum;
 }
 
-// Integration by parts of H = integral of p(u) J0(x sqrt(u)) du from 0 to R^2, again and again:
-// the sum over k of (-1)^k 2^(k + 1) p^(k)(R^2) R^(k + 1) J_(k+1)(x R)/x^(k + 1).
+// [D26] Integration by parts of H = integral of p(u) J0(x sqrt(u)) du from 0 to R^2, again and
+// again: the sum over k of (-1)^k 2^(k + 1) p^(k)(R^2) R^(k + 1) J_(k+1)(x R)/x^(k + 1).
 double PupilProfile::TransferOfEdge(double x) const {
   const double r = edge_.radius, at = x * r, per_x = r / x;
   return per_x * (2 * edge_.density * ::j1(at) +

@@ -108,15 +108,15 @@ double ImageDistanceSlope(const ThickLens& lens, double focus_depth_mm) {
          (lens.front_focal_length_mm / past_focal_point_mm);
 }
 
-// f1 D/f2, from (13): zf - f1 = f1 f2/(D - f2), so that f1 zf/(zf - f1) = f1 D/f2. This form needs
+// f1 D/f2, from [S13]: zf - f1 = f1 f2/(D - f2), so that f1 zf/(zf - f1) = f1 D/f2. This form needs
 // no zf and is finite for a focus at infinity, where D = f2 gives f1.
 double DefocusScaleMm(const ThickLens& lens, double image_distance_mm) {
   return lens.front_focal_length_mm * RearDistanceMm(lens, image_distance_mm) /
          lens.rear_focal_length_mm;
 }
 
-// (26)/(25) divided through by z: c = K/z - (D - f2)/f2. Same numbers, and a point at infinity has
-// the finite value -(D - f2)/f2.
+// [S26]/[S25] divided through by z: c = K/z - (D - f2)/f2. Same numbers, and a point at infinity
+// has the finite value -(D - f2)/f2.
 double DefocusPerAperture(const ThickLens& lens, double image_distance_mm, double depth_mm) {
   CheckDepth(depth_mm);
   const double rear_distance_mm = RearDistanceMm(lens, image_distance_mm);

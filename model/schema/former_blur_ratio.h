@@ -7,10 +7,10 @@
 namespace thicklens::model {
 
 // Camera files of the schema thicklens/camera/1 hold the blur ratio of an aperture before the
-// fall-off (12) narrowed its blur; since thicklens/camera/2 it is that of the blur itself.
+// fall-off [S12] narrowed its blur; since thicklens/camera/2 it is that of the blur itself.
 
-// The square of the blur's own ratio, kappa^2 E[w A_x^2]/(E[w] sigma^2) with sigma = kappa r, the
-// mean E over the aperture's transmission and, on the axis,
+// [D28] The square of the blur's own ratio, kappa^2 E[w A_x^2]/(E[w] sigma^2) with sigma = kappa r,
+// the mean E over the aperture's transmission and, on the axis,
 //   w = (1 + |A|^2/zf^2)^(-1/2) (1 + |A|^2/d1^2)^(-3/2),
 // by Gauss's rules in A^2, to 1e-6 for sigma below d1/4. Needs zf > f1, kappa >= 0.
 struct BlurRatioOfBlur {

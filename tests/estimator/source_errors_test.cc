@@ -71,7 +71,8 @@ Eigen::Index RankOf(const Eigen::MatrixXd& matrix) {
   return lu.rank();
 }
 
-// Supplement, section 3: "H has linearly independent columns, then it is invertible" (H^t H).
+// Supplement, section 3, [S19], [S20], [S21]: "H has linearly independent columns, then it is
+// invertible" (H^t H).
 TEST(SourceErrors, WithGammaZeroTheRankIsThatOfThePicture) {
   const BlockGeometry block = Block(6, 5, 3, 3);
   const Eigen::MatrixXd h = ProjectionH(block);
@@ -79,8 +80,9 @@ TEST(SourceErrors, WithGammaZeroTheRankIsThatOfThePicture) {
   EXPECT_EQ(RankOf(h.transpose() * h), 30);
 }
 
-// Supplement, section 3: "the matrix -G ... gives a matrix of rank six. Moreover, this matrix is
-// non-singular." Nothing beyond six unknowns can be both; with free ends it is neither.
+// Supplement, section 3, [S22] and [S24]: "the matrix -G ... gives a matrix of rank six. Moreover,
+// this matrix is non-singular." Nothing beyond six unknowns can be both; with free ends it is
+// neither.
 TEST(SourceErrors, GIsNeitherOfRankSixNorRegular) {
   const BlockGeometry block = Block(6, 5, 3, 3);
   for (const double slope : {0.0, 0.5, 1.0}) {

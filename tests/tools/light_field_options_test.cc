@@ -215,7 +215,7 @@ TEST(PrepareDepth, TheStepOfADisparityIsTakenOnTheAperture) {
   const model::Camera camera = SmallCamera();
   const double st_depth_mm = camera.focus_depth_mm();
   const model::LightFieldGrid grid = model::GridOnPlanes(camera, {-800, st_depth_mm + 800}, 3, 3);
-  const double aperture_step_mm = grid.u_step_mm * st_depth_mm / (st_depth_mm + 800);  // (10)
+  const double aperture_step_mm = grid.u_step_mm * st_depth_mm / (st_depth_mm + 800);  // [S10]
   const double depth_mm = 700;
   const auto disparity_px =
       static_cast<float>(model::DisparityPx(camera, aperture_step_mm, depth_mm));

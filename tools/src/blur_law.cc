@@ -73,7 +73,7 @@ double BlurLaw::SigmaPx(double depth_mm) const {
 }
 
 // With the signed q = r c(z)/p and c(z) = [f1 D - (D - f2) z]/(f2 z): sigma^2 = S0 + (kappa q)^2,
-// so that d sigma/d z = kappa^2 q dq/dz / sigma, dc/dz = -f1 D/(f2 z^2) (derived here).
+// so that d sigma/d z = kappa^2 q dq/dz / sigma, dc/dz = -f1 D/(f2 z^2) (derived here, [D88]).
 double BlurLaw::SlopePxPerMm(double depth_mm) const {
   const model::ThickLens& lens = sweep_->camera.lens;
   const double sigma_px = SigmaPx(depth_mm);
@@ -85,9 +85,9 @@ double BlurLaw::SlopePxPerMm(double depth_mm) const {
          sweep_->camera.sensor.pixel_pitch_mm / sigma_px;
 }
 
-// Derivatives of sigma, besides that along z, through which the offset acts (derived here): by
-// kappa kappa q^2/sigma, by the floor floor/sigma, by d1 kappa^2 q dq/dD / sigma with dc/dD
-// = (f1 - z)/(f2 z).
+// Derivatives of sigma, besides that along z, through which the offset acts (derived here, [D88]):
+// by kappa kappa q^2/sigma, by the floor floor/sigma, by d1 kappa^2 q dq/dD / sigma with dc/dD =
+// (f1 - z)/(f2 z).
 std::optional<double> BlurLaw::SigmaErrorPx(double depth_mm) const {
   const double sigma_px = SigmaPx(depth_mm);
   if (!covariance_ || !(sigma_px > 0)) return std::nullopt;

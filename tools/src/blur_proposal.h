@@ -35,9 +35,9 @@ class BlurProposal {
 };
 
 // Depth of the plane of focus, mm, for which every disparity is `offset_px` larger than with the
-// camera's. With d(z) = da K (1/z - 1/zf)/p: 1/zf' = 1/zf - offset p/(da K); derived here. p: pixel
-// pitch, da: aperture step of a view, mm, both of the axis of the larger step. Infinity if what is
-// in focus then would lie behind it; K is taken to be the camera's.
+// camera's. With d(z) = da K (1/z - 1/zf)/p: 1/zf' = 1/zf - offset p/(da K); derived here [D21]. p:
+// pixel pitch, da: aperture step of a view, mm, both of the axis of the larger step. Infinity if
+// what is in focus then would lie behind it; K is taken to be the camera's.
 double FocusDepthForOffsetMm(const estimator::EstimateInput& input, double offset_px);
 
 }  // namespace thicklens::tools

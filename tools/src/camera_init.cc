@@ -68,7 +68,7 @@ void DescribeLens(const CameraDescription& given, const Known& focal, const Know
   lens.lens_thickness_mm =
       Take(*GivenOr(given.lens_thickness_mm, 0.0), "lens.lens_thickness_mm", camera);
   // The f-number N is the focal length over the diameter of the entrance pupil, which is taken for
-  // the aperture on the front principal plane: r = f1/(2 N), mm.
+  // the aperture on the front principal plane: r = f1/(2 N), mm [D9].
   const Known radius{focal.value / (2 * f_number.value), focal.assumed || f_number.assumed};
   lens.aperture_radius_mm = Take(radius, "lens.aperture_radius_mm", camera);
 }

@@ -15,8 +15,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kDepthOfFieldRadiiPx[] = {0.5, 1};
 
-// r_defocus, mm on the sensor: (25), (26); for a point at infinity their limit r (D - f2)/f2, from
-// c(z) = f1 D/(f2 z) - (D - f2)/f2. D is measured from the rear principal plane.
+// r_defocus, mm on the sensor: [S25], [S26]; for a point at infinity their limit r (D - f2)/f2,
+// from c(z) = f1 D/(f2 z) - (D - f2)/f2. D is measured from the rear principal plane.
 double RadiusMm(const model::ThickLens& lens, double image_distance_mm, double depth_mm) {
   if (std::isfinite(depth_mm)) return model::BlurRadiusMm(lens, image_distance_mm, depth_mm);
   const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;
@@ -74,7 +74,7 @@ double FarthestCornerPx(const model::Sensor& sensor) {
 }
 
 // c(z) is f1 D/(f2 z) - (D - f2)/f2, of the thin lens d1/z - (d1 - f1)/f1, and both are 1 at z =
-// f1: they part by |b| (1 - f1/z), b = D/f2 - d1/f1. Derived here.
+// f1: they part by |b| (1 - f1/z), b = D/f2 - d1/f1. Derived here [D8].
 double ThinUpToMm(const model::Camera& camera, double image_distance_mm) {
   const model::ThickLens& lens = camera.lens;
   const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;

@@ -89,7 +89,7 @@ double FocusError(const HardCamera& camera, const nlohmann::json& focus_depth_mm
 }
 
 // `explain` between two depths, its blur radii against the ray trace: the largest difference, each
-// over its own radius or the aperture's, whichever is larger; and the plane of focus against (13)
+// over its own radius or the aperture's, whichever is larger; and the plane of focus against [S13]
 // in long double, over what rounding of D makes of it.
 HardRun ExplainBetween(const HardCamera& camera, const std::string& depths,
                        const std::string& file = kCameraFile) {

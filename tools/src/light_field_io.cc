@@ -362,7 +362,7 @@ void ForEachView(const model::LightField& light_field,
 // What the benchmark's tools compute with, where it is known. Their cameras are pinholes, for which
 // d = baseline_mm focal_length_mm (1/z - 1/zf) image_resolution_px/sensor_size_mm: with the focal
 // length K = f1 zf/(zf - f1), the scale of chief rays, and the step between views on the aperture
-// as the baseline, this is d(z) = da K (1/z - 1/zf)/p. Derived here.
+// as the baseline, this is d(z) = da K (1/z - 1/zf)/p. Derived here [D22].
 std::string HciParameters(const model::LightField& light_field) {
   const double larger_side_px = std::max(light_field.s_count, light_field.t_count);
   std::string intrinsics, extrinsics;

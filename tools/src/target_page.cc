@@ -144,8 +144,8 @@ Feature FeatureForCamera(const CameraView& view, double finest_mm) {
     return {finest_mm, InPixels(finest_mm, view) + ", the finest that is printed"};
   }
   // The distance from which the finest printed feature is at most six px of pitch p: in the plane
-  // of focus m = f1/(zf - f1), from (13), so that zf >= f1 (1 + feature/(6 p)), and with px_mm =
-  // p/m at the distance asked for: zf - f1 grows as px_mm does.
+  // of focus m = f1/(zf - f1), from [S13], so that zf >= f1 (1 + feature/(6 p)) [D47], and with
+  // px_mm = p/m at the distance asked for: zf - f1 grows as px_mm does.
   const double farther_mm = view.focal_length_mm + (view.distance_mm - view.focal_length_mm) *
                                                        finest_mm / (kMostFeaturePx * view.px_mm);
   throw Error(

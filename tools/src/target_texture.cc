@@ -118,7 +118,7 @@ std::vector<Leaf> DeadLeaves(const TargetPage& page) {
   for (int count = 0; openings.OpenPart() > kOpenAtEnd; ++count) {
     if (count % kTriesPerLook == 0) ThrowIfInterrupted();
     // r = (rmin^-2 - q (rmin^-2 - rmax^-2))^(-1/2), q uniform: the inverse of the distribution
-    // function of the density ~ r^-3 between rmin and rmax, derived here.
+    // function of the density ~ r^-3 between rmin and rmax, derived here [D46].
     Leaf leaf;
     leaf.radius_mm = 1 / std::sqrt(small_term - draws.Uniform() * (small_term - large_term));
     // Also from beyond the sides, so that the texture there is as in the middle.

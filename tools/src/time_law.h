@@ -30,8 +30,8 @@ struct TimedLoad {
   PartSeconds parts;   // none below 0, together no more than the whole
 };
 
-// Seconds of a run from when its files are read, as a sum of terms, none of them negative. Pixels
-// are in millions.
+// Seconds of a run from when its files are read [D120], as a sum of terms, none of them negative.
+// Pixels are in millions.
 class TimeLaw {
  public:
   // In the order of the profile's file, whose schema changes with it. s: the blur's sigma in px.

@@ -19,11 +19,11 @@ struct ApertureBox {
 // chief position x', px, bilinear between pixel centres and beyond the outermost as there. A sheet
 // of rubber: across an edge of depth it is stretched from one pixel to the next.
 //
-// Depth is told as shift V = K/p (1/z - 1/zf), px per mm of aperture: what lies at x' is shown at
-// x' - A V by rays through aperture position A (from X(z) of SceneSimulator, whose chief position
-// is cx + K/p X(z)/z). The ray (x, A) passes the chief position x + A V at the shift V, and meets
-// the sheet where V = V(x + A V): on each cell between four pixels the root of a quadratic
-// equation.
+// Depth is given as a shift V = K/p (1/z - 1/zf) [D41], px per mm of aperture: what lies at x' is
+// shown at x' - A V by rays through aperture position A (from X(z) of SceneSimulator, whose chief
+// position is cx + K/p X(z)/z). The ray (x, A) passes the chief position x + A V at the shift V,
+// and meets the sheet where V = V(x + A V): on each cell between four pixels the root of a
+// quadratic equation.
 class HeightField {
  public:
   // Depths in mm, > 0, rows top to bottom; K/p in px.

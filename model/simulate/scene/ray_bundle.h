@@ -32,7 +32,7 @@ struct ChiefHit {
 };
 
 // The rays of a pixel of a photograph, less its centre's chief ray, and what they meet. A ray
-// (A, t + d) meets the plane z0 + g . X at z, the chief ray (0, t) at zc; derived here:
+// (A, t + d) meets the plane z0 + g . X at z, the chief ray (0, t) at zc; derived here [D39]:
 //   z - zc = (g . A + zc g . d)/(1 - g . t - g . d),
 //   X - Xc = (A + z0 d) + (z - z0) d + (z - zc) t.
 // Being differences, they lose nothing that matters in float. Height fields are searched ray by

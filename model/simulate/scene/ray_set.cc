@@ -19,8 +19,8 @@ constexpr double kAiryRadii = 50;
 // Share of a standard normal distribution below x.
 double NormalBelow(double x) { return std::erfc(-x / std::sqrt(2.0)) / 2; }
 
-// Share below x of a box of width 1 around 0 convolved with a Gaussian: the difference, over the
-// box, of the Gaussian's twice integrated density, sigma^2 g(x) + x Phi(x/sigma). Without the
+// [D35] Share below x of a box of width 1 around 0 convolved with a Gaussian: the difference, over
+// the box, of the Gaussian's twice integrated density, sigma^2 g(x) + x Phi(x/sigma). Without the
 // Gaussian the box itself.
 double PixelBelow(double x, double sigma) {
   const auto integral = [sigma](double at) {

@@ -14,7 +14,7 @@ struct SamplingSpread {
   double irradiance = 0;  // relative sd of what rays through the aperture bring
 };
 
-// Rms error of stored values, 255 at full scale, of pixels that are the mean of `rays` rays.
+// [D45] Rms error of stored values, 255 at full scale, of pixels that are the mean of `rays` rays.
 // Measured with the sets of ray_set.h on leaves, noise and edges: of 16 rays
 //   E = hypot(.02 slope landing, min(.06 slope defocus, .04 range), min(.1 slope airy, .05 range)),
 // or of a place with jumps hypot(.026 range, min(.065 jump defocus, .08 range)), falling as

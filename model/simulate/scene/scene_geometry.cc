@@ -205,8 +205,8 @@ void SceneGeometry::CheckPlane(const std::string& place, const PlaneOptions& pla
   }
 }
 
-// The largest px on the plane, mm: with X = z t along the chief ray of slope t, the step per px
-// is p/K times dX/dt = z 1 + z^2/z0 t g^T, whose norm is at most z + z^2/z0 |t| |g|.
+// [D40] The largest px on the plane, mm: with X = z t along the chief ray of slope t, the step per
+// px is p/K times dX/dt = z 1 + z^2/z0 t g^T, whose norm is at most z + z^2/z0 |t| |g|.
 double SceneGeometry::CoarsestPixelMm(const PlaneOptions& plane) const {
   double largest_mm = 0;
   for (const Eigen::Vector2d& corner_px : WholePicture().Corners()) {

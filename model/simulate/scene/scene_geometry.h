@@ -28,8 +28,8 @@ struct SceneRay {
   Eigen::Vector2d PositionMm(double depth_mm) const { return aperture_mm + depth_mm * slope; }
 };
 
-// z of the ray with z = z0 + g . (A + slope z), derived here: (z0 + g . A)/(1 - g . slope). A plane
-// that has passed CheckPlane is met by every ray.
+// z of the ray with z = z0 + g . (A + slope z), derived here [D38]: (z0 + g . A)/(1 - g . slope). A
+// plane that has passed CheckPlane is met by every ray.
 inline double HitDepthMm(const PlaneOptions& plane, const SceneRay& ray) {
   return (plane.depth_mm + plane.slope.dot(ray.aperture_mm)) / (1 - plane.slope.dot(ray.slope));
 }

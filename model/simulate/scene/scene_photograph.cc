@@ -139,7 +139,7 @@ ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& r
     const Eigen::Vector2d behind_mm = sensor.pixel_pitch_mm * ray.offset_px + aperture_mm;
     behind_x(i) = static_cast<float>(behind_mm.x());
     behind_y(i) = static_cast<float>(behind_mm.y());
-    // The blur of a point on the axis is that of the calibration, fall-off included: (12) counts
+    // The blur of a point on the axis is that of the calibration, fall-off included: [S12] counts
     // relative to what the same part of the aperture brings to the principal point. A uniform
     // radiance 1 gives 1 there.
     exposure(i) =

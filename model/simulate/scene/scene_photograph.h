@@ -33,7 +33,7 @@ class ScenePhotograph {
  private:
   struct RaySet {
     RayBundle rays;
-    // One over (12) of each ray's place on the aperture at the principal point.
+    // One over [S12] of each ray's place on the aperture at the principal point.
     Eigen::ArrayXf exposure;
     Eigen::ArrayXf behind_x, behind_y;  // of each ray, its slope behind the lens times d1
   };

@@ -128,7 +128,7 @@ struct SceneSimulator::Impl {
     return sum.head<3>() / static_cast<double>(view_rays.size());
   }
 
-  // With ST in the plane of focus, s = (x - cx) ds whatever the view, and (10) is
+  // With ST in the plane of focus, s = (x - cx) ds whatever the view, and [S10] is
   // a = ((zl + d0) u - zl s)/d0.
   Viewpoint ViewpointOf(const LightFieldGrid& grid, int k, int l) const {
     Ray ray = grid.RayAt(0, 0, k, l);

@@ -195,9 +195,9 @@ Detail GlossOf(const SceneLayer& layer) {
 }
 
 // What rays through aperture positions of up to so many mm see of a height field in a region is
-// what chief rays see, compressed. Derived here: x' = x + A V(x'), so that dx'/dx is at most m =
-// 1/(1 - a), a = |A| |grad V|, and jumps by at most m^3 |A| jump(grad V) from pixel to pixel. False
-// where a is too large for these to mean anything: there they may meet it more than once.
+// what chief rays see, compressed. Derived here [D42]: x' = x + A V(x'), so that dx'/dx is at most
+// m = 1/(1 - a), a = |A| |grad V|, and jumps by at most m^3 |A| jump(grad V) from pixel to pixel.
+// False where a is too large for these to mean anything: there they may meet it more than once.
 bool Compress(const HeightField& field, const PictureRegion& region, double aperture_mm,
               Detail* detail) {
   constexpr double kSteepest = 0.3;

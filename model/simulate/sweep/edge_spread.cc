@@ -17,7 +17,7 @@ constexpr double kNarrowestBoxPx = 1e-5;
 // Phi(-9) = 1e-19.
 constexpr double kGaussianReach = 9;
 
-// Second antiderivative, px^2, of the normal distribution Phi(x/sigma), 0 at -infinity:
+// [D33] Second antiderivative, px^2, of the normal distribution Phi(x/sigma), 0 at -infinity:
 // [(x^2 + sigma^2) Phi + x sigma phi]/2. Derived by parts. Limit sigma = 0: max(x, 0)^2/2.
 double GaussianSecondAntiderivative(double x, double sigma) {
   if (!(sigma > 0)) return x > 0 ? x * x / 2 : 0;
@@ -27,9 +27,9 @@ double GaussianSecondAntiderivative(double x, double sigma) {
   return ((x * x + sigma * sigma) * cumulative + x * sigma * density) / 2;
 }
 
-// The same, px^2, for the step blurred by a disc of radius R, 1/2 + [u s + asin u]/pi, u = x/R,
-// s = sqrt(1 - u^2). Derived by integrating twice:
-// R^2 {u^2/4 + [(u^2/2 + 1/8) asin u + u s (13/24 + u^2/12)]/pi + 1/16}, and x^2/2 + R^2/8 behind.
+// The same [D33], px^2, for the step blurred by a disc of radius R, 1/2 + [u s + asin u]/pi, u =
+// x/R, s = sqrt(1 - u^2). Derived by integrating twice: R^2 {u^2/4 + [(u^2/2 + 1/8) asin u + u s
+// (13/24 + u^2/12)]/pi + 1/16}, and x^2/2 + R^2/8 behind.
 double DiscSecondAntiderivative(double x, double radius) {
   if (x <= -radius) return 0;
   if (x >= radius) return x * x / 2 + radius * radius / 8;

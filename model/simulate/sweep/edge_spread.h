@@ -12,7 +12,7 @@ namespace thicklens::model {
 //
 // The pixel box, projected on the normal, is a trapezoid: the convolution of two boxes of the
 // widths a = |cos(angle)| and b = |sin(angle)|. So the edge spread is a second difference of the
-// second antiderivative F of the step blurred by the rest (derived here):
+// second antiderivative F of the step blurred by the rest (derived here, [D32]):
 //   E(d) = [F(d + (a+b)/2) - F(d + (a-b)/2) - F(d - (a-b)/2) + F(d - (a+b)/2)]/(a b),
 // with F in closed form for a Gaussian alone and for a disc alone. Both together have none: there
 // E is the Fourier series of a periodic edge, tabulated, and read by cubic interpolation.

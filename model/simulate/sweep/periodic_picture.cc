@@ -59,7 +59,7 @@ AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_s
   plan.grid_size = 2 * cv::getOptimalDFTSize((wanted + 1) / 2);
 
   // Window phi(t) = I0(beta sqrt(1 - (2t/w)^2)) on |t| <= w/2, t in grid nodes, with the transform
-  // w sinh(q)/q, q = sqrt(beta^2 - (pi w xi)^2); beta after Beatty, Nishimura & Pauly (2005).
+  // w sinh(q)/q, q = sqrt(beta^2 - (pi w xi)^2); beta after Beatty, Nishimura & Pauly (2005) [L4].
   const double oversampling = static_cast<double>(plan.grid_size) / band;
   const double beta =
       kPi * std::sqrt(std::pow(kTaps / oversampling * (oversampling - 0.5), 2) - 0.8);

@@ -211,7 +211,7 @@ struct SweepSimulator::Impl {
   }
 
   // What each pixel gets of a uniform target's light, 1 at the principal point: by symmetry a
-  // function of the distance from there, and of no depth, since (12) knows the ray alone.
+  // function of the distance from there, and of no depth, since [S12] knows the ray alone.
   void MakeFalloff() {
     if (!On(Effect::kFalloff)) return;
     const Sensor& sensor = options.camera.sensor;
@@ -312,9 +312,9 @@ struct SweepSimulator::Impl {
     return picture;
   }
 
-  // The most by which blur, or the place of what is shown in the outermost rows, changes from one
-  // column to the next: d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|; a row
-  // y shows Y = (y p/K) z, and dz/z = -tan(tilt)/(N K/p) dx.
+  // [D44] The most by which blur, or the place of what is shown in the outermost rows, changes from
+  // one column to the next: d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|; a
+  // row y shows Y = (y p/K) z, and dz/z = -tan(tilt)/(N K/p) dx.
   double ChangePerColumnPx(const FrameState& frame) const {
     if (!IsTilted()) return 0;
     const Camera& camera = options.camera;

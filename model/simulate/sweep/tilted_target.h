@@ -10,7 +10,7 @@ namespace thicklens::model {
 // A flat target that is turned about the vertical line in which it meets the optical axis, its
 // right side toward the camera where the tilt is positive: z = z0 - X tan(tilt). The chief ray of a
 // picture position x, px from the principal point, is X = s z with s = x/scale, scale = K/p, so
-// that it meets the target (derived here) at
+// that it meets the target (derived here, [D43]) at
 //   z = z0/(1 + s tan(tilt)), xi = s z/cos(tilt) along the target and Y = (y/scale) z down.
 // Positions on the target are (xi, Y), mm from the axis. Without tilt xi is X.
 class TiltedTarget {

@@ -82,7 +82,7 @@ TEST(VerifyCalibration, AddsTheVariancesOfBoth) {
   EXPECT_NEAR(result.chi_square, 0.64 + 1, 1e-8);
   EXPECT_NEAR(result.p_value, std::exp(-0.82), 1e-8);
   EXPECT_FALSE(Named(result, "focus_depth_mm").counted);
-  // zf moves against d1, by as many sigmas but for the curvature of (13).
+  // zf moves against d1, by as many sigmas but for the curvature of [S13].
   EXPECT_NEAR(Named(result, "focus_depth_mm").deviation(), -0.8, 0.01);
   ASSERT_THAT(result.warnings, SizeIs(1));
   EXPECT_THAT(result.warnings[0], HasSubstr("blur_ratio: taken as exact"));

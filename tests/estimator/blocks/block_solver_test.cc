@@ -112,7 +112,7 @@ int RayOf(const EstimateInput& input, int i, int j, int k, int l) {
          i;
 }
 
-// Where ray (i, j, k, l) lands, by (16) and the picture's orientation.
+// Where ray (i, j, k, l) lands, by [S16] and the picture's orientation.
 Eigen::Vector2d LandingPx(const EstimateInput& input, int i, int j, int k, int l) {
   if (!input.grid) return {i, j};
   return model::PicturePositionPx(

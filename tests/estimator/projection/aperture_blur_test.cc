@@ -80,7 +80,7 @@ TEST(ApertureBlur, OnTheAxisIsTheCalibratedOne) {
 }
 
 // What the fall-off of a pixel's rays really is: at the principal point nothing is added to the
-// weights, elsewhere (12) changes them.
+// weights, elsewhere [S12] changes them.
 TEST(ApertureBlur, FallOffLeavesTheAxisAlone) {
   const model::Camera camera = WideCamera();
   const Eigen::ArrayXXd weights = model::ApertureWeights(ApertureShape::kGaussian, 5, 5);

@@ -183,7 +183,7 @@ TEST(Photograph, OfAUniformRadianceIsUniform) {
   }
 }
 
-// By (12): the light of a pixel is the sum of its rays' radiance times cos(alpha) cos^3(beta).
+// By [S12]: the light of a pixel is the sum of its rays' radiance times cos(alpha) cos^3(beta).
 TEST(Photograph, WeakensRaysByTheirIrradiance) {
   model::LightField field = RandomField(15, 11, 3, 3, 3, 6);
   AddCamera(&field, kInFocus);
@@ -293,7 +293,7 @@ TEST(RelativeFalloff, IsTheIrradianceOverThatAtThePrincipalPoint) {
     model::LightField field = RandomField(15, 11, 3, 5, 1, 11);
     AddCamera(&field, planes);
     const Eigen::ArrayXXd weights = 2 * RandomWeights(3, 5, 12);
-    // The view's ray that lands at the principal point, found by bisection of (16).
+    // The view's ray that lands at the principal point, found by bisection of [S16].
     model::Ray ray = field.grid->RayAt(0, 0, 2, 1);
     for (double* position : {&ray.s_mm, &ray.t_mm}) {
       double low = -1e4;

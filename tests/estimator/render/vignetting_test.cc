@@ -108,7 +108,7 @@ TEST(Vignetting, MakesThePhotographThatOfTheScene) {
   }
 }
 
-// The sum over the samples by itself, from (10) and the displacement c(z) a of what is out of
+// The sum over the samples by itself, from [S10] and the displacement c(z) a of what is out of
 // focus.
 TEST(Vignetting, IsTheSumOverTheRaysOfEachPixel) {
   const double depth_mm = 600, period_px = 14;

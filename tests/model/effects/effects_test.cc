@@ -83,7 +83,7 @@ TEST(EffectsTest, ToleranceHasAUnit) {
 }
 
 // The oracle of "displacement 0": rays of the source's two-plane parametrisation through both
-// lenses, (16).
+// lenses, [S16].
 TEST(EffectsTest, ThinLensOfTheSameFocusPutsRaysInTheSamePlace) {
   const Camera camera = TheCamera();
   const ThickLens thin = ThinCounterpart(camera.lens);

@@ -34,7 +34,7 @@ Camera SmallCamera() {
   return camera;
 }
 
-// H, XY x STUV: each ray lands by (16) and gives its weight to the nearest pixel (the unit
+// H, XY x STUV: each ray lands by [S16] and gives its weight to the nearest pixel (the unit
 // impulse).
 Eigen::MatrixXd ProjectionMatrix(const Camera& camera, const LightFieldGrid& grid) {
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(
@@ -131,7 +131,7 @@ TEST(SourceErrors, DistinctRowsDoNotMakeIndependentColumns) {
   }
 }
 
-// (9) measures beta from Ap. A ray leaves the rear principal plane at the height where it met Ap,
+// [S9] measures beta from Ap. A ray leaves the rear principal plane at the height where it met Ap,
 // so that its angle there needs D = d1 - rho.
 TEST(SourceErrors, AngleBehindTheLensIsMeasuredFromTheWrongPlane) {
   const LightFieldPlanes planes{0, 640};
@@ -148,7 +148,7 @@ TEST(SourceErrors, AngleBehindTheLensIsMeasuredFromTheWrongPlane) {
     const double by_9 = CosBeta(lens, image_distance_mm, planes, ray);
     const double truth = traced_cos_beta(oracle);
     EXPECT_GT(std::abs(by_9 - truth), 1e-4);
-    // Crossed planes make D longer than d1, so that (9) sees too steep a ray; else too flat a one.
+    // Crossed planes make D longer than d1, so that [S9] sees too steep a ray; else too flat a one.
     EXPECT_EQ(by_9 < truth, lens.lens_thickness_mm < 0);
     // The rear principal plane is what it lacks.
     const double rear_distance_mm = image_distance_mm - lens.lens_thickness_mm;
@@ -165,7 +165,7 @@ TEST(SourceErrors, AngleBehindTheLensIsMeasuredFromTheWrongPlane) {
   EXPECT_NEAR(CosBeta(lens, ImageDistanceMm(lens, 640), planes, ray), traced_cos_beta(ball), 1e-12);
 }
 
-// (23): C_{k+1}^-1 = C_k^-1 + mu C_k^-1 D_k C_k^-1 with mu = 1/(1 + tr(C_k^-1 D_k)). Sherman and
+// [S23]: C_{k+1}^-1 = C_k^-1 + mu C_k^-1 D_k C_k^-1 with mu = 1/(1 + tr(C_k^-1 D_k)). Sherman and
 // Morrison subtract.
 TEST(SourceErrors, InverseOfARankOneUpdateHasTheWrongSign) {
   Eigen::Matrix3d c;

@@ -360,7 +360,7 @@ TEST(ShippedCameras, AreReadAndFocusWhereTheySay) {
     EXPECT_EQ(camera.calibration->evidence.method, "assumed");
     const double stated_mm = camera.calibration->evidence.focus_depth_mm.value().value;
     const ThickLens& lens = camera.lens;
-    // (13) in its own form: 1 = f2/D + f1/zf.
+    // [S13] in its own form: 1 = f2/D + f1/zf.
     const double rear_mm = camera.image_distance_mm() - lens.lens_thickness_mm;
     EXPECT_NEAR(lens.rear_focal_length_mm / rear_mm + lens.front_focal_length_mm / stated_mm, 1,
                 4e-16);

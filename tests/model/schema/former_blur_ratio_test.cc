@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 const ThickLens kWide = {12.5, 12.8, 3, 12.5 / 2.8};
 
-// The second moment of the light on the axis by (12), written out once more, over that of the
+// The second moment of the light on the axis by [S12], written out once more, over that of the
 // aperture.
 double VarianceRatio(Psf psf, double sigma_mm, double zf_mm, double d1_mm) {
   constexpr int kSide = 801;

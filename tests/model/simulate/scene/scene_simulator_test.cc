@@ -406,8 +406,8 @@ TEST(SceneSimulatorTest, UniformSceneGivesAUniformPicture) {
   }
 }
 
-// A wide and fast lens, so that the fall-off is large; the mean over the aperture of (12), relative
-// to the same place of the aperture at the principal point, by a grid.
+// A wide and fast lens, so that the fall-off is large; the mean over the aperture of [S12],
+// relative to the same place of the aperture at the principal point, by a grid.
 TEST(SceneSimulatorTest, FallOffIsThatOfTheFormula) {
   constexpr double kFastRadiusMm = 30;
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {

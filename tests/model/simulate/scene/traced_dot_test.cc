@@ -1,4 +1,4 @@
-// The picture of a dot against formulas (25), (26) and against a lens traced surface by surface.
+// The picture of a dot against formulas [S25], [S26] and against a lens traced surface by surface.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -93,7 +93,7 @@ TEST(TracedDotTest, ADotsPictureIsWhereAndAsWideAsTheTracedLensPutsIt) {
           MacroScene::Options(camera, {dot, MacroScene::Uniform(2 * focus_mm, 0)}, kEffects, 1000),
           {{DotPicture(), {}, {}}});
 
-      // (25), (26): sigma = kappa r |c(z)|, c = [f1 D - (D - f2) z]/(f2 z), D = d1 - rho.
+      // [S25], [S26]: sigma = kappa r |c(z)|, c = [f1 D - (D - f2) z]/(f2 z), D = d1 - rho.
       const ThickLens& thick = camera.lens;
       const double d_mm = image_mm - thick.lens_thickness_mm;
       const double c =

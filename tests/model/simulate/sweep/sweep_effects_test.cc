@@ -139,7 +139,7 @@ TEST(SweepEffectsTest, EachNoiseHasDrawsOfItsOwn) {
   }
 }
 
-// cos(alpha) cos^3(beta) of (12), written out once more for the aperture's middle, where rays make
+// cos(alpha) cos^3(beta) of [S12], written out once more for the aperture's middle, where rays make
 // the chief ray's angle atan(x/K) in front of the lens and atan(x/d1) behind it; K the image
 // distance of a thin lens of f1 that is focused alike.
 TEST(SweepEffectsTest, FalloffIsThatOfTheChiefRayOfAPinhole) {
@@ -254,8 +254,8 @@ TEST(SweepEffectsTest, AutoHasAll) {
               ElementsAre(Pair(EffectName(Effect::kDrift), Gt(1))));
 }
 
-// A point's rays, drawn and weighed one by one by (12), against an edge at f/1.4: how wide the blur
-// is, where it lies and how bright it is, beside the axis and on it.
+// A point's rays, drawn and weighted one by one by [S12], against an edge at f/1.4: how wide the
+// blur is, where it lies and how bright it is, beside the axis and on it.
 TEST(SweepEffectsTest, FalloffWeighsTheRaysOfABlurredEdge) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     for (const double depth_mm : {240.0, 400.0}) {

@@ -52,15 +52,15 @@ struct ScaleSample {
 };
 
 // Says by which law the scale goes with the readings (ScaleKind) and, where it is 1/z, fits
-// 1/scale = (offset + direction reading)/z_reference, the size on the sensor going as 1/z along the
-// chief rays. Started by repeated medians, then Ceres with a Cauchy loss on the readings, each with
-// the error sqrt(reading_sigma^2 + (z scale_sigma/scale)^2): a fifth of the frames may be wrong by
-// any amount. sigma is the larger of the formal one and a delete-a-block jackknife over eight runs
-// of neighbouring readings, because the law's errors are not independent from frame to frame; what
-// the registrations may be wrong by together (3e-5 of scale from end to end) and the uncertain rest
-// of radial distortion are added in quadrature. `done` is false, with the reason, where the samples
-// are too few or the law is another one. With `corner_radius_px`, the distance of the region's
-// farthest corner from the optical axis, radial distortion is reported too.
+// 1/scale = (offset + direction reading)/z_reference [D57], the size on the sensor going as 1/z
+// along the chief rays. Started by repeated medians, then Ceres with a Cauchy loss on the readings,
+// each with the error sqrt(reading_sigma^2 + (z scale_sigma/scale)^2): a fifth of the frames may be
+// wrong by any amount. sigma is the larger of the formal one and a delete-a-block jackknife over
+// eight runs of neighbouring readings, because the law's errors are not independent from frame to
+// frame; what the registrations may be wrong by together (3e-5 of scale from end to end) and the
+// uncertain rest of radial distortion are added in quadrature. `done` is false, with the reason,
+// where the samples are too few or the law is another one. With `corner_radius_px`, the distance of
+// the region's farthest corner from the optical axis, radial distortion is reported too.
 ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_frame,
                      double reading_sigma_mm, model::BenchDirection direction,
                      double corner_radius_px = 0);

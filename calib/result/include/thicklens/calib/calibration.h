@@ -77,7 +77,7 @@ struct SharpnessPeak {
   double focus_depth_mm = 0;
   double sigma_mm = 0;
   int frames_used = 0;
-  // log(index) = c0 + c1 x + c2 x^2, x = (1/z - 1/z0) z0, z0 = reference_depth_mm.
+  // [D70] log(index) = c0 + c1 x + c2 x^2, x = (1/z - 1/z0) z0, z0 = reference_depth_mm.
   Eigen::Vector3d log_parabola{0, 0, 0};
   double reference_depth_mm = 0;
   double from_depth_mm = 0, to_depth_mm = 0;  // the frames fitted

@@ -19,10 +19,10 @@ struct SharpnessIndex {
   int edge_count = 0;
 };
 
-// MES, read as "mean edge slope": over the edge pixels, |I(e+) - I(e-)| / distance(e+, e-) with e+
-// and e- the nearest extrema on both sides along the gradient, averaged. The paper that the source
-// cites (Wang, Tian, Liang & Shi 2008) could not be had: this reading is inferred from the name.
-// `grey` is CV_32F.
+// MES, read as "mean edge slope" [D69]: over the edge pixels, |I(e+) - I(e-)| / distance(e+, e-)
+// with e+ and e- the nearest extrema on both sides along the gradient, averaged. The paper that the
+// source cites (Wang, Tian, Liang & Shi 2008) could not be had: this reading is inferred from the
+// name. `grey` is CV_32F.
 SharpnessIndex MeanEdgeSlope(const cv::Mat& grey, const SharpnessOptions& options);
 
 // The same for several thresholds at once, in the time that the lowest takes;

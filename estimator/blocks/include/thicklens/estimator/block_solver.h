@@ -56,7 +56,7 @@ struct BlockOptions {
   // iterations for a block's channel, >= 1.
   double tolerance = 1e-6;
   int max_iterations = 1000;
-  bool falloff = true;  // the irradiance of (12), where there is a camera
+  bool falloff = true;  // the irradiance of [S12], where there is a camera
   int threads = 0;      // 0: one per core
   // Called from any thread, one at a time, as blocks are finished. May throw to stop.
   std::function<void(int done, int total)> progress;
@@ -95,9 +95,9 @@ struct EstimateSummary {
 };
 
 // The light field of one picture by blocks, each solved on its own:
-//   (H^T H - gamma G + mu Id) L = H^T I + mu L0,
-// the minimiser of |H L - I|^2 + gamma |D L|^2 + mu |L - L0|^2, L0 the picture warped by its depth.
-// (21) of the source has no ridge; without one the system is singular or so nearly that its
+//   (H^T H - gamma G + mu Id) L = H^T I + mu L0, [D112]
+// the minimiser of |H L - I|^2 + gamma |D L|^2 + mu |L - L0|^2, L0 the picture warped by its depth:
+// [M19] with a ridge. [M21] has no ridge; without one the system is singular or so nearly that its
 // solution is noise, while its residual is perfect: see BlockOptions::rcond_min.
 // Channels share each block's factor. Blocks share no ray; smoothness links that leave a block
 // are lost. The result does not depend on the number of threads.

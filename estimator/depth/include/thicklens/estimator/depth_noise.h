@@ -18,7 +18,7 @@ struct SmoothedDepth {
 // The noise of a depth, taken out along surfaces: each pixel gets the middle of the plane through
 // those around it, up to 3 px away, whose disparity is its own but for five times the noise;
 // weighted least squares, Gaussian weights of sigma 2 px. Planes stay what they are, a step of
-// more than about seven times the noise is kept. Derived here. A pixel with less than
+// more than about seven times the noise is kept. Derived here [D94]. A pixel with less than
 // six such neighbours, or all of them in a line, keeps its disparity.
 // `noise_px`: standard deviation, px per view step (of the larger of the two), > 0, as DepthNoisePx
 // finds it. The result does not depend on the number of threads. Throws Error if the map has holes

@@ -14,7 +14,8 @@ constexpr double kLargestStepPx = 3;
 // Noise of the depth above which it costs more than the estimate gains, px of disparity per step.
 constexpr double kLargestDepthNoisePx = 0.05;
 // Blur from which details cannot be recovered, as sigma in px. Of a detail with a period of T px a
-// Gaussian blur leaves exp(-2 pi^2 sigma^2/T^2), derived here: at 3 px a twentieth for T = 7.7 px.
+// Gaussian blur leaves exp(-2 pi^2 sigma^2/T^2), derived here [D96]: at 3 px a twentieth for T
+// = 7.7 px.
 constexpr double kUnresolvedBlurSigmaPx = 3;
 
 struct StepCheck {
@@ -27,10 +28,10 @@ StepCheck CheckSteps(const DisparityMap& map, const Eigen::Vector2d& landing_ste
 
 // Standard deviation of the noise of a disparity from pixel to pixel, px per view step (the larger
 // of the two steps), where it is smooth: of all second differences along rows and columns the
-// median of the absolute value, over .6745 sqrt(6), what it would be of normal noise; derived here.
-// Slants have none, a curvature of c px per px^2 counts as .6 c, and edges are few; maps whose
-// steps of quantisation are wide have a median of 0. Noise that is smooth over several pixels is
-// not seen. Absent if the map is smaller than 3 px both ways or holes leave no three neighbours.
+// median of the absolute value, over .6745 sqrt(6), what it would be of normal noise; derived here
+// [D93]. Slants have none, a curvature of c px per px^2 counts as .6 c, and edges are few; maps
+// whose steps of quantisation are wide have a median of 0. Noise that is smooth over several pixels
+// is not seen. Absent if the map is smaller than 3 px both ways or holes leave no three neighbours.
 std::optional<double> DepthNoisePx(const DisparityMap& map);
 
 // A part of the photograph that the estimate does not explain.

@@ -15,7 +15,7 @@ struct FunctionalOptions {
   double tolerance = 1e-3;      // relative residual at which conjugate gradients stop, > 0, < 1
   int max_iterations = 1000;    // for each channel, >= 1
   bool double_precision = false;
-  bool falloff = true;                     // the irradiance of (12), where there is a camera
+  bool falloff = true;                     // the irradiance of [S12], where there is a camera
   int threads = 0;                         // 0: one per core
   std::optional<double> memory_limit_mib;  // for the whole process
   // Called from any thread, one at a time, for each view and each iteration. May throw to stop.
@@ -47,11 +47,10 @@ struct FunctionalSummary {
 // AperturePrior) reduce to a system of the picture's size, whose eigenvalues are at least 1 and, up
 // to the unevenness of H, at most 1 + 1/(U V mu), whatever the blur:
 //   (Id + H A^-1 H^T) y = I - H R0,   R = R0 + A^-1 H^T y,
-// derived here, by conjugate gradients. As gamma grows R(p, .) becomes even: that is EstimateScene
-// with a ridge of U V mu, a linear H and no weights of pixels. Each view shows the R(., k) by its
-// depth.
-// Throws Error for options and inputs that do not fit and a memory limit that is too low. The
-// result does not depend on the number of threads.
+// derived here [D115], by conjugate gradients. As gamma grows R(p, .) becomes even: that is
+// EstimateScene with a ridge of U V mu, a linear H and no weights of pixels. Each view shows the
+// R(., k) by its depth. Throws Error for options and inputs that do not fit and a memory limit that
+// is too low. The result does not depend on the number of threads.
 model::LightField EstimateFunctional(const EstimateInput& input, const FunctionalOptions& options,
                                      FunctionalSummary* summary);
 

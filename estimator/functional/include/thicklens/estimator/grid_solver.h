@@ -10,7 +10,7 @@ namespace thicklens::estimator {
 // and with the same H, D (in the warp form) and L0, but for the whole picture: the minimiser of
 //   |H L - I|^2 + gamma |D L|^2 + mu |L - L0|^2
 // over all rays that land on the picture, by conjugate gradients on
-//   (H^T H + gamma D^T D + mu Id) L = H^T I + mu L0
+//   (H^T H + gamma D^T D + mu Id) L = H^T I + mu L0  [D113]
 // from L0 on, without a matrix. As one block of the picture's size would do, it loses no link but
 // those that leave the picture, and keeps L0 where rays land outside of it. The eigenvalues lie
 // between mu and about 8 gamma + 1 + mu, so that small ridges take many iterations:

@@ -28,10 +28,11 @@ struct Conditioning {
 // times views), and for inputs that do not fit.
 Conditioning ConditioningOfBlock(const EstimateInput& input, const BlockOptions& options);
 
-// Of Id + H A^-1 H^T, the system of EstimateFunctional in scene-ray form, one unknown a pixel. Its
-// smallest eigenvalue is at least 1, and the largest at most 1 + |H|^2/mu, because A is at least
-// mu. For gamma toward infinity A^-1 tends to the mean over a point's rays over mu, and with mu' =
-// U V mu the largest tends to 1 + |H1|^2/mu', H1 the photograph of points whose rays are equal.
+// [D117] Of Id + H A^-1 H^T, the system of EstimateFunctional in scene-ray form, one unknown a
+// pixel. Its smallest eigenvalue is at least 1, and the largest at most 1 + |H|^2/mu, because A is
+// at least mu. For gamma toward infinity A^-1 tends to the mean over a point's rays over mu, and
+// with mu' = U V mu the largest tends to 1 + |H1|^2/mu', H1 the photograph of points whose rays are
+// equal.
 Conditioning ConditioningOfSceneRays(const EstimateInput& input, const FunctionalOptions& options);
 
 }  // namespace thicklens::estimator

@@ -8,9 +8,9 @@
 
 namespace thicklens::estimator {
 
-// The blur that the samples of an aperture carry: the standard deviation, mm on the aperture, of
-// where the rays of a point in focus cross it, about their centroid, by the weights of the views
-// times the fall-off (12) relative to the principal point.
+// The blur that the samples of an aperture carry [D30]: the standard deviation, mm on the aperture,
+// of where the rays of a point in focus cross it, about their centroid, by the weights of the views
+// times the fall-off [S12] relative to the principal point.
 struct ApertureBlur {
   double calibrated_sigma_mm = 0;  // kappa r
   Eigen::Vector2d sigma_mm{0, 0};  // of the point on the axis, along u and v; 0: one view

@@ -12,9 +12,9 @@ namespace thicklens::estimator {
 // The weights of a smaller aperture over the same views, V x U, sum 1: the light field's own ones,
 // those of the captured aperture of radius r, times what radius R leaves of each:
 // exp(-|a|^2/2 (1/(kappa R)^2 - 1/(kappa r)^2)) for a Gaussian, 1 within 2 kappa R for a disc, a
-// the view's place on the aperture; derived here. R = r gives the captured aperture. R is in mm
-// with a camera, and must be at most r; without one the aperture is a disc of R view steps. R = 0,
-// and an aperture that meets no view, is the view (or views) nearest to the centre. Absent views
+// the view's place on the aperture; derived here [D23]. R = r gives the captured aperture. R is in
+// mm with a camera, and must be at most r; without one the aperture is a disc of R view steps. R =
+// 0, and an aperture that meets no view, is the view (or views) nearest to the centre. Absent views
 // have 0.
 Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius);
 
@@ -37,7 +37,7 @@ struct Vignetting {
   std::optional<double> radius_mm;
 };
 
-// Of every ray of the view (k, l), T x S row by row, 1 in the middle of the aperture. From (10):
+// Of every ray of the view (k, l), T x S row by row, 1 in the middle of the aperture. From [S10]:
 // the ray (s, t, u, v) crosses at a = ((zl + d0) u - zl s)/d0; a step of the views is that of
 // model::ApertureStepsMm. Needs a grid and a camera.
 std::vector<float> PassedRays(const model::LightField& light_field, const Vignetting& vignetting,

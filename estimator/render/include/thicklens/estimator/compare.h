@@ -37,12 +37,12 @@ struct PictureScores {
 // are computed on the whole, then averaged inside). Throws Error if the sizes or channels differ or
 // the border leaves nothing.
 //
-// PSNR = -10 log10 of the mean squared difference, channels pooled.
+// PSNR = -10 log10 of the mean squared difference, channels pooled [L19].
 // SSIM (Wang et al. 2004): on .2126 R + .7152 G + .0722 B of the stored values, Gaussian window of
 // 11 x 11 px, sigma 1.5, K1 = .01, K2 = .03, range 1; windows that leave the picture are left out.
 // M-dE94: mean CIE94 difference, graphic arts (kL = kC = kH = 1, K1 = .045, K2 = .015), D65 sRGB to
 // Lab, the reference's chroma in the weights.
-// MACADE stand-in (the definition of MACADE could not be had): mean over edge pixels of the
+// MACADE stand-in [D119] (the definition of MACADE was not available): mean over edge pixels of the
 // reference of |grad A . grad B|/(|grad A||grad B|); 1 for equal orientation, 2/pi for random.
 // Gradients of the grey of SSIM, 3 x 3 (Sobel), not on the outermost pixels. An edge pixel has at
 // least half of the gradient that one pixel in a hundred of the reference exceeds, and at least

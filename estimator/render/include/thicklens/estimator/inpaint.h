@@ -28,13 +28,13 @@ struct InpaintSummary {
   double seconds = 0;
 };
 
-// The source's section 6, in place of what the solver put where near things hide the background
-// from the centre view: view by view, holes are filled by Telea's method (fast marching), and the
-// radiance of each point filled is carried along m to the holes of the other views that show it,
-// until no hole is left or all views are visited. The order (from the centre outward) and the rule
-// of carrying are ours: a point goes to the nearest sample x - (a' - a) disparity of the view a' if
-// that is a hole whose background has the same disparity to .2 px per view step. The method looks
-// at radiance, each channel on its own.
+// The supplement's section 6 [D99], in place of what the solver put where near things hide the
+// background from the centre view: view by view, holes are filled by Telea's method (fast marching)
+// [L16], and the radiance of each point filled is carried along m to the holes of the other views
+// that show it, until no hole is left or all views are visited. The order (from the centre outward)
+// and the rule of carrying are ours: a point goes to the nearest sample x - (a' - a) disparity of
+// the view a' if that is a hole whose background has the same disparity to .2 px per view step. The
+// method looks at radiance, each channel on its own.
 //
 // Holes are samples that nothing of the centre view covers; those that show what lies beyond its
 // border are none: there is nothing around them to go on. `map`: of the centre view, without holes.

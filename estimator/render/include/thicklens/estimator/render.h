@@ -11,7 +11,7 @@ namespace thicklens::estimator {
 
 // The photograph that the whole aperture would take of the light field, in linear light: the mean
 // of the views with `weights` (V x U, >= 0; the sum need not be 1), each ray where it lands.
-// Views that are not present have no share. Rays carry the irradiance of (12) in `falloff`,
+// Views that are not present have no share. Rays carry the irradiance of [S12] in `falloff`,
 // relative to that of a uniform radiance at the principal point; null: none. With UV off the
 // aperture the rays of a view cross it in different places: those that land at a pixel have the
 // weights of `vignetting`, with sum 1 over the views that are present, `weights` being those of the
@@ -24,7 +24,7 @@ model::LinearPicture Photograph(const model::LightField& light_field,
                                 const Vignetting* vignetting, kernels::Kernels<float>* kernels,
                                 int threads);
 
-// The photograph refocused: views shifted so that points of that disparity (px per view step)
+// The photograph refocused [D98]: views shifted so that points of that disparity (px per view step)
 // coincide, then averaged with `weights`; bicubic between samples. Where shifts leave a view, the
 // others are averaged; black where they leave all.
 model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,

@@ -23,7 +23,7 @@ namespace thicklens::estimator {
 // does not: the radiance takes up what it leaves, and nothing is unexplained. So a narrower blur is
 // proposed where it explains most of what the given one leaves, and a wider one never. A plane of
 // focus that is off makes the blur too wide on one side of it; where the unexplained blocks lie on
-// that side alone, a narrower blur explains them as well. Derived here.
+// that side alone, a narrower blur explains them as well. Derived here [D109].
 struct BlurTrial {
   double blur_scale = 1;
   double focus_offset_px = 0;  // per view step, on the axis of the larger step; near is positive
@@ -36,7 +36,7 @@ struct BlurTrial {
 };
 
 struct BlurCheckOptions {
-  bool falloff = true;  // the irradiance of (12), where there is a camera
+  bool falloff = true;  // the irradiance of [S12], where there is a camera
   int threads = 0;      // 0: one per core
   // For the whole process. Where the picture takes more, rows in its middle are looked at.
   std::optional<double> memory_limit_mib;

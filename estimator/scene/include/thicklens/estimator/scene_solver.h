@@ -46,7 +46,7 @@ struct SceneOptions {
   // Bicubic between the pixels of a surface, far from its edges. Off: linear, as in
   // EstimateFunctional.
   bool cubic = true;
-  bool falloff = true;  // the irradiance of (12), where there is a camera
+  bool falloff = true;  // the irradiance of [S12], where there is a camera
   int threads = 0;      // 0: one per core
   // For the whole process. Where the picture as a whole takes more, it is solved in bands.
   std::optional<double> memory_limit_mib;
@@ -114,9 +114,10 @@ struct SceneMaps {
 //              without their noise; lambda = 1e-3 (255 sigma)^1.5
 //   kGcv       the minimum of generalised cross-validation near that, the trace times 1.4
 // The iteration starts from the estimate at half the size.
-// Derived here; H as in SceneProjection. The iterations are computed where the backend is (null:
-// by C++ on the processor). Throws Error for options and inputs that do not fit, a memory limit
-// that is too low, and what a device reports. The result does not depend on the number of threads.
+// Derived here [D101]; H as in SceneProjection. The iterations are computed where the backend is
+// (null: by C++ on the processor). Throws Error for options and inputs that do not fit, a memory
+// limit that is too low, and what a device reports. The result does not depend on the number of
+// threads.
 //
 // In bands the noise and the strength are those of the whole photograph (kAuto looks at a part of
 // it, kGcv at the band in the middle), and each band is solved with rows around it, so many that
@@ -140,8 +141,8 @@ model::LightField EstimateSceneViews(const EstimateInput& input, const SceneOpti
                                      const SceneViewSink& sink, SceneSummary* summary,
                                      SceneMaps* maps, kernels::Backend* backend = nullptr);
 
-// Standard deviation of the noise of stored values in [0, 1], quantisation included: of 16 x 16
-// blocks with a mean of 12/255 to 243/255 the rms of (p00 - p10 - p01 + p11)/2, and of these the
+// Standard deviation of the noise of stored values in [0, 1], quantisation included [D97]: of 16 x
+// 16 blocks with a mean of 12/255 to 243/255 the rms of (p00 - p10 - p01 + p11)/2, and of these the
 // 25th percentile. Absent if no block is like that.
 std::optional<double> StoredNoiseSigma(const model::LinearPicture& picture,
                                        const model::TransferCurve& transfer);

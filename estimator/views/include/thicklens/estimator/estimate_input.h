@@ -30,7 +30,7 @@ struct EstimateInput {
   }
 };
 
-// A photograph as radiance: divided by what the irradiance fall-off of (12) leaves of a uniform
+// A photograph as radiance: divided by what the irradiance fall-off of [S12] leaves of a uniform
 // radiance at each of its pixels.
 model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
                                     const model::LightFieldGrid& grid, const model::Camera& camera,

@@ -27,8 +27,8 @@ struct DisparityMap {
   Eigen::Vector2d step{1, 1};
 };
 
-// From depths to the samples of a grid: disparity * step = -m, m of model::SlopeOnGrid. Throws
-// Error unless every depth is beyond the UV plane (where nearer is larger).
+// From depths to the samples of a grid [D16]: disparity * step = -m, m of model::SlopeOnGrid.
+// Throws Error unless every depth is beyond the UV plane (where nearer is larger).
 DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vector<float>& depth_mm,
                              int width_px, int height_px);
 // A map that says px per view step: scale * value + offset; NaN and infinities are holes, and so is
@@ -104,7 +104,7 @@ void Expand(const CompactView& compact, ViewDisparity* view);
 // seen, at its own source; else one that is hidden, by its way to a source where that leads to its
 // surface from here as well, else at its own source. A hidden sample that nothing nearer shares has
 // the share of its own surface that is seen after all. Of several the largest share counts, of the
-// same the nearer; less than .01 does not. Derived here.
+// same the nearer; less than .01 does not. Derived here [D91].
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
 struct SupportedPixels;  // hole_filler.h

@@ -71,7 +71,7 @@ struct ResidualSums {
   double with_former = 0;     // r . M^-1 (what r was before)
 };
 
-// The steps of conjugate gradients for (H^T W H + P) x = b, P the matrix of the prior,
+// The steps of conjugate gradients for (H^T W H + P) x = b [D106], P the matrix of the prior,
 // b = H^T W I + pull target, M = diag(H^T W H) (about) + diag(P). The vectors stay where they are
 // computed; sums are added in double (on a device without it, from sums in float over some hundred
 // pixels), in an order that never changes. An object is used by one thread at a time. Order of
@@ -86,7 +86,7 @@ class RadianceSteps {
   virtual void SetPrior(const QuadraticPrior<Real>& prior) = 0;
   // Takes s^2 and the numbers in; the prior remains what it is until TouchVariation.
   virtual void SetVariation(const TotalVariation<Real>& variation) = 0;
-  // The prior is from now on the quadratic that touches the total variation from above at x:
+  // The prior is from now on the quadratic that touches the total variation from above at x [D105]:
   // strength/2 g/(g(x) + eps^2)^(1/2) up to a constant.
   virtual void TouchVariation() = 0;
 

@@ -10,7 +10,7 @@
 
 namespace thicklens::kernels {
 
-// The unit impulse g that carries a ray from where it lands to the pixels.
+// The unit impulse g of [M16] that carries a ray from where it lands to the pixels.
 enum class Splat {
   kNearest,   // all of it to the nearest pixel, floor(position + 1/2)
   kBilinear,  // shared by the two nearest pixels of each axis, by distance
@@ -64,24 +64,24 @@ class Kernels {
   // arrives (none if the fraction is 0). Rays that do not exist are left out.
   virtual std::vector<std::int32_t> FindRays(const BlockGeometry& block, Splat splat) = 0;
 
-  // H, second half: the weight of each ray found. H0 = view weight times the share of the splat;
-  // rows are divided by their sums (W = 1/(H0 1), for the samples that exist; a row of sum 0 stays
-  // 0) and then multiplied by `irradiance` (one number a ray of the block; empty: 1).
+  // H of [M10], second half: the weight of each ray found. H0 = view weight times the share of the
+  // splat; rows are divided by their sums (W = 1/(H0 1), for the samples that exist; a row of sum 0
+  // stays 0) and then multiplied by `irradiance` (one number a ray of the block; empty: 1).
   virtual EllMatrix<Real> WeighRays(const BlockGeometry& block, Splat splat,
                                     const std::vector<std::int32_t>& rays,
                                     const std::vector<Real>& irradiance) = 0;
 
-  // The derivation mask of each ray in the warp form: (D L)(i, k) = L(i + m, k + 1) - L(i, k), m
-  // in samples per view step, linear interpolation between samples. Rows: first one a ray for the
-  // step in u (its m in slope_u), then one a ray for the step in v. A row is empty where the
-  // slope is NaN, where there is no next view, and where a tap that has weight does not exist or
-  // is outside of the block. 3 slots: the ray itself (-1), the two taps.
+  // The derivation mask of each ray in the warp form [M18], [D111]: (D L)(i, k) = L(i + m, k + 1) -
+  // L(i, k), m in samples per view step, linear interpolation between samples. Rows: first one a
+  // ray for the step in u (its m in slope_u), then one a ray for the step in v. A row is empty
+  // where the slope is NaN, where there is no next view, and where a tap that has weight does not
+  // exist or is outside of the block. 3 slots: the ray itself (-1), the two taps.
   virtual EllMatrix<Real> WarpDifferences(const BlockGeometry& block,
                                           const std::vector<Real>& slope_u,
                                           const std::vector<Real>& slope_v) = 0;
 
   // The derivation mask of each ray as six explicit finite differences of the second derivative
-  // along the rays of its scene point, (m d/ds + d/du)^2 and the same in t and v:
+  // [M20] along the rays of its scene point, (m d/ds + d/du)^2 and the same in t and v:
   //   (G L) = m^2 L_ss + 2 m L_su + L_uu + n^2 L_tt + 2 n L_tv + L_vv,
   // central differences with step 1, L_su by the four diagonal neighbours over 4. A neighbour that
   // does not exist or is outside of the block is replaced by the ray itself, so that a constant

@@ -21,7 +21,7 @@ struct LightFieldPlanes {
   double plane_spacing_mm = 0;  // d0, not 0
 };
 
-// P and Q of (17), (18), dimensionless: landing = P s - Q u.
+// P and Q of [S17], [S18], dimensionless: landing = P s - Q u.
 struct ProjectionCoefficients {
   double p = 0;
   double q = 0;
@@ -29,47 +29,48 @@ struct ProjectionCoefficients {
 ProjectionCoefficients ProjectionOf(const ThickLens& lens, double image_distance_mm,
                                     const LightFieldPlanes& planes);
 
-// (16): where the ray meets the sensor, mm from the optical axis, in scene orientation (the image
-// is inverted: positive is what the picture shows left of or above the principal point).
+// [S16], [M13]: where the ray meets the sensor, mm from the optical axis, in scene orientation (the
+// image is inverted: positive is what the picture shows left of or above the principal point).
 Eigen::Vector2d LandingPointMm(const ThickLens& lens, double image_distance_mm,
                                const LightFieldPlanes& planes, const Ray& ray);
 
-// (15): the same through the ray's crossing with the plane of focus and the nodal points. Kept as
-// an independent road to (16); undefined for a focus at infinity (throws Error).
+// [S14], [S15]: the same through the ray's crossing with the plane of focus and the nodal points.
+// Kept as an independent way to [S16]; undefined for a focus at infinity (throws Error).
 Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens, double image_distance_mm,
                                             const LightFieldPlanes& planes, const Ray& ray);
 
-// (10): where the ray crosses the aperture plane, mm.
+// [S10]: where the ray crosses the aperture plane, mm.
 Eigen::Vector2d ApertureCrossingMm(const LightFieldPlanes& planes, const Ray& ray);
 
-// Position of the ray at a depth, mm: [s (z - zl) + u (zl + d0 - z)]/d0, likewise t, v.
+// Position of the ray at a depth, mm [D10]: [s (z - zl) + u (zl + d0 - z)]/d0, likewise t, v.
 Eigen::Vector2d PositionAtDepthMm(const LightFieldPlanes& planes, const Ray& ray, double depth_mm);
 
-// Picture position of a landing point, px: x = cx - i_x/p, y = cy - i_y/p.
+// Picture position of a landing point, px [D11]: x = cx - i_x/p, y = cy - i_y/p.
 Eigen::Vector2d PicturePositionPx(const Sensor& sensor, const Eigen::Vector2d& landing_mm);
 
-// cos(alpha) = 1/sqrt(1 + ((u - s)^2 + (v - t)^2)/d0^2): (8) written so that it is finite at
+// cos(alpha) = 1/sqrt(1 + ((u - s)^2 + (v - t)^2)/d0^2): [S8] written so that it is finite at
 // zl = 0. alpha is the angle between the ray in the scene and the axis.
 double CosAlpha(const LightFieldPlanes& planes, const Ray& ray);
 
-// cos(beta) of (9), beta the angle behind the lens, with d1 measured from Ap. Erratum of the
+// cos(beta) of [S9], beta the angle behind the lens, with d1 measured from Ap. Erratum of the
 // source, kept: for rho != 0 the rear principal plane would be the right one.
 double CosBeta(const ThickLens& lens, double image_distance_mm, const LightFieldPlanes& planes,
                const Ray& ray);
 
-// cos(alpha) cos^3(beta): the part of (12) that differs from ray to ray. The rest, k/d1^2
-// ((zl + d0)/d0)^2 du dv, is one constant, fixed by exposure (see LightFieldGrid).
+// cos(alpha) cos^3(beta): the part of [S12] that differs from ray to ray ([S1], [S2], [S3], [S4],
+// [S5], [S6], [S7], [S11]). The rest, k/d1^2
+// ((zl + d0)/d0)^2 du dv, is one constant, fixed by exposure [M11] (see LightFieldGrid).
 double RelativeIrradiance(const ThickLens& lens, double image_distance_mm,
                           const LightFieldPlanes& planes, const Ray& ray);
 
-// Transmission of the aperture at (a_u, a_v), mm from the axis, 1 at its centre.
+// Transmission of the aperture [D12] at (a_u, a_v), mm from the axis, 1 at its centre.
 // Gaussian: standard deviation kappa r per axis, not cut at r (then the PSF is exactly Gaussian
 // with sigma = kappa r_defocus). Disc: 1 inside the radius 2 kappa r, 0 outside (kappa 0.5: the
 // full aperture); its second moment is that of the Gaussian.
 double ApertureTransmission(Psf psf, double blur_ratio, double aperture_radius_mm,
                             const Eigen::Vector2d& crossing_mm);
 
-// How the aperture weighs the views of a light field.
+// How the aperture weights the views of a light field [D13].
 enum class ApertureShape {
   kUniform,   // all alike
   kGaussian,  // exp(-(4 a/U)^2/2) per axis: +-2 standard deviations over the samples
@@ -91,9 +92,9 @@ Eigen::ArrayXXd ApertureWeights(ApertureShape shape, int u_count, int v_count);
 // a_i = i - (U-1)/2 times `step`, each with a weight; the weights sum to 1.
 //
 // The steps are such that the samples carry exactly the calibrated blur: the weighted second moment
-// of the positions about their centroid is (kappa r)^2 per axis. Derived: with a_k from the
+// of the positions about their centroid is (kappa r)^2 per axis. Derived [D14]: with a_k from the
 // centroid, sum_k w_k (a_k da)^2 = (kappa r)^2 gives da = kappa r/sqrt(sum_k w_k a_k^2). The
-// weights are those of a point on the axis, its fall-off included: whatever (12) does there is in
+// weights are those of a point on the axis, its fall-off included: whatever [S12] does there is in
 // the calibrated blur. An axis with one sample carries no blur; its step is 0. (The spacing 4 kappa
 // r/U, a first guess, carries 12 % too little blur at U = 7.)
 struct ApertureSamples {
@@ -147,12 +148,12 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
 // in focus: a = u zf/(zf - zl), whatever d0. Of the default grid the grid's own steps.
 Eigen::Vector2d ApertureStepsMm(const LightFieldGrid& grid, const Camera& camera);
 
-// m = (z - zl - d0) du/((z - zl) ds): the step of s, in samples, per view step at a fixed scene
-// point. For Q = 0 it is minus the disparity. Throws Error at z = zl, where it is infinite.
+// [D16] m = (z - zl - d0) du/((z - zl) ds): the step of s, in samples, per view step at a fixed
+// scene point. For Q = 0 it is minus the disparity. Throws Error at z = zl, where it is infinite.
 double SlopeOnGrid(const LightFieldGrid& grid, double depth_mm);
 
-// d(z) = da c(z)/p: disparity, px per view step of `aperture_step_mm`, near positive, 0 in the
-// plane of focus: what the centre view shows at x stands at x - a d in view a.
+// [D17] d(z) = da c(z)/p: disparity, px per view step of `aperture_step_mm`, near positive, 0 in
+// the plane of focus: what the centre view shows at x stands at x - a d in view a.
 double DisparityPx(const Camera& camera, double aperture_step_mm, double depth_mm);
 
 }  // namespace thicklens::model

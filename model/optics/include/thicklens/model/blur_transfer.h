@@ -5,7 +5,7 @@
 
 namespace thicklens::model {
 
-// Optical transfer functions in closed form; frequencies in cycles per px, 1 at frequency 0.
+// Optical transfer functions in closed form [D31]; frequencies in cycles per px, 1 at frequency 0.
 
 // exp(-2 pi^2 sigma^2 (fx^2 + fy^2)).
 double GaussianTransfer(double sigma_px, double fx, double fy);

@@ -94,7 +94,7 @@ struct Camera {
 
   // The calibrated values. Each throws Error naming the camera and the field where it is absent.
   double image_distance_mm() const;
-  double focus_depth_mm() const;  // from image_distance_mm by (13)
+  double focus_depth_mm() const;  // from image_distance_mm by [S13]
   double blur_ratio() const;
 
   // K/p: px per radian of the chief ray's slope in front of the lens; converts px from the

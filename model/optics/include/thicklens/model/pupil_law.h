@@ -9,11 +9,11 @@
 
 namespace thicklens::model {
 
-// How the light of a point spreads over the pupil. A is the position on the aperture plane Ap, i
-// the position on the sensor from the principal point, both mm and upright, T the transmission of
-// the camera's PSF shape. On the axis (i = 0) the density of the light over A is
+// How the light of a point spreads over the pupil [D24]. A is the position on the aperture plane
+// Ap, i the position on the sensor from the principal point, both mm and upright, T the
+// transmission of the camera's PSF shape. On the axis (i = 0) the density of the light over A is
 //   kUniform       T(A)
-//   kPaper         T(A) cos(alpha) cos^3(beta), (12) of the paper
+//   kPaper         T(A) cos(alpha) cos^3(beta), [S12]
 //   kCosineFourth  T(A) cos^4(beta)
 //   kSineCondition T(|A| cos(beta)) cos^4(beta): uniform over the direction cosines of the rays
 //                  behind the lens, as Abbe's sine condition has it for a Lambertian point
@@ -40,8 +40,8 @@ inline constexpr double kWidestPupil = 0.3;
 // exactly sigma^2 whatever the law (a pupil law changes the shape of the blur, never its
 // sigma). The density is held as rings, the nodes of a Gauss rule in A^2 (Laguerre for a Gaussian
 // T, Legendre for a disc), so that its transfer function is a sum of Bessel functions J0. Rays
-// steeper than 72 degrees behind the lens do not exist. Derived here; checked by ray sums in the
-// tests.
+// steeper than 72 degrees behind the lens do not exist. Derived here [D25]; checked by ray sums in
+// the tests.
 class PupilProfile {
  public:
   // `largest_x`: how far Transfer of a disc is to be exact. Throws Error unless sigma, zf and d1
@@ -85,9 +85,9 @@ class PupilProfile {
 
 // The mean of A displaces what is out of focus by c(z) times it, c(z) = K (1/z - 1/zf), in
 // proportion to i: the image looks as if the rays came through a point in front of the aperture, at
-// this depth, mm: g K/(g K/zf - 1), g the mean per landing. Derived here: the size in the image
-// goes as 1/(z (1 + c g)), and z (1 + c g) is a straight line in z with its zero there. Needs zf >
-// f1, kappa >= 0; of a pupil beyond kWidestPupil, that of the widest. 0 for the uniform law.
+// this depth, mm: g K/(g K/zf - 1), g the mean per landing. Derived here [D27]: the size in the
+// image goes as 1/(z (1 + c g)), and z (1 + c g) is a straight line in z with its zero there. Needs
+// zf > f1, kappa >= 0; of a pupil beyond kWidestPupil, that of the widest. 0 for the uniform law.
 double CentreOfPerspectiveMm(const ThickLens& lens, Psf psf, PupilLaw law, double blur_ratio,
                              double focus_depth_mm);
 

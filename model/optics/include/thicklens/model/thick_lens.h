@@ -24,7 +24,7 @@ struct ThickLens {
 // The lens as a thin one, for comparison: f1 = f2 = the front value, rho = 0.
 ThickLens ThinCounterpart(const ThickLens& lens);
 
-// d1 = rho + f2 zf/(zf - f1), mm, for the plane of focus zf, mm. From (13): 1 = f2/D + f1/zf.
+// d1 = rho + f2 zf/(zf - f1), mm, for the plane of focus zf, mm. From [S13]: 1 = f2/D + f1/zf.
 // Throws Error unless zf > f1 (a nearer object has no real image). zf = +inf gives rho + f2.
 double ImageDistanceMm(const ThickLens& lens, double focus_depth_mm);
 
@@ -32,26 +32,27 @@ double ImageDistanceMm(const ThickLens& lens, double focus_depth_mm);
 // throws Error if D < f2: such a sensor is in front of every image.
 double FocusDepthMm(const ThickLens& lens, double image_distance_mm);
 
-// d d1/d zf = -f2 f1/(zf - f1)^2: how an error of the focus depth goes into the image distance.
+// [D2] d d1/d zf = -f2 f1/(zf - f1)^2: how an error of the focus depth goes into the image
+// distance.
 double ImageDistanceSlope(const ThickLens& lens, double focus_depth_mm);
 
 // K = f1 zf/(zf - f1), mm; f1 for a focus at infinity. Signed displacement on the sensor is
-// aperture position times c(z), c(z) = K (1/z - 1/zf). Equal to f1 D/f2.
+// aperture position times c(z), c(z) = K (1/z - 1/zf). Equal to f1 D/f2. [D3]
 double DefocusScaleMm(const ThickLens& lens, double image_distance_mm);
 
 // c(z) = [f1 D - (D - f2) z]/(f2 z), dimensionless, positive for points nearer than zf.
-// Source: (26) over (25). Throws Error unless depth_mm > 0.
+// [S26] over [S25]. Throws Error unless depth_mm > 0.
 double DefocusPerAperture(const ThickLens& lens, double image_distance_mm, double depth_mm);
 
-// r_defocus = |r c(z)|, mm on the sensor: (25), (26). 0 in the plane of focus.
+// r_defocus = |r c(z)|, mm on the sensor: [S25], [S26]. 0 in the plane of focus.
 double BlurRadiusMm(const ThickLens& lens, double image_distance_mm, double depth_mm);
 
 // Size on the sensor over size in the scene along the chief ray (through the centre of Ap), signed:
-// m = -f1 D/(f2 z). The image is inverted. At z = zf this is the conjugate magnification.
+// m = -f1 D/(f2 z) [D5]. The image is inverted. At z = zf this is the conjugate magnification.
 double ChiefRayMagnification(const ThickLens& lens, double image_distance_mm, double depth_mm);
 
-// Depths of the nodal points from Ap. N1 lies f1 - f2 in front of Ap (positive toward the scene);
-// N2 lies rho + f2 - f1 behind it (positive toward the sensor).
+// Depths of the nodal points from Ap [D1]. N1 lies f1 - f2 in front of Ap (positive toward the
+// scene); N2 lies rho + f2 - f1 behind it (positive toward the sensor).
 double FrontNodalDepthMm(const ThickLens& lens);
 double RearNodalDistanceMm(const ThickLens& lens);
 
@@ -60,7 +61,7 @@ struct DepthOfField {
   double near_mm = 0;
   double far_mm = 0;
 };
-// From |1/z - 1/zf| <= r_max/(r K), derived here. A limit of 0 gives (zf, zf).
+// From |1/z - 1/zf| <= r_max/(r K), derived here [D6]. A limit of 0 gives (zf, zf).
 DepthOfField DepthOfFieldMm(const ThickLens& lens, double image_distance_mm,
                             double max_blur_radius_mm);
 

@@ -10,7 +10,7 @@
 
 namespace thicklens::model {
 
-// Which way the bench scale runs: z = offset + reading (away) or offset - reading (toward).
+// Which way the bench scale runs [D56]: z = offset + reading (away) or offset - reading (toward).
 enum class BenchDirection { kAway, kToward };
 std::string BenchDirectionName(BenchDirection direction);
 double DirectionSign(BenchDirection direction);  // +1 away, -1 toward

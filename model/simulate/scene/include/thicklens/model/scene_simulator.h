@@ -170,9 +170,9 @@ struct SceneRun {
 // the geometric optics of the thick lens. It knows no light-field samples: the ray of picture
 // position x through aperture position A meets depth z at
 //   X(z) = (x - cx) z p/K + A (1 - z/zf),
-// the line that lands A c(z)/p to the left of the chief ray of what it meets there (derived here
-// from (16) with UV on the aperture). A plane is met in closed form, a depth map by a search from
-// pixel to pixel and in closed form between four of them.
+// the line that lands A c(z)/p to the left of the chief ray of what it meets there ([D37], derived
+// here from [S16] with UV on the aperture). A plane is met in closed form, a depth map by a search
+// from pixel to pixel and in closed form between four of them.
 //
 // A pixel of the photograph is the mean over a set of rays (Hammersley points), as many as its blur
 // and its surroundings ask for (see sampling_plan.h); pixels with as many have the same set. It
