@@ -168,6 +168,8 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
     }
     std::error_code failure;
     if (found.what() == Found::kLeftOver) fs::remove_all(path, failure);
+    // Whoever made it may be at removing it, too.
+    if (failure == std::errc::no_such_file_or_directory) failure.clear();
     if (failure == std::errc::not_enough_memory) throw std::bad_alloc();
     if (failure) {
       throw Error(

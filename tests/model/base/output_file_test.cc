@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
@@ -363,6 +364,8 @@ TEST(OutputFolder, StaleStagingIsEmptiedAndSecondClaimantRefused) {
 TEST(OutputFolder, ManyClaimantsOneHolder) {
   const TemporaryFolder folder;
   std::atomic<int> other_errors{0};
+  std::mutex mutex;
+  std::string last_error;
   ParallelFor(8, 8, [&](int worker) {
     for (int i = 0; i < 50; ++i) {
       const std::string error = ErrorOf([&] {
@@ -371,10 +374,14 @@ TEST(OutputFolder, ManyClaimantsOneHolder) {
         out.Write("frames/a", std::to_string(worker));
         if (i % 2 == 0) out.Commit();
       });
-      if (error != "(no error)" && error.find("another run") == std::string::npos) ++other_errors;
+      if (error != "(no error)" && error.find("another run") == std::string::npos) {
+        ++other_errors;
+        const std::lock_guard<std::mutex> lock(mutex);
+        last_error = error;
+      }
     }
   });
-  EXPECT_EQ(other_errors, 0);
+  EXPECT_EQ(other_errors, 0) << last_error;
   EXPECT_THAT(folder.Entries(), ElementsAre("out"));
   EXPECT_EQ(ContentOf(folder / "out/truth.yaml"), ContentOf(folder / "out/frames/a"));
 }
