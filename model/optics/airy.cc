@@ -6,7 +6,7 @@ namespace thicklens::model {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kFirstDark = 3.8317059702075125;  // of J1
+constexpr double kFirstDark = 3.8317059702075125;  // first zero of J1
 constexpr double kFarthest = 50;                   // Airy radii
 
 double ShareWithin(double airy_radii) {

@@ -8,24 +8,25 @@
 namespace thicklens::model {
 
 // Diffraction at the aperture [L2], incoherent, in the plane of focus (Born and Wolf, Principles of
-// Optics, 8.5.2), with the sensor at D = d1 - rho from the rear principal plane, where the
-// aperture's image has the aperture's own size.
-//   disc of radius R = 2 kappa r: the Airy pattern, share of the light within the radius x
-//     1 - J0(v)^2 - J1(v)^2, v = 2 pi R x/(lambda D); its first dark ring at
-//     .6098 lambda D/R holds 83.8 %
-//   Gaussian whose transmission of light has the standard deviation s = kappa r: the field's is
-//     sqrt(2) s, and its Fourier transform squared a Gaussian of lambda D/(4 pi s). Derived here
-//     [D36].
+// Optics, 8.5.2). The sensor is at D = d1 - rho from the rear principal plane, where the image of
+// the aperture has the size of the aperture itself.
+//   Disc of radius R = 2 kappa r: the Airy pattern. The share of the light within the radius x is
+//     1 - J0(v)^2 - J1(v)^2, v = 2 pi R x/(lambda D). The first dark ring at 0.6098 lambda D/R
+//     contains 83.8 %.
+//   Gaussian whose transmission of light has the standard deviation s = kappa r: the field's
+//     standard deviation is sqrt(2) s, and the squared Fourier transform of the field is a Gaussian
+//     with the standard deviation lambda D/(4 pi s). Derived here [D36].
 
-// The radius that holds 83.8 % of the light, px of the sensor; 0 of an aperture without size, of
-// which nothing can be told.
+// Radius that contains 83.8 % of the light, px of the sensor. It is 0 for an aperture without size,
+// for which it is undefined. Throws Error if the camera lacks its blur ratio or image distance.
 double AiryRadiusPx(const Camera& camera, double wavelength_mm);
 
-// That radius of a Gaussian of sigma 1 per axis: sqrt(-2 log(1 - .838)).
+// Radius that contains 83.8 % of a Gaussian of sigma 1 per axis: sqrt(-2 log(1 - 0.838)).
 constexpr double kGaussianAiryRadius = 1.9078;
 
-// Of a disc's light the distances that shares of (i + 1/2)/count do not pass, in Airy radii. The
-// pattern's last 0.3 %, which lies beyond 50 of them, is put there.
+// Quantiles of the Airy pattern of a disc: element i is the radius, in Airy radii, that contains
+// the share (i + 1/2)/count of the light. The last 0.3 % of the light, which is beyond 50 Airy
+// radii, is placed at 50.
 std::vector<double> AiryQuantiles(int count);
 
 }  // namespace thicklens::model

@@ -11,26 +11,26 @@
 namespace thicklens::model {
 namespace {
 
-// Rays with sin^2(beta) above this do not exist: 72 degrees.
+// Largest sin^2(beta) of the rays, about 72 degrees. Steeper rays do not exist.
 constexpr double kLargestSquaredSine = 0.9;
 constexpr double kTableStep = 0.01;
-// exp(-10^2/2) is 2e-22.
+// The transfer function of a Gaussian is negligible there: exp(-10^2/2) is 2e-22.
 constexpr double kGaussianReach = 10;
 constexpr int kGaussianNodes = 72;
 // Legendre's rule of n nodes in A^2 is exact to rounding for J0(x A/sigma) up to about x = n - 30.
 constexpr int kDiscNodesBeyond = 40;
-// Below it the series for the disc's edge is not good enough.
+// The series for the disc's edge is not accurate enough below this x.
 constexpr double kLeastDiscReach = 40;
 constexpr int kMomentNodes = 32;
 
-// Nodes at A^2 of a T of sigma 1, and their weights, which sum to 1.
+// Nodes of A^2 for a T of sigma 1, and their weights, which sum to 1.
 struct Rule {
   Eigen::ArrayXd at, weight;
 };
 
-// After Golub and Welsch (1969) [L3], from the recurrence of the orthogonal polynomials. Half of
-// A^2 of a Gaussian has the density exp(-x): Laguerre's. A^2 of a disc of radius 2 is uniform from
-// 0 to 4: Legendre's.
+// Gauss rule after Golub and Welsch (1969) [L3], from the recurrence of the orthogonal polynomials.
+// For a Gaussian, A^2/2 has the density exp(-x): the Laguerre polynomials. For a disc of radius 2,
+// A^2 is uniform from 0 to 4: the Legendre polynomials.
 Rule GaussRule(Psf psf, int nodes) {
   Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(nodes), beside(nodes - 1);
   for (int k = 1; k < nodes; ++k)
@@ -46,10 +46,10 @@ Rule GaussRule(Psf psf, int nodes) {
   return rule;
 }
 
-// See PupilProfile::DiscEdge.
 using DiscEdge = PupilProfile::DiscEdge;
 
-// A law with a T of a given sigma: A^2, mm^2, and the light at each node (any sum).
+// The light under a law for a T of a given sigma: A^2, mm^2, and the share of the light at each
+// node. The shares sum to 1.
 struct Light {
   Eigen::ArrayXd square, share;
   double second_moment = 0;  // per axis, mm^2
@@ -67,7 +67,7 @@ class Law {
   Light Of(double transmission_sigma_mm) const {
     Light light{transmission_sigma_mm * transmission_sigma_mm * rule_.at, rule_.weight, 0};
     if (law_ == PupilLaw::kSineCondition) {
-      // The nodes are those of d1 sin(beta); A = d1 tan(beta). The Jacobian is the cos^4.
+      // The nodes are those of d1 sin(beta), and A = d1 tan(beta). The Jacobian is cos^4(beta).
       const Eigen::ArrayXd sine2 = light.square / distance2_;
       light.share = (sine2 < kLargestSquaredSine).select(light.share, 0);
       light.square /= 1 - sine2.min(kLargestSquaredSine);
@@ -83,12 +83,13 @@ class Law {
     return light;
   }
 
-  // Of a disc: the density of the light over u = A^2/sigma^2 at its edge, R^2, with its first two
-  // derivatives. Inside the edge it is w(u)/(sum of w over the rule) times the uniform density.
+  // Edge of a disc: the density of the light over u = A^2/sigma^2 at R^2, with its first two
+  // derivatives. Inside the edge the density is w(u)/(sum of w over the rule) times the uniform
+  // density.
   DiscEdge EdgeOf(const Light& light, double transmission_sigma_mm) const {
     const double sigma2 = light.second_moment;                             // mm^2
-    const double end = 4 * transmission_sigma_mm * transmission_sigma_mm;  // of the rule, mm^2
-    // w = product of (1 + A^2/a)^-m.
+    const double end = 4 * transmission_sigma_mm * transmission_sigma_mm;  // end of the rule, mm^2
+    // w is the product of (1 + A^2/a)^-m.
     double a[2] = {distance2_, focus2_}, m[2] = {0, 0};
     double edge = end, share = 1;
     switch (law_) {
@@ -124,8 +125,9 @@ class Law {
     return result;
   }
 
-  // The mean of A over i. Of a weight w(A, i) it is E[A_x d ln w/d i_x]; of the sine condition the
-  // mean of d1 tan over rays whose direction cosines lie symmetrically about the chief ray's.
+  // The mean of A divided by i. For a weight w(A, i) it is E[A_x d ln w/d i_x]. For the sine
+  // condition it is the mean of d1 tan(beta) over rays whose direction cosines are symmetric about
+  // those of the chief ray.
   double MeanPerLanding(const Light& light) const {
     const auto mean = [&light](const Eigen::ArrayXd& of) { return (light.share * of).sum(); };
     const Eigen::ArrayXd half = 0.5 * light.square;  // A_x^2, averaged over a circle
@@ -153,7 +155,7 @@ class Law {
   const PupilOptics& optics_;
 };
 
-// The sigma of the T whose light has the second moment sigma^2.
+// Sigma, mm, of the T whose light has the second moment sigma^2. Throws Error if there is none.
 double TransmissionSigmaMm(const Law& law, double sigma_mm) {
   double transmission_mm = sigma_mm;
   for (int i = 0; i < 500; ++i) {
@@ -242,8 +244,8 @@ double PupilProfile::Sum(double x) const {
   return sum;
 }
 
-// [D26] Integration by parts of H = integral of p(u) J0(x sqrt(u)) du from 0 to R^2, again and
-// again: the sum over k of (-1)^k 2^(k + 1) p^(k)(R^2) R^(k + 1) J_(k+1)(x R)/x^(k + 1).
+// [D26] Repeated integration by parts of H = integral of p(u) J0(x sqrt(u)) du from 0 to R^2 gives
+// the sum over k of (-1)^k 2^(k + 1) p^(k)(R^2) R^(k + 1) J_(k+1)(x R)/x^(k + 1).
 double PupilProfile::TransferOfEdge(double x) const {
   const double r = edge_.radius, at = x * r, per_x = r / x;
   return per_x * (2 * edge_.density * ::j1(at) +

@@ -6,10 +6,11 @@
 
 namespace thicklens::model {
 
-// cos(alpha) cos^3(beta) of [S12]: alpha in front of the lens, of the ray's slope there, mm to the
-// right and down per mm of depth; beta behind it, where the ray runs from `aperture_mm` to
-// -landing_mm over the distance d1. Erratum of [S9], kept: for rho != 0 the rear
-// principal plane would be the place to start from.
+// Relative irradiance cos(alpha) cos^3(beta) of [S12], dimensionless. alpha is the angle to the
+// axis in front of the lens; `slope` is the ray's slope there, mm to the right and down per mm of
+// depth. beta is the angle behind the lens, where the ray runs from `aperture_mm` to -landing_mm
+// over the distance d1. Erratum of [S9], kept: for rho != 0 the ray would have to start at the rear
+// principal plane.
 inline double RayIrradiance(const Eigen::Vector2d& slope, const Eigen::Vector2d& landing_mm,
                             const Eigen::Vector2d& aperture_mm, double image_distance_mm) {
   const double tan2_alpha = slope.squaredNorm();

@@ -25,9 +25,9 @@ double RearDistanceMm(const ThickLens& lens, double image_distance_mm) {
   return rear_distance_mm;
 }
 
-// D - f2, mm; exactly 0 where the two agree to rounding. Rounding: d1 - rho takes back the
-// addition that made d1, so that the last bits of D are those of d1 and rho, not of f2. Without
-// this, a lens focused at infinity by ImageDistanceMm could come back as one that focuses nowhere.
+// D - f2, mm; exactly 0 where the two agree to rounding. d1 - rho reverses the addition that made
+// d1, so that the last bits of D are those of d1 and rho, not of f2. Without this tolerance, a lens
+// that ImageDistanceMm focuses at infinity could be found to have no plane of focus.
 double FocusExtensionMm(const ThickLens& lens, double image_distance_mm, double rear_distance_mm) {
   const double extension_mm = rear_distance_mm - lens.rear_focal_length_mm;
   const double largest_mm =
@@ -80,7 +80,7 @@ ThickLens ThinCounterpart(const ThickLens& lens) {
 
 double ImageDistanceMm(const ThickLens& lens, double focus_depth_mm) {
   CheckFocusDepth(lens, focus_depth_mm);
-  // zf/(zf - f1), 1 at infinity. Not written 1/(1 - f1/zf): that loses digits close to f1.
+  // zf/(zf - f1), 1 at infinity. The form 1/(1 - f1/zf) would lose digits close to f1.
   const double stretch = std::isinf(focus_depth_mm)
                              ? 1.0
                              : focus_depth_mm / (focus_depth_mm - lens.front_focal_length_mm);
@@ -103,20 +103,20 @@ double FocusDepthMm(const ThickLens& lens, double image_distance_mm) {
 double ImageDistanceSlope(const ThickLens& lens, double focus_depth_mm) {
   CheckFocusDepth(lens, focus_depth_mm);
   const double past_focal_point_mm = focus_depth_mm - lens.front_focal_length_mm;
-  // Two quotients, not one square, so that no length unit can overflow it; 0 at infinity.
+  // Two quotients instead of one square avoid overflow in any unit of length; 0 at infinity.
   return -(lens.rear_focal_length_mm / past_focal_point_mm) *
          (lens.front_focal_length_mm / past_focal_point_mm);
 }
 
-// f1 D/f2, from [S13]: zf - f1 = f1 f2/(D - f2), so that f1 zf/(zf - f1) = f1 D/f2. This form needs
-// no zf and is finite for a focus at infinity, where D = f2 gives f1.
+// K = f1 D/f2 follows from [S13]: zf - f1 = f1 f2/(D - f2), so that f1 zf/(zf - f1) = f1 D/f2. This
+// form needs no zf and is finite for a focus at infinity, where D = f2 gives f1.
 double DefocusScaleMm(const ThickLens& lens, double image_distance_mm) {
   return lens.front_focal_length_mm * RearDistanceMm(lens, image_distance_mm) /
          lens.rear_focal_length_mm;
 }
 
-// [S26]/[S25] divided through by z: c = K/z - (D - f2)/f2. Same numbers, and a point at infinity
-// has the finite value -(D - f2)/f2.
+// Both terms of [S26]/[S25] divided by z: c = K/z - (D - f2)/f2. The values are the same, and a
+// point at infinity has the finite value -(D - f2)/f2.
 double DefocusPerAperture(const ThickLens& lens, double image_distance_mm, double depth_mm) {
   CheckDepth(depth_mm);
   const double rear_distance_mm = RearDistanceMm(lens, image_distance_mm);

@@ -9,7 +9,7 @@
 namespace thicklens::model {
 namespace {
 
-// [L1] IEC 61966-2-1: a straight piece near black, where a power alone would have an infinite
+// [L1] IEC 61966-2-1. The curve is straight near black, where a power alone would have an infinite
 // slope.
 double EncodeSrgb(double light) {
   return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;

@@ -5,16 +5,18 @@
 
 namespace thicklens::model {
 
-// Optical transfer functions in closed form [D31]; frequencies in cycles per px, 1 at frequency 0.
+// Optical transfer functions in closed form [D31]. Lengths are in px of the sensor, frequencies in
+// cycles per px. Every function is real, dimensionless and 1 at frequency 0.
 
+// Transfer function of a Gaussian with the standard deviation sigma per axis:
 // exp(-2 pi^2 sigma^2 (fx^2 + fy^2)).
 double GaussianTransfer(double sigma_px, double fx, double fy);
-// 2 J1(2 pi R f)/(2 pi R f) of a uniform disc of radius R.
+// Transfer function of a uniform disc of radius R: 2 J1(2 pi R f)/(2 pi R f), f^2 = fx^2 + fy^2.
 double DiscTransfer(double radius_px, double fx, double fy);
-// sinc(fx) sinc(fy) of the pixel's own box of one pixel.
+// Transfer function of the box of one pixel: sinc(fx) sinc(fy), sinc(x) = sin(pi x)/(pi x).
 double PixelBoxTransfer(double fx, double fy);
-// Defocus by the camera's PSF for the per-axis sigma kappa r_defocus/p: a Gaussian of that sigma,
-// or a disc of radius 2 sigma.
+// Transfer function of the defocus blur for its sigma per axis, kappa r_defocus/p. The PSF is a
+// Gaussian of that sigma or a disc of radius 2 sigma.
 double DefocusTransfer(Psf psf, double sigma_px, double fx, double fy);
 
 }  // namespace thicklens::model

@@ -16,97 +16,109 @@ struct Sensor {
   int width_px = 0;
   int height_px = 0;
   double pixel_pitch_mm = 0;
-  // The pixel where the optical axis meets the sensor; the centre of the top-left pixel is (0, 0).
+  // Position where the optical axis meets the sensor. The centre of the top-left pixel is (0, 0),
+  // x is to the right, y down.
   Eigen::Vector2d principal_point_px{0, 0};
   TransferCurve transfer;
 
+  // Returns true if the sizes and the pitch are > 0 and all numbers are finite. Otherwise `why`, if
+  // not null, gets the field, the constraint and the value.
   bool IsValid(std::string* why) const;
 };
 
-// Shape of the defocus point spread function for a blur radius r_defocus and blur ratio kappa.
+// Shape of the defocus point spread function (PSF) on the sensor, for the blur radius r_defocus and
+// the blur ratio kappa.
 enum class Psf {
   kGaussian,  // sigma = kappa r_defocus per axis
-  kDisc,      // uniform disc of radius 2 kappa r_defocus, whose second-moment sigma is the same
+  kDisc,      // uniform disc of radius 2 kappa r_defocus; its second-moment sigma is the same
 };
+// Name of the shape in files: "gaussian" or "disc".
 std::string PsfName(Psf psf);
 
-// A measured number with its standard deviation.
+// A measured number and its standard deviation, both in the unit of the field that holds them.
 struct Estimate {
   double value = 0;
   double sigma = 0;
 };
 
-// What is known about a number that was typed in rather than measured.
+// Reliability of a number that was typed in rather than measured.
 struct Statement {
-  double tolerance = 0;  // in the number's own unit; 0: none stated
-  bool assumed = false;  // not published by the maker, not measured: somebody's assumption
+  double tolerance = 0;  // in the unit of the number; 0: no tolerance is stated
+  bool assumed = false;  // true: an assumption, neither published by the maker nor measured
 };
 
-// A frame that took no part in a calibration, and why.
+// A frame that was excluded from a calibration, and the reason.
 struct RejectedFrame {
   std::string image;
   std::string reason;
 };
 
-// Where a calibration came from.
+// Origin of a calibration.
 struct Evidence {
-  std::string method;  // "assumed": not measured at all
+  std::string method;  // "assumed": nothing was measured
   int frames_used = 0;
   std::vector<RejectedFrame> frames_rejected;
   std::optional<double> chi2_per_dof;
   std::optional<Estimate> focus_depth_mm;
-  // The PSF family whose second moment blur_ratio is (a Psf's name; empty: not stated), and the
-  // band of the fit, its largest 2 pi^2 sigma^2 nu^2.
+  // The PSF family whose second moment defines blur_ratio (PsfName; empty: not stated), and the
+  // band of the fit: its largest 2 pi^2 sigma^2 nu^2, dimensionless.
   std::string blur_family;
   std::optional<double> blur_band;
-  std::string data_sha256;  // over the frames' bytes and the readings
-  std::string version;      // of thicklens
+  std::string data_sha256;  // hash of the bytes of the frames and of the readings
+  std::string version;      // version of thicklens
   std::string date;         // ISO 8601
 };
 
-// What `thicklens calibrate` adds to a camera. A parameter that did not converge is absent.
+// The part of a camera that `thicklens calibrate` adds. A parameter that did not converge is
+// absent.
 struct CameraCalibration {
-  std::optional<Estimate> image_distance_mm;  // d1
-  // kappa: second-moment sigma of the defocus blur of a point on the axis over the blur radius.
+  std::optional<Estimate> image_distance_mm;  // d1, from Ap to the sensor
+  // kappa, dimensionless: the second-moment sigma, per axis, of the defocus blur of a point on the
+  // axis, divided by its blur radius.
   std::optional<Estimate> blur_ratio;
   std::optional<Estimate> blur_floor_px;  // sqrt(S0)
   std::optional<Estimate> bench_offset_mm;
-  // Covariance of the parameters named in `covariance_order`, in their units; may be empty.
+  // Covariance matrix of the parameters that `covariance_order` names, one row and one column for
+  // each, in their units. Both are empty if no covariance is known.
   std::vector<std::string> covariance_order;
   Eigen::MatrixXd covariance;
   Evidence evidence;
 };
 
+// A thick lens with its sensor. It owns all its data; copies are independent.
 struct Camera {
   std::string name;
   ThickLens lens;
   Sensor sensor;
   Psf psf = Psf::kGaussian;
-  // Keyed by the field's path in the file, e.g. "lens.aperture_radius_mm"; an element of a list is
-  // "sensor.principal_point_px[0]". Only fields about which something is stated are present.
+  // The key is the path of the field in the file, e.g. "lens.aperture_radius_mm"; an element of a
+  // list is "sensor.principal_point_px[0]". Only fields with a statement are present.
   std::map<std::string, Statement> statements;
   std::optional<CameraCalibration> calibration;
-  // What a reader should know of how the camera was read, one sentence each; not written.
+  // Remarks on how the camera was read, one sentence each. They are not written to files.
   std::vector<std::string> notices;
 
-  // True if the numbers describe a possible camera; else `why` names field, value and constraint.
+  // Returns true if the numbers describe a possible camera. Otherwise `why`, if not null, gets the
+  // field, the value and the constraint.
   bool IsValid(std::string* why) const;
 
-  // The calibrated values. Each throws Error naming the camera and the field where it is absent.
-  double image_distance_mm() const;
-  double focus_depth_mm() const;  // from image_distance_mm by [S13]
-  double blur_ratio() const;
+  // The calibrated values. Each function throws Error, which names the camera and the field, if the
+  // value is absent.
+  double image_distance_mm() const;  // d1, from Ap to the sensor
+  double focus_depth_mm() const;     // zf, from Ap; computed from image_distance_mm by [S13]
+  double blur_ratio() const;         // kappa
 
-  // K/p: px per radian of the chief ray's slope in front of the lens; converts px from the
-  // principal point into that slope. Needs image_distance_mm.
+  // K/p, px per unit slope of the chief ray in front of the lens. A position in px from the
+  // principal point, divided by K/p, is that slope. Throws Error if the image distance is absent.
   double focal_scale_px() const;
 };
 
-// Names of the fields marked `assumed`, for the notice printed once per run.
+// Paths of the fields that are marked `assumed`, for the notice that is printed once per run.
 std::vector<std::string> AssumedFields(const Camera& camera);
 
-// The same camera with the thin lens of focal length f1, focused on the same plane: its image
-// distance is f1 zf/(zf - f1), and rays land where they did. Needs an image distance.
+// Copy of the camera with the thin lens of focal length f1, focused on the same plane. Its image
+// distance is f1 zf/(zf - f1), and every ray has the same landing point as before. Throws Error if
+// the image distance is absent.
 Camera ThinTwin(const Camera& camera);
 
 }  // namespace thicklens::model

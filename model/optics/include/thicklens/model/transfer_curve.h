@@ -5,7 +5,7 @@
 
 namespace thicklens::model {
 
-// How linear light becomes the value that a picture file stores. Both are in [0, 1].
+// The curve from linear light to the value that an image file stores. Both are in [0, 1].
 class TransferCurve {
  public:
   enum class Kind { kLinear, kSrgb, kGamma };
@@ -15,12 +15,14 @@ class TransferCurve {
   static TransferCurve Srgb() { return TransferCurve(Kind::kSrgb, 1); }
   static TransferCurve Gamma(double gamma) { return TransferCurve(Kind::kGamma, gamma); }
 
-  // "linear", "srgb" or "gamma-2.2". Throws Error that lists these for anything else.
+  // The curve of the name "linear", "srgb" or "gamma-2.2". Throws Error, which lists these names,
+  // for any other.
   static TransferCurve FromName(const std::string& name);
   std::string Name() const;
 
-  // IEC 61966-2-1 for srgb; stored = light^(1/gamma) for gamma. Values outside [0, 1] are continued
-  // as odd functions (srgb, gamma), so that noise around 0 keeps its mean.
+  // Encode gives the stored value, Decode is its inverse. The curve is IEC 61966-2-1 for srgb and
+  // stored = light^(1/gamma) for gamma. Outside [0, 1] the curves srgb and gamma are continued as
+  // odd functions, so that noise around 0 keeps its mean.
   double Encode(double light) const;
   double Decode(double stored) const;
 
