@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kWeightSumTolerance = 1e-6;
 
-// What is wrong with the weights, or nothing.
+// Returns the error of the weights, or an empty text if they are valid.
 std::string WeightComplaint(const LightField& light_field) {
   const Eigen::ArrayXXd& weights = light_field.weights;
   if (weights.rows() != light_field.v_count || weights.cols() != light_field.u_count) {
@@ -36,7 +36,7 @@ std::string WeightComplaint(const LightField& light_field) {
   return "";
 }
 
-// The same for what ties the light field to a camera.
+// Returns the error of the grid and the camera, or an empty text if they are valid.
 std::string GridComplaint(const LightField& light_field) {
   if (light_field.grid.has_value() != light_field.camera.has_value()) {
     return light_field.grid ? "grid: there is one, but no camera: both or none are needed"
@@ -107,7 +107,7 @@ void RequireView(const LightField& light_field, int k, int l) {
                           light_field.u_count - 1, light_field.v_count - 1));
 }
 
-// The first of the `inner` views in the middle of `all`.
+// Index of the first of the `inner` central views of `all`.
 int FirstInner(const char* name, int inner, int all) {
   if (inner < 1 || inner > all || (all - inner) % 2 != 0) {
     throw Error(fmt::format(
@@ -118,9 +118,9 @@ int FirstInner(const char* name, int inner, int all) {
   return (all - inner) / 2;
 }
 
-// `what` names the picture in the message.
+// Throws Error if the rectangle is empty or not inside. `what` is the name in the message.
 void RequireInside(const std::string& what, const PixelRect& rect, int width_px, int height_px) {
-  // Written as differences, which cannot overflow once the corner is inside.
+  // The differences cannot overflow once the corner is inside.
   const bool inside = rect.x >= 0 && rect.y >= 0 && rect.width >= 1 && rect.height >= 1 &&
                       rect.x < width_px && rect.y < height_px && rect.width <= width_px - rect.x &&
                       rect.height <= height_px - rect.y;

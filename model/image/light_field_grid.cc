@@ -10,7 +10,7 @@
 namespace thicklens::model {
 namespace {
 
-// True if rays can be told by their crossings with the two planes.
+// Returns true if the crossings with the two planes determine a ray.
 bool ArePlanesPossible(const LightFieldPlanes& planes, std::string* why) {
   if (!std::isfinite(planes.uv_depth_mm)) {
     if (why != nullptr) {
@@ -39,8 +39,8 @@ double SquaredSlope(const LightFieldPlanes& planes, const Ray& ray) {
   return u_slope * u_slope + v_slope * v_slope;
 }
 
-// One weight per sample of an axis, not normalised: exp(-(4 a/n)^2/2), +-2 standard deviations over
-// n samples.
+// Weight of one sample of an axis, not normalised: exp(-(4 a/n)^2/2), so that n samples cover +-2
+// standard deviations.
 double GaussianWeight(double offset, int count) {
   const double deviations = 4 * offset / count;
   return std::exp(-deviations * deviations / 2);
@@ -60,8 +60,8 @@ double StepMm(double sigma_mm, double second_moment) {
 }  // namespace
 
 // [S17]: P = [zl (D - f2) - f1 D]/(d0 f2). [S18]: Q = [(zl + d0)(D - f2) - f1 D]/(d0 f2). In terms
-// of c(z): P = -zl c(zl)/d0, Q = -(zl + d0) c(zl + d0)/d0; hence Q = 0 with ST in the plane of
-// focus. The products are kept whole: c itself is infinite at zl = 0, where P is not.
+// of c(z): P = -zl c(zl)/d0, Q = -(zl + d0) c(zl + d0)/d0; hence Q = 0 if ST is the plane of focus.
+// The products are computed as a whole, because c is infinite at zl = 0, where P is finite.
 ProjectionCoefficients ProjectionOf(const ThickLens& lens, double image_distance_mm,
                                     const LightFieldPlanes& planes) {
   CheckPlanes(planes);
@@ -80,8 +80,8 @@ Eigen::Vector2d LandingPointMm(const ThickLens& lens, double image_distance_mm,
   return {k.p * ray.s_mm - k.q * ray.u_mm, k.p * ray.t_mm - k.q * ray.v_mm};
 }
 
-// [S14] gives the crossing x_f with the plane of focus; then, by similar triangles at the nodal
-// points, i_x = -(D - f2 + f1)/(zf - f1 + f2) x_f [S15].
+// [S14] gives the crossing x_f with the plane of focus. Similar triangles at the nodal points then
+// give i_x = -(D - f2 + f1)/(zf - f1 + f2) x_f [S15].
 Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens, double image_distance_mm,
                                             const LightFieldPlanes& planes, const Ray& ray) {
   const double focus_depth_mm = FocusDepthMm(lens, image_distance_mm);
@@ -96,13 +96,13 @@ Eigen::Vector2d LandingPointByNodalPointsMm(const ThickLens& lens, double image_
   return -sensor_to_nodal_mm / object_to_nodal_mm * PositionAtDepthMm(planes, ray, focus_depth_mm);
 }
 
-// [S10]: a_u = [(zl + d0) u - zl s]/d0, which is the ray's position at depth 0.
+// [S10]: a_u = [(zl + d0) u - zl s]/d0 is the ray's position at depth 0.
 Eigen::Vector2d ApertureCrossingMm(const LightFieldPlanes& planes, const Ray& ray) {
   return PositionAtDepthMm(planes, ray, 0);
 }
 
-// Nothing is divided by the depth or by its distance from a plane: finite at z = zl and z = zl +
-// d0.
+// The position is finite at z = zl and z = zl + d0, because nothing is divided by the depth or by
+// its distance from a plane.
 Eigen::Vector2d PositionAtDepthMm(const LightFieldPlanes& planes, const Ray& ray, double depth_mm) {
   CheckPlanes(planes);
   if (!std::isfinite(depth_mm)) {
@@ -119,16 +119,16 @@ Eigen::Vector2d PicturePositionPx(const Sensor& sensor, const Eigen::Vector2d& l
   return sensor.principal_point_px - landing_mm / sensor.pixel_pitch_mm;
 }
 
-// [S8] has zl/sqrt((a_u - u)^2 + (a_v - v)^2 + zl^2), 0/0 at zl = 0. With [S10], a_u - u =
-// zl (u - s)/d0: zl cancels.
+// [S8] is zl/sqrt((a_u - u)^2 + (a_v - v)^2 + zl^2), which is 0/0 at zl = 0. zl cancels, because
+// a_u - u = zl (u - s)/d0 by [S10].
 double CosAlpha(const LightFieldPlanes& planes, const Ray& ray) {
   CheckPlanes(planes);
   return 1 / std::sqrt(1 + SquaredSlope(planes, ray));
 }
 
-// [S9]: d1/sqrt((i_x - a_u)^2 + (i_y - a_v)^2 + d1^2). Erratum kept: the ray that meets Ap at
+// [S9]: d1/sqrt((i_x - a_u)^2 + (i_y - a_v)^2 + d1^2). Erratum, kept: the ray that meets Ap at
 // (a_u, a_v) leaves the REAR principal plane at that height, D = d1 - rho in front of the sensor.
-// Exact at rho = 0.
+// The formula is exact at rho = 0.
 double CosBeta(const ThickLens& lens, double image_distance_mm, const LightFieldPlanes& planes,
                const Ray& ray) {
   const Eigen::Vector2d slope =
@@ -286,8 +286,8 @@ bool LightFieldGrid::IsValid(std::string* why) const {
   if (!(t_step_mm > 0) || !std::isfinite(t_step_mm)) {
     return fail(fmt::format("t_step_mm is {}: it must be finite and > 0", t_step_mm));
   }
-  // 0 is possible: one view, or an aperture without blur. Negative is, too: with ST nearer than UV
-  // (d0 < 0) u and the aperture position run against each other.
+  // A step of 0 is valid: one view, or an aperture without blur. A negative step is valid too: if
+  // ST is nearer than UV (d0 < 0), u and the aperture position have opposite directions.
   if (!std::isfinite(u_step_mm)) {
     return fail(fmt::format("u_step_mm is {}: it must be finite", u_step_mm));
   }
@@ -348,8 +348,8 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
   }
 
   const double p = ProjectionOf(camera.lens, image_distance_mm, planes).p;
-  // A ray through the point on the axis in focus has s = -u (zl + d0 - zf)/(zf - zl), and so, by
-  // [S10], crosses the aperture at a = u zf/(zf - zl). Derived here [D15]; zf may be infinite.
+  // A ray through the point on the axis in focus has s = -u (zl + d0 - zf)/(zf - zl). By [S10] it
+  // crosses the aperture at a = u zf/(zf - zl). Derived here [D15]; zf may be infinite.
   const double uv_per_aperture = 1 - planes.uv_depth_mm / focus_depth_mm;
 
   LightFieldGrid grid;
@@ -370,8 +370,8 @@ LightFieldGrid GridOnPlanes(const Camera& camera, const LightFieldPlanes& planes
   return grid;
 }
 
-// The ray stays on the point while s (z - zl) + u (zl + d0 - z) is constant. Written with
-// d0/(z - zl), so that a point at infinity has the finite slope du/ds.
+// The ray passes through the point while s (z - zl) + u (zl + d0 - z) is constant. The form with
+// d0/(z - zl) gives a point at infinity the finite slope du/ds.
 double SlopeOnGrid(const LightFieldGrid& grid, double depth_mm) {
   const double from_uv_mm = depth_mm - grid.planes.uv_depth_mm;
   if (!(depth_mm > 0) || from_uv_mm == 0) {

@@ -25,7 +25,8 @@ std::size_t CountOf(int width, int height, int channels) {
          static_cast<std::size_t>(channels);
 }
 
-// `what` names the array in the message: "picture", "depth map".
+// Throws Error unless the count is the product of the sizes. `what` is the array's name in the
+// message.
 void CheckSize(const std::string& what, int width_px, int height_px, int channels,
                std::size_t count) {
   if (width_px < 1 || height_px < 1 || channels < 1 ||
@@ -48,14 +49,14 @@ double FullScale(int bits) {
   return bits == 8 ? 255.0 : 65535.0;
 }
 
-// The level of a value that is stored as integers up to `full_scale`.
+// Integer level of an encoded value, 1 at `full_scale`.
 std::uint16_t RoundedLevel(double stored, double full_scale) {
   const double level = std::floor(stored * full_scale + 0.5);
-  // Written so that NaN becomes black; a cast of it would be undefined.
+  // The comparison makes NaN black; a cast of NaN would be undefined.
   return static_cast<std::uint16_t>(level > 0 ? std::min(level, full_scale) : 0.0);
 }
 
-// `level_of` gives what is stored for each value.
+// Stored image; `level_of` gives the level of each value.
 template <typename LevelOf>
 StoredPicture StoredBy(const LinearPicture& picture, int bits, const LevelOf& level_of) {
   CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
@@ -94,20 +95,20 @@ void CheckConvention(const DepthConvention& convention, const std::string& depth
   }
 }
 
-// Turns numbers of one map into z, mm from Ap.
+// Converts the numbers of one map to z, mm from Ap.
 class DepthConverter {
  public:
   DepthConverter(const Camera& camera, const DepthConvention& convention)
       : convention_(convention), principal_point_px_(camera.sensor.principal_point_px) {
-    if (convention.kind == DepthKind::kZ) return;  // the only kind that needs no calibration
+    if (convention.kind == DepthKind::kZ) return;  // z is the only kind without calibration
     focal_scale_px_ = camera.focal_scale_px();
     if (convention.kind == DepthKind::kRange) return;
     inverse_focus_per_mm_ = 1 / camera.focus_depth_mm();
     inverse_per_px_ = 1 / (convention.aperture_step_mm * focal_scale_px_);
   }
 
-  // NaN where the number stands for no depth in front of the camera. Negative for a negative z or
-  // range.
+  // Depth z, mm from Ap; NaN if the number is no depth in front of the camera. A negative z or
+  // range gives a negative depth.
   double DepthMm(double value, int x, int y, bool integer) const {
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     if (!std::isfinite(value)) return kNone;
@@ -143,7 +144,8 @@ class DepthConverter {
   double inverse_per_px_ = 0;        // p/(da K), 1/mm per px of disparity
 };
 
-// The median is the lower of the two middle ones, so that it is a depth that occurs.
+// The median of an even number of depths is the lower of the two middle ones, so that it is a depth
+// of the map.
 DepthStatistics StatisticsOf(const std::vector<float>& depth_mm) {
   std::vector<float> valid_mm;
   valid_mm.reserve(depth_mm.size());
@@ -162,14 +164,14 @@ DepthStatistics StatisticsOf(const std::vector<float>& depth_mm) {
   return statistics;
 }
 
-// Refuses depths that no picture of this camera has. A unit that is off by 1000 is told by two
-// bounds at once, in lengths of the camera, so that a landscape taken with a near focus, or a close
-// object with a far one, still passes:
-//   too large by 1000: every depth beyond 1000 f1 (none was nearer than f1), and the median beyond
-//     100 zf (it was beyond zf/10);
-//   too small by 1000: every depth within 10 f1 (none was beyond 10^4 f1), and the median within
-//     zf/100 (it was within 10 zf).
-// Many of the second sort are nearer than f1 already.
+// Throws Error for depths that are impossible in an image of this camera. A unit that is wrong by a
+// factor of 1000 is detected by two conditions, both of which must hold, so that a landscape with a
+// near focus, or a close object with a far focus, is still accepted:
+//   too large by 1000: every depth is beyond 1000 f1 (no true depth is nearer than f1), and the
+//     median is beyond 100 zf (the true one is beyond zf/10);
+//   too small by 1000: every depth is within 10 f1 (no true depth is beyond 10^4 f1), and the
+//     median is within zf/100 (the true one is within 10 zf).
+// Many maps that are too small already contain depths nearer than f1.
 void CheckPlausible(const Camera& camera, const DepthStatistics& depth,
                     const std::string& depth_name, const std::string& doubt) {
   const std::string found = fmt::format("{}: depths from {:.6g} to {:.6g} mm, median {:.6g} mm",
@@ -204,7 +206,7 @@ StoredLevels::StoredLevels(const TransferCurve& transfer, int bits) : bits_(bits
   };
   least_light_.push_back(0);
   for (int level = 1; level <= static_cast<int>(full_scale); ++level) {
-    // Decode and Encode are inverse to each other up to their rounding, which may cross a float.
+    // Decode is the inverse of Encode up to rounding, which may reach the next float.
     auto least = static_cast<float>(transfer.Decode((level - 0.5) / full_scale));
     while (level_of(least) >= level) least = std::nextafter(least, 0.0F);
     while (level_of(least) < level) least = std::nextafter(least, 2.0F);
@@ -212,7 +214,7 @@ StoredLevels::StoredLevels(const TransferCurve& transfer, int bits) : bits_(bits
   }
   lowest_level_.resize(CellOf(1) + 1);
   for (std::size_t level = 1; level < least_light_.size(); ++level) {
-    // From the cell after the one that the level begins in.
+    // The level is the minimum from the cell after the one in which it begins.
     const std::size_t cell = CellOf(least_light_[level]) + 1;
     if (cell < lowest_level_.size()) lowest_level_[cell] = static_cast<std::uint16_t>(level);
   }
@@ -225,7 +227,7 @@ LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transf
   CheckBits(picture.bits);
   CheckSize("picture", picture.width_px, picture.height_px, picture.channels,
             picture.values.size());
-  // One entry a possible value: a power function for each pixel would cost far more.
+  // A table with one entry for each possible value costs far less than a power function per pixel.
   std::vector<float> light_of(static_cast<std::size_t>(picture.full_scale()) + 1);
   for (std::size_t value = 0; value < light_of.size(); ++value) {
     light_of[value] =
@@ -328,7 +330,7 @@ Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& 
                         "negative",
                         depth_name, x, y, value));
       }
-      // A depth beyond what float holds is one at infinity.
+      // A depth above the maximum of float is at infinity, which is a hole.
       const bool is_depth = depth_mm <= std::numeric_limits<float>::max();
       scene.depth_mm.push_back(is_depth ? static_cast<float>(depth_mm) : kHole);
     }

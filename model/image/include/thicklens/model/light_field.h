@@ -14,7 +14,7 @@
 
 namespace thicklens::model {
 
-// Where a light field came from. Fields that do not apply are empty.
+// Origin of a light field. Fields that do not apply are empty.
 struct LightFieldOrigin {
   // "scene", "blocks", "functional", "grid", "simulated", "imported", "dibr"
   std::string method;
@@ -22,38 +22,41 @@ struct LightFieldOrigin {
   std::optional<int> block_px;
   std::optional<double> gamma, ridge;
   std::optional<double> seconds, relative_residual, rcond_min;
-  std::vector<std::string> effects;  // of image formation that were on: "defocus", "falloff"
+  // Names of the effects of image formation that were on, e.g. "defocus", "falloff".
+  std::vector<std::string> effects;
   std::string version, date;
-  std::string prior;  // of the scene's radiance: "ridge", "gradient", "tv", "patches"
-  std::optional<double> strength, noise_sigma;  // of that prior; of the photograph's stored values
+  std::string prior;  // prior of the scene's radiance: "ridge", "gradient", "tv", "patches"
+  // Strength of that prior; noise of the stored values of the photograph.
+  std::optional<double> strength, noise_sigma;
   std::optional<int> iterations;
 };
 
-// U x V views of S x T samples in linear light.
+// A light field of U x V views of S x T samples in linear light. It owns all its data.
 //
-// A view (k, l) is seen from the aperture position a = k - (U-1)/2 steps to the right and
-// b = l - (V-1)/2 steps down. What the centre view (a = b = 0) shows at x stands at x - a d in it,
-// d the disparity of the scene point in px per view step (near positive).
+// The viewpoint of the view (k, l) is the aperture position a = k - (U-1)/2 steps to the right and
+// b = l - (V-1)/2 steps down. A scene point at x in the centre view (a = b = 0) is at x - a d in
+// the view, where d is its disparity in px per view step (near positive).
 //
-// With a grid, the steps are those of a camera (mm), and a disparity follows from a depth. Without
-// one, the light field is relative: its steps are the scene's own, one unit of disparity is one px
-// per view step, and there is no camera and no irradiance fall-off.
+// A light field with a grid has the steps of a camera (mm), and a disparity follows from a depth. A
+// light field without a grid is relative: its steps are those of the scene, one unit of disparity
+// is one px per view step, and there is no camera and no irradiance fall-off.
 struct LightField {
   int s_count = 0, t_count = 0, u_count = 0, v_count = 0;
   int channels = 0;  // 1 (grey), 3 (RGB), or any number of bands
-  // Radiance, 1 at full scale; may leave [0, 1]. One plane a channel and view:
-  // ((channel * V + l) * U + k) * T * S + j * S + i.
+  // Radiance, 1 at full scale; values may be outside [0, 1]. There is one plane for each channel
+  // and view. The index of the sample (i, j) is ((channel * V + l) * U + k) * T * S + j * S + i.
   std::vector<float> values;
-  // V x U: the share of each view in the photograph that the light field belongs to, sum 1.
+  // V x U: the share of each view in the photograph of this light field; the sum is 1.
   Eigen::ArrayXXd weights;
-  // V * U, l * U + k: false where a view is not known (its values are 0). Empty: all are.
+  // V * U entries, index l * U + k: false if the view is unknown (its values are 0). Empty: all
+  // views are known.
   std::vector<bool> present;
-  // q, per axis: px that a ray lands beside its sample, per view step. 0 with ST in the plane of
-  // focus, and for relative light fields.
+  // q, per axis: offset of a ray's landing point from its sample, px per view step. It is 0 if ST
+  // is in the plane of focus, and for relative light fields.
   Eigen::Vector2d landing_step_px{0, 0};
   TransferCurve transfer = TransferCurve::Srgb();  // for storing views
   std::optional<LightFieldGrid> grid;
-  std::optional<Camera> camera;  // present if and only if `grid` is
+  std::optional<Camera> camera;  // present if and only if `grid` is present
   LightFieldOrigin origin;
 
   std::size_t view_size() const {
@@ -72,36 +75,44 @@ struct LightField {
   double u_offset(int k) const { return k - (u_count - 1) / 2.0; }
   double v_offset(int l) const { return l - (v_count - 1) / 2.0; }
 
-  // True if sizes, weights and presence fit; else `why` names field and value.
+  // Returns true if the sizes, the weights, `present`, the grid and the camera agree. Otherwise
+  // `why`, if not null, gets the field and the value.
   bool IsValid(std::string* why) const;
 };
 
-// An empty light field (values 0, uniform weights) of the given sizes.
+// A light field of the given sizes with all values 0, uniform weights and no grid. Throws Error
+// unless all sizes are >= 1.
 LightField MakeLightField(int s_count, int t_count, int u_count, int v_count, int channels);
 
-// A light field without its values, which may be large. InnerViews and CropViews take one, too, and
-// then give one.
+// Copy of a light field without its values, which may be large. InnerViews and CropViews also
+// accept such a description and then return one.
 LightField DescriptionOf(const LightField& light_field);
 
-// One view as a picture, channels interleaved, and back. Throws Error for a view outside.
+// Copy of one view as an image of S x T px, channels interleaved. Throws Error if the view does not
+// exist.
 LinearPicture ViewPicture(const LightField& light_field, int k, int l);
-// A view that is set is present.
+// Replaces one view and marks it as present. Throws Error if the view does not exist or the size or
+// the channels of the image differ.
 void SetView(LightField* light_field, int k, int l, const LinearPicture& picture);
 
-// The u x v views in the middle; their weights are scaled to sum 1. Throws Error unless the counts
-// are at most, and of the parity of, those that there are (else the middle would move).
+// The central u x v views, with weights scaled to the sum 1. Throws Error unless each count is from
+// 1 to the present one and of the same parity (otherwise the middle would move), and unless the
+// views have some weight.
 LightField InnerViews(const LightField& light_field, int u_count, int v_count);
 
-// A rectangle of every view. The camera's principal point moves with it. Throws Error if it leaves
-// the views.
+// A rectangle of pixels, px; (x, y) is its top-left pixel.
 struct PixelRect {
   int x = 0, y = 0, width = 0, height = 0;
 };
+// The rectangle `rect` of every view, of an image or of a depth map. The principal point of the
+// camera and the origin of the grid move with the rectangle. Each function throws Error if `rect`
+// is empty or not inside.
 LightField CropViews(const LightField& light_field, const PixelRect& rect);
 LinearPicture CropPicture(const LinearPicture& picture, const PixelRect& rect);
 StoredPicture CropPicture(const StoredPicture& picture, const PixelRect& rect);
 RawDepthMap CropDepth(const RawDepthMap& map, const PixelRect& rect);
-// The same camera with only that rectangle of its sensor.
+// Copy of the camera whose sensor is only the rectangle `rect` of the sensor. Throws Error if
+// `rect` is empty or not inside the sensor.
 Camera CropCamera(const Camera& camera, const PixelRect& rect);
 
 }  // namespace thicklens::model

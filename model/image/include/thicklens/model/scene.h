@@ -10,7 +10,8 @@
 
 namespace thicklens::model {
 
-// A picture as a file stores it: integer values, rows top to bottom, channels interleaved (RGB).
+// An image as a file stores it: integer values, rows from top to bottom, channels interleaved
+// (RGB).
 struct StoredPicture {
   int width_px = 0;
   int height_px = 0;
@@ -21,7 +22,7 @@ struct StoredPicture {
   double full_scale() const { return bits == 8 ? 255.0 : 65535.0; }
 };
 
-// A picture in linear light, 1 at full scale, same order of values.
+// An image in linear light, 1 at full scale; the order of the values is that of StoredPicture.
 struct LinearPicture {
   int width_px = 0;
   int height_px = 0;
@@ -36,30 +37,36 @@ struct LinearPicture {
   }
 };
 
+// Decodes the stored values. Throws Error if `bits` is not 8 or 16, the number of values does not
+// fit the size, or a value is above full scale.
 LinearPicture ToLinear(const StoredPicture& picture, const TransferCurve& transfer);
+// Encodes, rounds and clips the values; NaN becomes 0. Throws Error if `bits` is not 8 or 16 or the
+// number of values does not fit the size.
 StoredPicture ToStored(const LinearPicture& picture, const TransferCurve& transfer, int bits);
-// The same with normal noise of standard deviation `sigma`, in full scales, added to the stored
-// values before they are rounded; sigma = 0 gives ToStored. The seed alone decides the draws.
+// ToStored with normal noise, which is added to the encoded values before they are rounded. `sigma`
+// is its standard deviation in units of full scale; 0 gives ToStored. The seed alone determines the
+// noise. Throws Error also unless sigma is finite and >= 0.
 StoredPicture ToStoredWithNoise(const LinearPicture& picture, const TransferCurve& transfer,
                                 int bits, double sigma, std::uint64_t seed);
-// .2126 R + .7152 G + .0722 B for three channels; one channel is returned as it is; of four the
-// last (alpha) is left out. Throws Error for other counts.
+// Grey image 0.2126 R + 0.7152 G + 0.0722 B of three channels. One channel is returned unchanged;
+// the last of four channels (alpha) is ignored. Throws Error for other numbers of channels.
 LinearPicture ToGrey(const LinearPicture& picture);
 
-// What the numbers of a depth map mean. Never guessed: the user says it.
+// Meaning of the numbers of a depth map. The user states it; it is never guessed.
 enum class DepthKind {
   kZ,          // depth along the axis from Ap
   kRange,      // distance along the chief ray of the pixel, from the centre of Ap
   kDisparity,  // px per view step, near positive, 0 in the plane of focus
 };
-DepthKind DepthKindFromName(const std::string& name);  // "z", "range", "disparity"
+// The kind of the name "z", "range" or "disparity". Throws Error for any other name.
+DepthKind DepthKindFromName(const std::string& name);
 
-// A map as read from a file, one number a pixel.
+// A depth map as read from a file: one number per pixel, rows from top to bottom.
 struct RawDepthMap {
   int width_px = 0;
   int height_px = 0;
   std::vector<float> values;
-  bool integer = false;  // from an integer file format, where 0 means "no data"
+  bool integer = false;  // true: the file format is integer, and 0 means "no data"
 };
 
 struct DepthConvention {
@@ -67,31 +74,35 @@ struct DepthConvention {
   double unit_mm = 1;          // kZ, kRange: mm per unit of the map (tum5000: 0.2)
   double disparity_scale = 1;  // kDisparity: disparity_px = scale * value + offset
   double disparity_offset_px = 0;
-  double aperture_step_mm = 0;  // kDisparity: da of the views that the disparity refers to
+  double aperture_step_mm = 0;  // kDisparity: da, step on Ap between the views of the disparity
 };
-// "mm", "cm", "m", "tum5000" (16-bit PNG of the TUM benchmark, m x 5000): mm per unit. Throws
-// Error.
+// Millimetres per unit for the name "mm", "cm", "m" or "tum5000" (16-bit PNG of the TUM benchmark,
+// m x 5000). Throws Error for any other name.
 double DepthUnitMm(const std::string& name);
 
+// Numbers of depths and holes in a depth map, and the depths from Ap.
 struct DepthStatistics {
   std::size_t valid = 0;
   std::size_t holes = 0;
-  double min_mm = 0, median_mm = 0, max_mm = 0;  // of the valid ones; 0 if there are none
+  double min_mm = 0, median_mm = 0, max_mm = 0;  // over the valid depths; 0 if there are none
 };
 
-// A picture in linear light with the depth of what each pixel's chief ray meets.
+// An image in linear light with the depth of the surface that the chief ray of each pixel meets.
 struct Scene {
   LinearPicture picture;
-  std::vector<float> depth_mm;  // z from Ap, aligned with the picture; NaN marks a hole
+  std::vector<float> depth_mm;  // z from Ap, one value per pixel of the image; NaN marks a hole
   DepthStatistics depth;
 };
 
-// Converts the map by its convention (range: z = range/sqrt(1 + (t p/K)^2), t px from the principal
-// point; disparity: 1/z = 1/zf + d p/(da K)) and puts it beside the picture. Holes: NaN and
-// infinities; 0 in integer maps and in z and range; a disparity of a point at or behind infinity.
-// Throws Error naming `depth_name` if the sizes differ, a depth is negative, all are holes, or the
-// depths cannot be this camera's (nearer than its front focal point, or the unit off by a factor
-// of 1000), with min, median and max in mm.
+// Makes a scene of an image and its depth map. The map is converted to z by its convention:
+//   range: z = range/sqrt(1 + (t p/K)^2), t px from the principal point
+//   disparity: 1/z = 1/zf + d p/(da K)
+// Holes are NaN and infinities, 0 in integer maps and in maps of z and range, and disparities of
+// points at or beyond infinity. Throws Error, which names `depth_name`, if the sizes differ, a
+// depth is negative, all values are holes, or the depths are impossible for this camera (nearer
+// than its front focal point, or with a unit that is wrong by a factor of 1000); the latter message
+// states the minimum, median and maximum in mm. Throws Error also if the convention is invalid or
+// the camera lacks the calibration that range and disparity need.
 Scene MakeScene(const Camera& camera, LinearPicture picture, const RawDepthMap& map,
                 const DepthConvention& convention, const std::string& depth_name);
 

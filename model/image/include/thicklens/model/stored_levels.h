@@ -11,8 +11,8 @@
 
 namespace thicklens::model {
 
-// The values that files store for light, for many pictures of one curve: the levels of
-// floor(Encode(light) (2^bits - 1) + 1/2), clipped, without a power function for each value.
+// Table of the values that files store for linear light, for many images of one transfer curve. It
+// gives floor(Encode(light) (2^bits - 1) + 1/2), clipped, without a power function for each value.
 class StoredLevels {
  public:
   // Throws Error unless `bits` is 8 or 16.
@@ -20,7 +20,7 @@ class StoredLevels {
 
   int bits() const { return bits_; }
 
-  // NaN is black.
+  // The stored value of `light`, 1 at full scale. NaN gives 0.
   std::uint16_t LevelOf(float light) const {
     if (!(light > 0)) return 0;
     if (light >= least_light_.back()) return static_cast<std::uint16_t>(least_light_.size() - 1);
@@ -30,17 +30,19 @@ class StoredLevels {
   }
 
  private:
-  // Light in cells of about one level each: curves are nearly straight over the root of light.
+  // Index of the cell of `light`. Cells have about one level each, because curves are nearly
+  // straight over the square root of light.
   std::size_t CellOf(float light) const {
     return static_cast<std::size_t>(std::sqrt(light) * static_cast<float>(least_light_.size()));
   }
 
   int bits_ = 8;
-  std::vector<float> least_light_;           // of each level; 0 for level 0
-  std::vector<std::uint16_t> lowest_level_;  // of the light in each cell
+  std::vector<float> least_light_;           // minimum light of each level; 0 for level 0
+  std::vector<std::uint16_t> lowest_level_;  // minimum level of the light in each cell
 };
 
-// ToStored(picture, transfer, bits) of the levels' curve and bits, the same values.
+// Gives the same values as the other ToStored with the curve and the bits of `levels`. Throws Error
+// if the number of values does not fit the size.
 StoredPicture ToStored(const LinearPicture& picture, const StoredLevels& levels);
 
 }  // namespace thicklens::model
