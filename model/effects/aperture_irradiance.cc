@@ -19,7 +19,7 @@ Aperture ApertureOf(const EffectOptics& optics, const EffectSet& effects) {
 
 const std::vector<AperturePoint>& AperturePoints(Aperture aperture) {
   static const std::vector<AperturePoint> pinhole = {{0, 0, 1}};
-  // Gauss and Hermite's three on each axis.
+  // Gauss-Hermite rule of three nodes on each axis.
   static const std::vector<AperturePoint> gaussian = [] {
     std::vector<AperturePoint> points;
     const double at[] = {-std::sqrt(3.0), 0, std::sqrt(3.0)},

@@ -11,22 +11,22 @@ namespace thicklens::model {
 
 enum class Aperture { kPinhole, kGaussian, kDisc };
 
-// Of a picture with these effects.
+// The aperture of an image with these effects.
 Aperture ApertureOf(const EffectOptics& optics, const EffectSet& effects);
 
-// Points of an aperture of standard deviation 1 whose mean is exact up to the fifth order.
+// Points and weights of an aperture of standard deviation 1. Their weighted mean is exact up to the
+// fifth order.
 struct AperturePoint {
   double x, y, weight;
 };
 const std::vector<AperturePoint>& AperturePoints(Aperture aperture);
 
-// What rays through the points of an aperture bring to a position of the image of a uniform
-// radiance, each by [S12] relative to what the same point of the aperture brings to the principal
-// point: the calibrated blur of a point on the axis contains the fall-off there. Their mean, which
-// is 1 at the principal point, and each over that mean.
+// Irradiance at a position of the image of a uniform radiance, by the rays through the points of an
+// aperture. Each value is [S12] relative to the value of the same aperture point at the principal
+// point, because the calibrated blur of a point on the axis contains the fall-off there.
 struct Irradiance {
-  double mean = 0;
-  std::vector<double> over_mean;
+  double mean = 0;                // weighted mean over the aperture; 1 at the principal point
+  std::vector<double> over_mean;  // the value of each point divided by the mean
 };
 Irradiance IrradianceAt(const EffectOptics& optics, const Eigen::Vector2d& position_px,
                         double image_distance_mm, Aperture aperture);

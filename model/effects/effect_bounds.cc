@@ -31,8 +31,8 @@ double EffectOptics::DefocusPx(double depth_mm) const {
   return aperture_sigma_mm_ * scale_px_ * (1 / depth_mm - inverse_focus_);
 }
 
-// Of surfaces at different depths the sharpest counts: between two on both sides of the plane of
-// focus there may be one in it.
+// The sharpest of the surfaces at different depths determines the smoothing. Between two surfaces
+// on both sides of the plane of focus there may be one in that plane.
 EffectOptics::Smoothing EffectOptics::SmoothingBy(const EffectSet& effects,
                                                   const EffectPlace& place) const {
   Smoothing smoothing;
@@ -51,20 +51,20 @@ EffectOptics::Smoothing EffectOptics::SmoothingBy(const EffectSet& effects,
   return smoothing;
 }
 
-// Derived here [D48], k the density of the added displacement d (mean 0, variance v per axis), L
-// the picture with range R, I = k * L:
+// Derived here [D48]. k is the density of the added displacement d (mean 0, variance v per axis), L
+// is the image with the range R, and I = k * L:
 //   |I - L| <= R
 //   |I - L| <= 1/2 v sup(|L_xx| + |L_yy|)                 Taylor; the mean of d vanishes
 //   |I - L| <= E|d| sup|grad L|, E|d| <= sqrt(2 v)        Jensen
-// and past a straight jump of height J, which the pixel's box has made a ramp no steeper than
-// sqrt(2) J per px, from the foot of the ramp: sqrt(2) J E[d_n^+], which for a Gaussian is
-// J sqrt(v/pi); without the box half of it. In a picture that has a Gaussian blur of variance g
-// already,
+// At a straight jump of height J, which the pixel's box has turned into a ramp with a slope of at
+// most sqrt(2) J per px, the bound at the foot of the ramp is sqrt(2) J E[d_n^+], which is
+// J sqrt(v/pi) for a Gaussian. Without the box it is half of the jump. In an image that already has
+// a Gaussian blur of variance g,
 //   sup(|L_xx| + |L_yy|) <= R 4 phi(1)/g, phi the normal density,
-// since |d2/dx2 (G * M)| <= R/2 integral |d2G/dx2| = 2 phi(1) R/g; and in one that has been
-// averaged over a disc of radius b, |I - L| <= R/2 integral |k * D - D|
-//   <= R/2 E|d_n| (perimeter/area of D) = R/b E|d_n|.
-// Jumps of the radiance are bounded by the range in the last two.
+// since |d2/dx2 (G * M)| <= R/2 integral |d2G/dx2| = 2 phi(1) R/g. In an image that has been
+// averaged over a disc D of radius b,
+//   |I - L| <= R/2 integral |k * D - D| <= R/2 E|d_n| (perimeter/area of D) = R/b E|d_n|.
+// The range bounds the jumps of the radiance in the last two cases.
 double BlurChange(const EffectPlace& place, double variance_px2,
                   const EffectOptics::Smoothing& other) {
   if (!(variance_px2 > 0)) return 0;
@@ -84,9 +84,10 @@ double BlurChange(const EffectPlace& place, double variance_px2,
   return change;
 }
 
-// |L(x + d) - L(x)| <= |d| sup|grad L| and, at a jump [D49] that a box has made a ramp, sqrt(2) J
-// |d|; after a Gaussian blur of variance g at most R |d|/sqrt(2 pi g), after a disc of radius b R
-// |d| 2/(pi b): the most that an edge has.
+// The change is |L(x + d) - L(x)| <= |d| sup|grad L|. At a jump that a box has turned into a ramp
+// it is at most sqrt(2) J |d| [D49]. After a Gaussian blur of variance g it is at most
+// R |d|/sqrt(2 pi g), after a disc of radius b at most R |d| 2/(pi b): the maximum is that of an
+// edge.
 double ShiftChange(const EffectPlace& place, double shift_px,
                    const EffectOptics::Smoothing& other) {
   const double range = Range(place);
@@ -98,7 +99,7 @@ double ShiftChange(const EffectPlace& place, double shift_px,
   return shift_px == 0 ? 0 : std::min(range, slope * std::abs(shift_px));
 }
 
-// Transfer curves are concave: the same change counts most where it is dark.
+// Transfer curves are concave: the same change of light has the largest effect where it is dark.
 double StoredChange(const EffectOptics& optics, const EffectPlace& place, double change) {
   const TransferCurve& transfer = optics.transfer();
   const double dark = std::clamp(place.dark, 0.0, 1.0);
@@ -106,7 +107,7 @@ double StoredChange(const EffectOptics& optics, const EffectPlace& place, double
   return 255 * (transfer.Encode(lit) - transfer.Encode(dark));
 }
 
-// Encode(L) - Encode(L (1 - e)) grows with L for curves that are powers of light, or straight.
+// Encode(L) - Encode(L (1 - e)) increases with L for curves that are powers of light, or straight.
 double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative) {
   const TransferCurve& transfer = optics.transfer();
   const double bright = std::clamp(place.bright, 0.0, 1.0);

@@ -7,7 +7,8 @@
 
 namespace thicklens::model {
 
-// What the bounds of effects need of a camera and of the effects of a picture, computed once.
+// Quantities of a camera and of the effects of an image that the bounds of effects need, computed
+// once. Keeps a reference to the conditions, which must outlive it.
 class EffectOptics {
  public:
   EffectOptics(const EffectConditions& given, const EffectSet& of_picture);
@@ -18,22 +19,20 @@ class EffectOptics {
   double aperture_sigma_mm() const { return aperture_sigma_mm_; }  // kappa r
   double scale_px() const { return scale_px_; }                    // K/p
   double floor_px() const { return floor_px_; }
-  double image_distance_mm() const {
-    return image_distance_mm_;
-  }                                                            // of the thin lens without thickness
+  // The image distance d1; K, that of the thin lens, without the effect of thickness.
+  double image_distance_mm() const { return image_distance_mm_; }
   const TransferCurve& transfer() const { return transfer_; }  // linear without its effect
   bool is_disc() const { return conditions_.camera.psf == Psf::kDisc; }
 
-  // c(z) kappa r/p: displacement on the sensor, px, per standard deviation of the aperture; its
+  // c(z) kappa r/p: displacement on the sensor, px, per standard deviation of the aperture. Its
   // absolute value is the sigma of defocus.
   double DefocusPx(double depth_mm) const;
 
-  // What other effects leave of a picture's detail: the variance of their Gaussian blur, the radius
-  // of their disc, px, and whether a pixel's box has made ramps of its jumps.
+  // Smoothing of the image by other effects.
   struct Smoothing {
-    double gaussian_px2 = 0;
-    double disc_px = 0;
-    bool boxed = false;
+    double gaussian_px2 = 0;  // variance of the Gaussian blur per axis
+    double disc_px = 0;       // radius of the disc
+    bool boxed = false;       // true: the box of a pixel has turned jumps into ramps
   };
   Smoothing SmoothingBy(const EffectSet& effects, const EffectPlace& place) const;
 
@@ -46,30 +45,31 @@ class EffectOptics {
 
 // Bounds of changes in linear light.
 
-// By a blur of zero mean and `variance_px2` per axis, added to a picture that has `other` already.
+// Change by a blur of zero mean and `variance_px2` per axis, applied to an image that already has
+// the smoothing `other`.
 double BlurChange(const EffectPlace& place, double variance_px2,
                   const EffectOptics::Smoothing& other);
-// By a displacement, px.
+// Change by a displacement, px, of an image that already has the smoothing `other`.
 double ShiftChange(const EffectPlace& place, double shift_px, const EffectOptics::Smoothing& other);
 
 // Bounds of changes of stored values, 255 at full scale.
 
-// Of radiance, anywhere between the place's dark and bright.
+// Stored change for a change of the radiance anywhere between `dark` and `bright` of the place.
 double StoredChange(const EffectOptics& optics, const EffectPlace& place, double change);
-// Of light that is (1 + relative) times as strong.
+// Stored change for light that is scaled by (1 + relative).
 double StoredScaling(const EffectOptics& optics, const EffectPlace& place, double relative);
-// What a standard deviation in linear light is in stored values where the place is darkest; curves
-// are continued as odd functions below black, as TransferCurve::Encode has it.
+// Standard deviation of stored values for a standard deviation in linear light where the place is
+// darkest. Curves are continued as odd functions below black (TransferCurve::Encode).
 double StoredSigma(const EffectOptics& optics, const EffectPlace& place, double sigma);
 
 // Throws Error if the conditions are not valid or there is no place.
 void CheckEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places);
 bool MattersMore(const EffectImpact& a, const EffectImpact& b);
-// Where it matters most of all places, in a picture with `others`.
+// The place with the largest impact of the effect in an image that also has `others`.
 EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
                          const std::vector<EffectPlace>& places, const EffectSet& others);
 
-// The sections: one function an effect.
+// The impact of each effect: one function per effect.
 EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others);
 EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,

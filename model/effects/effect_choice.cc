@@ -16,7 +16,7 @@
 namespace thicklens::model {
 namespace {
 
-// What the effects that have been left out have taken of the tolerance.
+// The part of the tolerance that the omitted effects have used.
 class Spent {
  public:
   explicit Spent(const EffectTolerance& tolerance) : tolerance_(tolerance) {}
@@ -50,7 +50,7 @@ class Spent {
   double bounds_ = 0, noise_ = 0;
 };
 
-// Whether the bound of another effect is another without this one.
+// Whether the bounds of other effects change when this effect is removed.
 bool HidesOthers(Effect effect) {
   return EffectSet{Effect::kThickness, Effect::kDefocus,   Effect::kApertureShape, Effect::kFalloff,
                    Effect::kPixelBox,  Effect::kLensFloor, Effect::kTransferCurve}
@@ -99,7 +99,7 @@ EffectTolerance EffectToleranceFromText(const std::string& text) {
 
 namespace {
 
-// Of `effects` in a picture that has `kept`, too, and keeps them.
+// ChooseEffects for an image that also has the effects `kept`, which are never left out.
 EffectSet ChooseBeside(const EffectSet& kept, const EffectConditions& conditions,
                        const std::vector<EffectPlace>& places, const EffectSet& effects,
                        const EffectTolerance& tolerance, int threads) {
@@ -164,7 +164,7 @@ EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions&
                             JoinedNames(foreign), JoinedNames(of_model)));
   }
   EffectDecision decision;
-  // What the user takes out is not among the others of the rest.
+  // The effects that the user excludes are not part of the image in which the rest is assessed.
   EffectSet base = of_model.Without(choice.without);
   if (choice.base == EffectChoice::Base::kGiven) base = base.Both(choice.given);
   const std::vector<Effect> each = of_model.Effects();

@@ -82,7 +82,8 @@ EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
     const EffectImpact impact = section(optics, place, others);
     if (MattersMore(impact, finding.impact)) finding = {effect, impact, place};
   }
-  // A bound that adds up several parts may pass what a stored value can change at all.
+  // A bound that is a sum of several parts may exceed the largest possible change of a stored
+  // value.
   if (!FactsOf(effect).random) {
     finding.impact.grey_levels = std::min(finding.impact.grey_levels, 255.0);
   }

@@ -13,7 +13,8 @@ Eigen::Vector2d FromAxisPx(const EffectOptics& optics, const EffectPlace& place)
   return place.position_px - optics.camera().sensor.principal_point_px;
 }
 
-// What another depth does to the blur at a place.
+// Bound of the change in linear light by the blur at a place when its depth changes by `shift_mm`
+// in either direction.
 double ChangeByDepth(const EffectOptics& optics, const EffectPlace& place, double shift_mm,
                      const EffectSet& others) {
   if (!others.Has(Effect::kDefocus) || !std::isfinite(place.depth_mm)) return 0;
@@ -32,18 +33,20 @@ double ChangeByDepth(const EffectOptics& optics, const EffectPlace& place, doubl
 
 }  // namespace
 
-// Lamp fall-off [D55]. Formula: a lamp at the camera lights a target at z with (zf/z)^2 of what it
-// does in the plane of focus. Bound: the scaling of the brightest. Enters: a factor of each frame.
+// Lamp fall-off [D55]. Formula: the irradiance by a lamp at the camera of a target at z is (zf/z)^2
+// times the irradiance in the plane of focus. Bound: the scaling of the brightest light. Enters: a
+// factor of each frame.
 EffectImpact LampFalloffImpact(const EffectOptics& optics, const EffectPlace& place,
                                const EffectSet& /*others*/) {
   const auto& bench = optics.conditions().bench;
   if (!bench || !bench->lamp_at_camera || !(optics.inverse_focus() > 0)) return {};
   const double light = std::pow(1 / (place.depth_mm * optics.inverse_focus()), 2);
-  // Relative to the brighter of the two, as StoredScaling has it.
+  // The loss is relative to the brighter of the two, as in StoredScaling.
   return {std::abs(light - 1), StoredScaling(optics, place, light < 1 ? 1 - light : 1 - 1 / light)};
 }
 
-// Flicker. Formula: a normal factor of each frame, sd relative. Enters: a factor of each frame.
+// Flicker. Formula: a normal factor of each frame with a relative standard deviation. Enters: a
+// factor of each frame.
 EffectImpact FlickerImpact(const EffectOptics& optics, const EffectPlace& place,
                            const EffectSet& /*others*/) {
   const auto& bench = optics.conditions().bench;
@@ -51,8 +54,8 @@ EffectImpact FlickerImpact(const EffectOptics& optics, const EffectPlace& place,
   return {bench->flicker, StoredScaling(optics, place, bench->flicker)};
 }
 
-// Magnification. Formula: |m| = f1 D/(f2 z), relative to the plane of focus zf/z. Bound: the
-// displacement of the place, ShiftChange. Enters: the scale of each frame.
+// Magnification. Formula: |m| = f1 D/(f2 z), which is zf/z relative to the plane of focus. Bound:
+// ShiftChange of the displacement of the place. Enters: the scale of each frame.
 EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectPlace& place,
                                  const EffectSet& others) {
   if (!optics.conditions().bench || !(optics.inverse_focus() > 0)) return {};
@@ -62,8 +65,9 @@ EffectImpact MagnificationImpact(const EffectOptics& optics, const EffectPlace& 
                                  ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
-// Drift. Formula: a normal displacement of the target in each frame, sd per axis in px at zf.
-// Bound: ShiftChange of it, of either axis. Enters: the place of each frame's target.
+// Drift. Formula: a normal displacement of the target in each frame, with its standard deviation
+// per axis in px at zf. Bound: ShiftChange of that standard deviation, for either axis. Enters: the
+// position of the target in each frame.
 EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
                          const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
@@ -73,19 +77,20 @@ EffectImpact DriftImpact(const EffectOptics& optics, const EffectPlace& place,
                                  ShiftChange(place, shift_px, optics.SmoothingBy(others, place)))};
 }
 
-// Tilt. Formula: the target's depth where a chief ray meets it is z0/N, N = 1 + (x p/K) tan(tilt),
-// and what is met lies at x/(N cos(tilt)) and y/N of the picture of a target across the axis.
-// Bound: what the depth changes of the blur, of either sign of the tilt, the displacement, and the
-// light of a lamp at the camera, which goes as N^2. Enters: the depth of each column of a frame.
+// Tilt. Formula: the depth at which a chief ray meets the target is z0/N, N = 1 + (x p/K)
+// tan(tilt). The point that it meets is at x/(N cos(tilt)) and y/N in the image of a target across
+// the axis. Bound: the sum of the change of the blur by the depth, for either sign of the tilt, of
+// the displacement, and of the light of a lamp at the camera, which is in proportion to N^2.
+// Enters: the depth of each column of a frame.
 EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
                         const EffectSet& others) {
   const auto& bench = optics.conditions().bench;
   if (!bench || bench->tilt_deg == 0 || !std::isfinite(place.depth_mm)) return {};
   const double tilt_rad = std::abs(bench->tilt_deg) * kPi / 180;
   const Eigen::Vector2d from_axis_px = FromAxisPx(optics, place).cwiseAbs();
-  // No target is seen at more than five times the depth of its middle.
+  // No target is visible at more than five times the depth of its middle.
   const double beside = std::min(0.8, from_axis_px.x() / optics.scale_px() * std::tan(tilt_rad));
-  // `place` may lie anywhere between the middle's depth and the column's.
+  // The depth of `place` may be any between that of the middle and that of the column.
   const double shift_mm = place.depth_mm * beside / (1 - beside);
   double displaced_px = 0;
   for (const double nearness : {1 - beside, 1 + beside}) {
@@ -102,9 +107,9 @@ EffectImpact TiltImpact(const EffectOptics& optics, const EffectPlace& place,
   return {place.depth_mm * beside, grey_levels};
 }
 
-// Reading error. Formula: a normal error of what is written, not of where the target stands: no
-// picture changes. Its grey levels are those of the frame at the depth that was read. Enters: the
-// readings.
+// Reading error. Formula: a normal error of the recorded reading, not of the position of the
+// target, so that no image changes. Its grey levels are those of a frame at the depth that was
+// read. Enters: the readings.
 EffectImpact ReadingErrorImpact(const EffectOptics& optics, const EffectPlace& place,
                                 const EffectSet& others) {
   const auto& bench = optics.conditions().bench;

@@ -1,4 +1,4 @@
-// Effects of the lens and of light on its way through it.
+// Effects of the lens and of the light on its way through the lens.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -16,10 +16,11 @@ double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
                   std::abs(optics.DefocusPx(place.other_depth_mm.value_or(place.depth_mm))));
 }
 
-// [D50] What weights of the aperture's rays change of a picture, stored: `weights` over the points,
-// less 1, of standard deviation s. It is their covariance with what different rays see, whose own
-// standard deviation is at most sqrt((I - dark)(bright - I)) where they see I in the mean, and at
-// most what their displacement by defocus changes.
+// [D50] Bound of the stored change by weights of the rays over the aperture. `weights` has one
+// value per aperture point, with the mean 1 and the standard deviation s. The change is the
+// covariance of the weights with the radiance along the rays. The standard deviation of that
+// radiance is at most sqrt((I - dark)(bright - I)), where I is its mean, and at most the change by
+// the displacement of the rays by defocus.
 double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aperture aperture,
                       const std::vector<double>& weights, const EffectSet& others) {
   double square = 0;
@@ -42,7 +43,7 @@ double WeighingChange(const EffectOptics& optics, const EffectPlace& place, Aper
   return most;
 }
 
-// What the whole aperture does to the fall-off of a picture through its middle, stored.
+// Bound of the stored change when the fall-off of the whole aperture replaces that of its middle.
 double FalloffOfAperture(const EffectOptics& optics, const EffectPlace& place,
                          const EffectSet& others, Aperture aperture) {
   if (!others.Has(Effect::kFalloff)) return 0;
@@ -54,9 +55,10 @@ double FalloffOfAperture(const EffectOptics& optics, const EffectPlace& place,
          WeighingChange(optics, place, aperture, whole.over_mean, others);
 }
 
-// What another shape of the aperture does to the fall-off: weights that are linear over the
-// aperture, g A, weigh what different rays see by at most g R/2 integral |A_x| |D|, D the
-// difference of both densities, which is 0.587 of the g sigma R/2 of the Gaussian.
+// Bound of the stored change when the fall-off of a disc replaces that of a Gaussian. Weights that
+// are linear over the aperture, g A, change the weighted radiance of the rays by at most
+// g R/2 integral |A_x| |D|, where D is the difference of both densities. That is 0.587 of
+// g sigma R/2, the value of the Gaussian.
 double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
                       const EffectSet& others) {
   if (!others.Has(Effect::kFalloff)) return 0;
@@ -73,10 +75,11 @@ double FalloffOfShape(const EffectOptics& optics, const EffectPlace& place,
 }  // namespace
 
 // Thickness [D7]. Formula: [S13], [S25], [S26] depend on the lens through f1 and zf alone, since
-// f1 D/f2 = K = f1 zf/(zf - f1): the thin lens f1 that is focused on the same plane puts every ray
-// in the same place. Its image distance is another, K instead of d1, and with it cos(beta).
-// Bound: the ratio of both irradiances, and of their weights of the rays. Enters: the camera is
-// replaced by its thin counterpart. Amount: the ratio's distance from 1; no ray is displaced.
+// f1 D/f2 = K = f1 zf/(zf - f1). The thin lens f1 that is focused on the same plane therefore gives
+// every ray the same landing point. Its image distance is K instead of d1, so that cos(beta)
+// differs. Bound: the ratio of both irradiances, and of their weights of the rays. Enters: the
+// camera is replaced by its thin counterpart. Amount: the ratio's distance from 1; no ray is
+// displaced.
 EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   if (!others.Has(Effect::kFalloff)) return {};
@@ -93,9 +96,9 @@ EffectImpact ThicknessImpact(const EffectOptics& optics, const EffectPlace& plac
                                 WeighingChange(optics, place, aperture, thick.over_mean, others)};
 }
 
-// Defocus. Formula: sigma = kappa r |c(z)|/p [D4], [S25], [S26]. Bound: BlurChange of its variance,
-// and what the whole aperture does to the fall-off. Enters: rays go through the whole aperture
-// instead of its middle.
+// Defocus. Formula: sigma = kappa r |c(z)|/p [D4], [S25], [S26]. Bound: the sum of BlurChange of
+// its variance and FalloffOfAperture. Enters: rays pass through the whole aperture instead of its
+// middle.
 EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
                            const EffectSet& others) {
   const double sigma_px = SigmaPx(optics, place);
@@ -106,16 +109,17 @@ EffectImpact DefocusImpact(const EffectOptics& optics, const EffectPlace& place,
   return {sigma_px, StoredChange(optics, place, change) + of_falloff, of_falloff};
 }
 
-// Aperture shape. Formula: a disc of radius 2 sigma against a Gaussian of sigma, the same second
-// moments. Bound, derived here [D51], D the difference of both and A(r) that of their light within
-// r, min(r^2/(4 sigma^2), 1) - 1 + exp(-r^2/(2 sigma^2)): with psi' = A/(2 pi r), so that D is the
-// Laplacian of psi, the change D * L is at most
-//   1/2 integral |D| R = 0.289 R                      for any picture of range R
+// Aperture shape. Formula: a disc of radius 2 sigma replaces a Gaussian of sigma with the same
+// second moments. Bound, derived here [D51]: D is the difference of both densities and A(r) the
+// difference of their light within r, min(r^2/(4 sigma^2), 1) - 1 + exp(-r^2/(2 sigma^2)). With
+// psi' = A/(2 pi r), so that D is the Laplacian of psi, the change D * L is at most
+//   1/2 integral |D| R = 0.289 R                      for any image of range R
 //   integral |psi'| sup|grad L| = 0.222 sigma slope
 //   integral |psi| sup|laplacian L| = 0.0940 sigma^2 bend
-// and at a straight jump the farthest distance of the edge spreads, 0.0404 of it, at a corner of
-// two at most twice that. Amount: 0.0404 as a displacement of the edge, times sigma sqrt(2 pi).
-// With what the shape does to the fall-off. Enters: where rays go through the aperture.
+// At a straight jump it is at most the largest distance of the two edge spread functions, 0.0404 of
+// the jump; at a corner of two jumps it is at most twice that. FalloffOfShape is added. Amount:
+// 0.0404 as a displacement of the edge, times sigma sqrt(2 pi). Enters: the positions of the rays
+// in the aperture.
 EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& place,
                                  const EffectSet& others) {
   if (!optics.is_disc() || !others.Has(Effect::kDefocus)) return {};
@@ -133,9 +137,9 @@ EffectImpact ApertureShapeImpact(const EffectOptics& optics, const EffectPlace& 
           of_falloff};
 }
 
-// Fall-off. Formula: [S12], cos(alpha) cos^3(beta), 1 at the principal point by exposure. Bound:
-// its mean over the aperture scales what is seen; its deviations from that mean weigh what
-// different rays see. Enters: a weight of each ray.
+// Fall-off. Formula: [S12], cos(alpha) cos^3(beta), which the exposure scales to 1 at the principal
+// point. Bound: its mean over the aperture scales the radiance; its deviations from that mean are
+// weights of the radiance along the rays. Enters: a weight of each ray.
 EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
                            const EffectSet& others) {
   const Aperture aperture = ApertureOf(optics, others);
@@ -147,12 +151,12 @@ EffectImpact FalloffImpact(const EffectOptics& optics, const EffectPlace& place,
               WeighingChange(optics, place, aperture, irradiance.over_mean, others)};
 }
 
-// Vignetting. Formula: [S10], rays of directional samples at u cross the aperture at
-// a = ((zl + d0) u - zl s)/d0: for zl != 0 the bundle of a pixel at s wanders over the aperture by
-// zl s/d0, in standard deviations of its transmission w. Bound: the light of a Gaussian and the
-// same one displaced by w that they do not share is erf(w/(2 sqrt(2))) [D52], which weighs what
-// different rays see; the bundle's own weights are normalised. Enters: weights of the views that
-// depend on the pixel.
+// Vignetting. Formula: by [S10], rays of directional samples at u cross the aperture at
+// a = ((zl + d0) u - zl s)/d0. For zl != 0 the bundle of a pixel at s is displaced on the aperture
+// by zl s/d0, which is w in standard deviations of the transmission. Bound: a Gaussian and the same
+// Gaussian displaced by w differ in the share erf(w/(2 sqrt(2))) of their light [D52], which is the
+// weight of the radiance along the rays; the weights of the bundle are normalised. Enters: weights
+// of the views that depend on the pixel.
 EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& place,
                               const EffectSet& others) {
   const auto& planes = optics.conditions().planes;
@@ -169,10 +173,10 @@ EffectImpact VignettingImpact(const EffectOptics& optics, const EffectPlace& pla
   return {lost, StoredChange(optics, place, lost * (place.bright - place.dark))};
 }
 
-// Occlusion [D53]. Formula: the parallax between both sides of an edge of depth, kappa r |c(z1) -
-// c(z2)|/p for each standard deviation of the aperture. Bound: rays that are carried past the edge
-// see another surface: as at a jump of the height of the range, BlurChange of that parallax.
-// Enters: each ray is traced to what it meets first.
+// Occlusion [D53]. Formula: the parallax between both sides of a depth edge,
+// kappa r |c(z1) - c(z2)|/p for each standard deviation of the aperture. Bound: rays that pass the
+// edge meet another surface. The bound is therefore that of a jump with the height of the range:
+// BlurChange of the parallax. Enters: each ray is traced to the first surface that it meets.
 EffectImpact OcclusionImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   if (!place.other_depth_mm || !others.Has(Effect::kDefocus)) return {};

@@ -1,4 +1,4 @@
-// Effects of what light meets behind the aperture: diffraction, lens floor, pixels, electronics.
+// Effects behind the aperture: diffraction, lens floor, pixels, electronics.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -9,7 +9,7 @@
 namespace thicklens::model {
 namespace {
 
-// Of a uniform distribution of width 1.
+// Variance of a uniform distribution of width 1.
 constexpr double kBoxVariance = 1.0 / 12;
 
 double RoundingStep(const EffectOptics& optics) {
@@ -18,9 +18,9 @@ double RoundingStep(const EffectOptics& optics) {
 
 }  // namespace
 
-// Pixel box [D54]. Formula: mean over a square of one px, of variance 1/12 per axis. Bound:
-// BlurChange; at a jump, which no box has made a ramp yet, up to 3/4 of it (the tip of a right
-// angle has a quarter of its pixel). Enters: where rays land.
+// Pixel box [D54]. Formula: the mean over a square of one px, whose variance is 1/12 per axis.
+// Bound: BlurChange; at a jump, which no box has turned into a ramp yet, up to 3/4 of the jump (the
+// tip of a right angle covers a quarter of its pixel). Enters: the landing points of the rays.
 EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place,
                             const EffectSet& others) {
   EffectPlace smooth = place;
@@ -29,16 +29,16 @@ EffectImpact PixelBoxImpact(const EffectOptics& optics, const EffectPlace& place
   double change = BlurChange(smooth, kBoxVariance, {}) + 0.75 * place.jump;
   if (other.gaussian_px2 > 0 || other.disc_px > 0) {
     EffectPlace worst = place;
-    worst.jump = worst.slope = worst.bend = 1e9;  // only what the blur leaves of it
+    worst.jump = worst.slope = worst.bend = 1e9;  // only the other blur bounds the change
     change = std::min(change, BlurChange(worst, kBoxVariance, other));
   }
   return {std::sqrt(kBoxVariance),
           StoredChange(optics, place, std::min(change, place.bright - place.dark))};
 }
 
-// Lens floor. Formula: a Gaussian of the measured sigma, in quadrature with defocus. Bound:
-// BlurChange, and that of diffraction, which comes forth without the floor that holds it. Enters:
-// where rays land.
+// Lens floor. Formula: a Gaussian of the measured sigma, in quadrature with defocus. Bound: the sum
+// of BlurChange and the bound of diffraction, which appears when the floor that contains it is
+// removed. Enters: the landing points of the rays.
 EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& others) {
   const double floor_px = optics.floor_px();
@@ -51,10 +51,10 @@ EffectImpact LensFloorImpact(const EffectOptics& optics, const EffectPlace& plac
   return {floor_px, StoredChange(optics, place, change) + of_diffraction};
 }
 
-// Diffraction. Formula: airy.h. A lens floor that was measured holds it already: then it is not
-// added once more, and its impact is 0. Bound: of the Gaussian BlurChange; of a disc's pattern,
+// Diffraction. Formula: airy.h. A measured lens floor already contains diffraction; it is then not
+// added again, and its impact is 0. Bound: for the Gaussian, BlurChange; for the pattern of a disc,
 // which has no variance, the mean of min(R, |d| slope) + J min(1, sqrt(2) |d_n|/2) over its
-// displacements d; without the box, half of J. Enters: where rays land.
+// displacements d. Without the box the second term is J/2. Enters: the landing points of the rays.
 EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& place,
                                const EffectSet& others) {
   const double radius_px = AiryRadiusPx(optics.camera(), optics.conditions().wavelength_mm);
@@ -79,29 +79,30 @@ EffectImpact DiffractionImpact(const EffectOptics& optics, const EffectPlace& pl
   return {radius_px, StoredChange(optics, place, std::min(range, change))};
 }
 
-// Shot noise [D54]. Formula: Poisson of L n electrons, n at full scale: sd sqrt(L/n) in linear
-// light. Bound: what that is in stored values, which grows where the transfer curve is straight,
-// near black, and falls where it is a power of at most 1/2; looked at where these meet, too.
-// Enters: after the picture is formed.
+// Shot noise [D54]. Formula: a Poisson distribution of L n electrons, n at full scale, whose
+// standard deviation is sqrt(L/n) in linear light. Bound: that deviation in stored values. It
+// increases with L where the transfer curve is straight, near black, and decreases where the curve
+// is a power of at most 1/2; therefore the point where these parts meet is evaluated as well.
+// Enters: after the image is formed.
 EffectImpact ShotNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& /*others*/) {
   const double full_well = optics.conditions().full_well_electrons;
   if (!(full_well > 0)) return {};
-  constexpr double kKnee = 0.0031308;  // of sRGB
+  constexpr double kKnee = 0.0031308;  // end of the straight part of sRGB
   double largest = 0;
   EffectPlace level = place;
   for (const double light : {place.dark, place.bright,
                              std::clamp(kKnee, place.dark, std::max(place.dark, place.bright))}) {
-    // Less than one electron is the same as one.
+    // Light of less than one electron is treated as one electron.
     level.dark = std::max(light, 1 / full_well);
     largest = std::max(largest, StoredSigma(optics, level, std::sqrt(level.dark / full_well)));
   }
   return {largest, largest};
 }
 
-// Read noise. Formula: normal, in electrons before the transfer curve or in stored values after
-// it. Bound: what the former is in stored values where it is dark; both in quadrature. Enters:
-// after the picture is formed.
+// Read noise. Formula: normal noise in electrons before the transfer curve, or in stored values
+// after it. Bound: the former in stored values where the place is darkest, added to the latter in
+// quadrature. Enters: after the image is formed.
 EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectPlace& place,
                              const EffectSet& /*others*/) {
   const EffectConditions& conditions = optics.conditions();
@@ -114,17 +115,17 @@ EffectImpact ReadNoiseImpact(const EffectOptics& optics, const EffectPlace& plac
   return {sigma, sigma};
 }
 
-// Quantisation [D54]. Formula: rounding to 1/(2^bits - 1), an error of standard deviation
-// 1/sqrt(12) of that. Enters: last of all.
+// Quantisation [D54]. Formula: rounding to steps of 1/(2^bits - 1), an error with the standard
+// deviation of 1/sqrt(12) step. Enters: at the very end.
 EffectImpact QuantisationImpact(const EffectOptics& optics, const EffectPlace& /*place*/,
                                 const EffectSet& /*others*/) {
   const double sigma = RoundingStep(optics) * std::sqrt(kBoxVariance);
   return {sigma, sigma};
 }
 
-// Transfer curve. Formula: IEC 61966-2-1 or a power. Bound: its distance from linear light, which
-// is concave: the largest between dark and bright is at its maximum or at the nearer end. Enters:
-// after the picture is formed.
+// Transfer curve. Formula: IEC 61966-2-1 or a power. Bound: the distance of the curve from linear
+// light. The distance is concave, so that its largest value between dark and bright is at its
+// maximum or at the nearer end. Enters: after the image is formed.
 EffectImpact TransferCurveImpact(const EffectOptics& optics, const EffectPlace& place,
                                  const EffectSet& /*others*/) {
   const TransferCurve& transfer = optics.camera().sensor.transfer;

@@ -11,60 +11,67 @@
 
 namespace thicklens::model {
 
-// What the effects that are left out may change, all together.
+// Largest change of the image that all effects which are left out may cause together.
 struct EffectTolerance {
-  double grey_levels =
-      0.5;  // > 0; the sum of their bounds, and apart from it the sd of their noise
-  // For effects that are measured in px: instead of grey levels, each on its own. > 0.
+  // Grey levels of stored values, 255 at full scale, > 0. It limits the sum of the bounds and,
+  // separately, the standard deviation of the omitted noise.
+  double grey_levels = 0.5;
+  // Limit in px, > 0. If present, it replaces the grey levels for each effect that is measured in
+  // px, individually.
   std::optional<double> px;
 
+  // Returns true if the limits are finite and > 0. Otherwise `why`, if not null, gets the reason.
   bool IsValid(std::string* why) const;
 };
-// "0.5gl" or "0.1px". Throws Error.
+// The tolerance of a text such as "0.5gl" (grey levels) or "0.1px". Throws Error for other texts.
 EffectTolerance EffectToleranceFromText(const std::string& text);
 
-// Those of `effects` that the scene calls for: one after the other the least is left out, while the
-// tolerance allows it. Bounds add up along the way: each is that of taking the effect from a
-// picture that lacks those before it.
+// The subset of `effects` that the scene requires. The effects with the least impact are left out
+// one after the other while the tolerance allows it. Their bounds add up: each is the bound of
+// removing the effect from an image that already lacks the earlier ones. `threads`: 0 means one per
+// core. Throws Error if the tolerance or the conditions are not valid or there is no place.
 EffectSet ChooseEffects(const EffectConditions& conditions, const std::vector<EffectPlace>& places,
                         const EffectSet& effects, const EffectTolerance& tolerance,
                         int threads = 1);
 
-// What the user wants of a forward model.
+// The user's choice of the effects of a forward model.
 struct EffectChoice {
   enum class Base {
-    kAuto,   // those that the scene calls for, within the tolerance
-    kAll,    // all that the forward model has
-    kGiven,  // `given` alone
+    kAuto,   // the effects that the scene requires, within the tolerance
+    kAll,    // all effects of the forward model
+    kGiven,  // only the effects in `given`
   };
   Base base = Base::kAuto;
   EffectSet given;
-  EffectSet without;  // of any base, never
-  EffectSet kept;     // what kAuto keeps, whatever it matters
+  EffectSet without;  // effects that are always excluded, on every base
+  EffectSet kept;     // effects that kAuto keeps regardless of their impact
   EffectTolerance tolerance;
 };
-// `effects`: "auto", "all", "none", or names between commas; `without`: names, or nothing;
-// `tolerance`: as above, or nothing for the default. Throws Error.
+// Parses a choice. `effects` is "auto", "all", "none" or a list of names separated by commas.
+// `without` is a list of names, which may be empty. `tolerance` is a text for
+// EffectToleranceFromText; an empty text gives the default. Throws Error for other texts.
 EffectChoice EffectChoiceFromText(const std::string& effects, const std::string& without,
                                   const std::string& tolerance);
 
-// What became of it.
+// Result of a choice.
 struct EffectDecision {
-  EffectSet on;
-  // Of each effect of the forward model: what it alone would change at most in a picture with all
-  // the others that the user does not exclude.
+  EffectSet on;  // the effects that are simulated
+  // One finding for each effect of the forward model: the largest change by this effect alone in an
+  // image with all other effects that the user does not exclude.
   std::vector<EffectFinding> findings;
 };
-// `of_model`: what the forward model has. Throws Error for effects that are named and that it does
-// not have, and as FindImpacts does.
+// Applies a choice to the effects `of_model` of the forward model. `threads`: 0 means one per core.
+// Throws Error if the choice names an effect that the model lacks, if the conditions or (for kAuto)
+// the tolerance are not valid, or if there is no place.
 EffectDecision DecideEffects(const EffectChoice& choice, const EffectConditions& conditions,
                              const std::vector<EffectPlace>& places, const EffectSet& of_model,
                              int threads = 1);
 
-// What is written down of it.
+// Record of a decision for files.
 struct EffectRecord {
-  std::vector<std::string> on;
-  std::vector<std::pair<std::string, double>> left_out_grey_levels;  // the bounds
+  std::vector<std::string> on;  // names of the effects that are simulated
+  // Name and bound, grey levels, of each effect that is left out.
+  std::vector<std::pair<std::string, double>> left_out_grey_levels;
 };
 EffectRecord RecordOf(const EffectDecision& decision);
 

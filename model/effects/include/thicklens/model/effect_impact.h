@@ -13,77 +13,84 @@
 
 namespace thicklens::model {
 
-// A bench that moves a flat target along the axis. The plane of focus is what depths, light and
-// scale are compared with.
+// A bench that moves a flat target along the axis. Depth, light and scale refer to the plane of
+// focus zf.
 struct BenchConditions {
-  bool lamp_at_camera = true;   // irradiance of the target as (zf/z)^2
-  double flicker = 0;           // relative sd of the lamp, per frame
-  double drift_sigma_px = 0;    // sd of the target's lateral position, per frame, at zf
-  double reading_sigma_mm = 0;  // sd of the error of each reading
-  double tilt_deg = 0;          // of the target against the plane across the axis
+  bool lamp_at_camera = true;   // true: the irradiance of the target is in proportion to (zf/z)^2
+  double flicker = 0;           // relative standard deviation of the lamp per frame
+  double drift_sigma_px = 0;    // sd of the target's lateral position per frame and axis, px at zf
+  double reading_sigma_mm = 0;  // standard deviation of the error of each reading
+  double tilt_deg = 0;          // angle between the target and the plane across the axis
 };
 
-// How a scene is photographed.
+// Conditions under which a scene is photographed.
 struct EffectConditions {
-  Camera camera;  // with image distance and blur ratio; a blur floor that it lacks is taken as 0
-  // Of the light field that the picture is made from; absent: UV on the aperture.
+  Camera camera;  // needs image distance and blur ratio; an absent blur floor is taken as 0
+  // Planes of the light field from which the image is made; absent: UV is the aperture plane.
   std::optional<LightFieldPlanes> planes;
   double wavelength_mm = 550e-6;
-  int bits = 8;                         // of the stored picture
-  double stored_noise_grey_levels = 0;  // sd of noise that is added to stored values
+  int bits = 8;                         // bits per value of the stored image
+  double stored_noise_grey_levels = 0;  // sd of the noise that is added to stored values
   double full_well_electrons = 0;       // at full scale; 0: no noise in electrons is known
   double read_noise_electrons = 0;
-  std::optional<BenchConditions> bench;  // absent: a single picture
+  std::optional<BenchConditions> bench;  // absent: a single image
 
+  // Returns true if all numbers are in their range and the camera has its image distance and blur
+  // ratio. Otherwise `why`, if not null, gets the field, the value and the constraint.
   bool IsValid(std::string* why) const;
 };
 
-// A place of a scene, with what is photographed there. The default is an edge between black and
-// white across the picture, with nothing near or behind it.
+// A place of a scene and the radiance around it. The default is an edge between black and white
+// across the image, without another surface near or behind it.
 struct EffectPlace {
-  Eigen::Vector2d position_px{0, 0};  // in the picture
-  double depth_mm = 0;                // from Ap; may be +inf
-  // Of what is most different in 1/z of all that blur spreads to here past an edge of depth.
+  Eigen::Vector2d position_px{0, 0};  // position in the image
+  double depth_mm = 0;                // depth from Ap; may be +inf
+  // Depth from Ap of the surface whose 1/z differs most, among all surfaces that blur spreads to
+  // this place across a depth edge. Absent: there is no such edge.
   std::optional<double> other_depth_mm;
-  // Of what is least blurred of all that blur spreads to here; absent: the nearest to the plane of
-  // focus between the two above.
+  // Depth from Ap of the sharpest surface among all that blur spreads to this place. Absent: the
+  // depth nearest to the plane of focus between the two depths above.
   std::optional<double> sharpest_depth_mm;
-  // Radiance in linear light of what blur spreads to here: bounds, the highest jump between
-  // neighbours, and of what lies between jumps the steepest slope per px and the largest
-  // |d2L/dx2| + |d2L/dy2| per px^2.
+  // Radiance, in linear light, of the surfaces that blur spreads to this place: its bounds `dark`
+  // and `bright`, the largest `jump` between neighbours and, between jumps, the largest `slope` per
+  // px and the largest `bend`, |d2L/dx2| + |d2L/dy2|, per px^2.
   double dark = 0, bright = 1;
   double jump = 1, slope = 0, bend = 0;
 };
 
+// Change of the image by one effect at one place.
 struct EffectImpact {
-  double amount = 0;  // in the effect's unit
-  // Bound of the change of stored values, 255 at full scale; of random effects their standard
-  // deviation. Wherever the place's radiance is what it is said to be.
+  double amount = 0;  // in the unit of the effect (EffectFacts::unit)
+  // Bound of the change of stored values, 255 at full scale; the standard deviation for random
+  // effects. It holds wherever the radiance is as the place states.
   double grey_levels = 0;
-  // The part of it that is none of the amount's: of effects in px what they do to the fall-off.
+  // The part of `grey_levels` that `amount` does not cover: for effects in px, their change of the
+  // fall-off.
   double aside_grey_levels = 0;
 };
 
-// What the effect does at a place to a picture that has the effects `others`, too. Effects of a
-// bench do nothing to a single picture. Each bound is derived at its section: effects_of_*.cc.
+// Impact of the effect at a place on an image that also has the effects `others`. Effects of a
+// bench do not change a single image. The derivation of each bound is at its function in
+// effects_of_*.cc. Throws Error if the conditions are not valid.
 EffectImpact ImpactAt(Effect effect, const EffectConditions& conditions, const EffectPlace& place,
                       const EffectSet& others);
 
-// Where an effect matters most.
+// The place where an effect has its largest impact, and that impact.
 struct EffectFinding {
   Effect effect = Effect::kThickness;
   EffectImpact impact;
   EffectPlace place;
 };
-// Of each of `effects`, in their order, among all of them. Throws Error if the conditions are not
-// valid or there is no place. `threads`: 0: one per core.
+// One finding for each of `effects`, in their order, in an image with all the other `effects`.
+// Throws Error if the conditions are not valid or there is no place. `threads`: 0 means one per
+// core.
 std::vector<EffectFinding> FindImpacts(const EffectConditions& conditions,
                                        const std::vector<EffectPlace>& places,
                                        const EffectSet& effects, int threads = 1);
 
-// Black and white edges in the middle and in the farthest corner of the picture at depths equally
-// spaced in 1/z; with `occlusion` those of the one end before the other. Throws Error unless
-// 0 < near_mm <= far_mm.
+// Black and white edges in the middle and in the farthest corner of the image, at depths from Ap
+// that are equally spaced in 1/z. With `occlusion` there are also edges at near_mm in front of
+// far_mm. Throws Error unless 0 < near_mm <= far_mm and near_mm is finite.
 std::vector<EffectPlace> PlacesBetween(const Camera& camera, double near_mm, double far_mm,
                                        bool occlusion);
 

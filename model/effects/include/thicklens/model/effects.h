@@ -8,8 +8,8 @@
 
 namespace thicklens::model {
 
-// The effects of image formation. Each is a part of its own: a forward model without it does what
-// EffectFacts::without says, and spends nothing on it.
+// The effects of image formation. They are independent of each other: a forward model without an
+// effect does what EffectFacts::without states, and spends no time on the effect.
 enum class Effect {
   kThickness,
   kDefocus,
@@ -24,7 +24,7 @@ enum class Effect {
   kReadNoise,
   kQuantisation,
   kTransferCurve,
-  // Of a bench that moves a target from frame to frame.
+  // The remaining effects belong to a bench that moves a target from frame to frame.
   kLampFalloff,
   kFlicker,
   kMagnification,
@@ -33,29 +33,32 @@ enum class Effect {
   kReadingError,
 };
 
-// What an impact is measured in.
+// Unit of an impact.
 enum class EffectUnit {
-  kPx,          // of the sensor: a displacement, or the sigma of a blur per axis
-  kRelative,    // of the irradiance
-  kGreyLevels,  // of stored values, 255 at full scale
-  kMm,          // of the depth
+  kPx,          // px of the sensor: a displacement, or the sigma of a blur per axis
+  kRelative,    // relative change of the irradiance
+  kGreyLevels,  // grey levels of stored values, 255 at full scale
+  kMm,          // millimetres of depth
 };
 std::string EffectUnitName(EffectUnit unit);  // "px", "relative", "grey-levels", "mm"
 
+// Static description of an effect. The texts are literals and always valid.
 struct EffectFacts {
   Effect effect;
   const char* name;     // "thickness", "defocus", "aperture-shape", ...
-  const char* what;     // what it is, in words
-  const char* without;  // what stands in its place
+  const char* what;     // description in words
+  const char* without;  // the model that replaces the effect when it is off
   EffectUnit unit;
-  bool random;  // its impact is a standard deviation over repeated exposures
+  bool random;  // true: the impact is a standard deviation over repeated exposures
 };
 
 const std::vector<EffectFacts>& AllEffects();  // in the order of the enumeration
 const EffectFacts& FactsOf(Effect effect);
 std::string EffectName(Effect effect);
-Effect EffectFromName(const std::string& name);  // throws Error that lists the names
+// Inverse of EffectName. Throws Error, which lists the names, for any other name.
+Effect EffectFromName(const std::string& name);
 
+// A set of effects.
 class EffectSet {
  public:
   EffectSet() = default;
@@ -82,9 +85,9 @@ class EffectSet {
 
   std::uint32_t bits_ = 0;
 };
-// Of names between commas. Throws Error for one that does not exist.
+// The set of a list of names separated by commas. Throws Error for an unknown name.
 EffectSet EffectSetFromNames(const std::string& names);
-std::string JoinedNames(const EffectSet& effects);  // between ", "; "none" for none
+std::string JoinedNames(const EffectSet& effects);  // separated by ", "; "none" if empty
 
 }  // namespace thicklens::model
 
