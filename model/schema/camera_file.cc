@@ -15,12 +15,12 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kSchema[] = "thicklens/camera/2";
-// Its blur ratio was another (former_blur_ratio.h).
+// The blur ratio had another definition in this schema (former_blur_ratio.h).
 constexpr char kFormerSchema[] = "thicklens/camera/1";
 constexpr int kMaxImageSizePx = 100000;
 
-// A number, or {value: .., tolerance: .., assumed: ..}; what is stated about it goes into the
-// camera.
+// Returns the number of a node that is a number or {value: .., tolerance: .., assumed: ..}, and
+// stores the statement, if there is one, in the camera.
 YamlNode ValueNode(const YamlNode& node, Camera* camera) {
   if (!node.IsMap()) return node;
   node.RequireKeys({"value", "tolerance", "assumed"});
@@ -61,7 +61,7 @@ void ReadSensor(const YamlNode& node, Camera* camera) {
 
 using NumberOf = double (YamlNode::*)() const;
 
-// `number` is the check on the value: any, positive or not negative.
+// `number` reads and checks the value: any, positive or not negative.
 std::optional<Estimate> ReadEstimate(const YamlNode& parent, const std::string& key,
                                      NumberOf number) {
   const auto node = parent.Find(key);
@@ -137,7 +137,7 @@ CameraCalibration ReadCalibration(const YamlNode& node) {
   return calibration;
 }
 
-// YAML::Emitter quotes texts where needed; numbers are handed to it as text in their shortest form.
+// YAML::Emitter quotes texts where needed. Numbers are passed to it as text in their shortest form.
 class Writer {
  public:
   explicit Writer(const Camera& camera) : camera_(camera) {}
@@ -274,8 +274,8 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
   }
   if (const auto calibration = root.Find("calibration"))
     camera.calibration = ReadCalibration(*calibration);
-  // Each number was checked where it stands. What is left is how the image distance goes with the
-  // lens, so an error belongs to the calibration if there is one.
+  // Each number was already checked at its place. The remaining check compares the image distance
+  // with the lens, so that an error belongs to the calibration if there is one.
   std::string why;
   if (!camera.IsValid(&why)) {
     const auto place = camera.calibration ? root.At("calibration").Find("image_distance_mm")

@@ -8,11 +8,12 @@
 
 namespace thicklens::model {
 
-// What a file says of effects: auto, all, none or a list of names; without: a list of names;
-// tolerance. What it does not say stays. Throws Error at the place.
+// Reads the keys of the choice of effects from the map `root`: `effects` (auto, all, none or a list
+// of names), `without` (a list of names) and `tolerance`. Fields without a key keep their values.
+// Throws Error with file:line:column.
 void ReadEffectChoice(const YamlNode& root, EffectChoice* choice);
 
-// effects: and left_out_grey_levels: of a map.
+// Writes the keys `effects` and `left_out_grey_levels` into the open map of `out`.
 void EmitEffects(const EffectRecord& record, YAML::Emitter* out);
 
 }  // namespace thicklens::model

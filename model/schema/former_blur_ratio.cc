@@ -11,19 +11,19 @@ namespace {
 
 constexpr int kNodes = 12;
 
-// Nodes and weights of a mean of A^2/sigma^2 over an aperture of sigma 1.
+// Nodes, A^2/sigma^2, and weights of a mean over an aperture of sigma 1.
 struct Rule {
   Eigen::ArrayXd at, weight;
 };
 
-// After Golub and Welsch (1969), from the recurrence of the orthogonal polynomials.
+// Gauss rule after Golub and Welsch (1969), from the recurrence of the orthogonal polynomials.
 Rule GaussRule(const Eigen::VectorXd& diagonal, const Eigen::VectorXd& beside) {
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
   solver.computeFromTridiagonal(diagonal, beside);
   return {solver.eigenvalues().array(), solver.eigenvectors().row(0).transpose().array().square()};
 }
 
-// A^2/2 of a Gaussian has the density exp(-x): Laguerre's polynomials.
+// A^2/2 of a Gaussian has the density exp(-x): the Laguerre polynomials.
 Rule GaussianRule() {
   Eigen::VectorXd diagonal(kNodes), beside(kNodes - 1);
   for (int k = 0; k < kNodes; ++k) diagonal[k] = 2 * k + 1;
@@ -33,7 +33,7 @@ Rule GaussianRule() {
   return rule;
 }
 
-// A^2 of a disc of radius 2 is uniform from 0 to 4: Legendre's.
+// A^2 of a disc of radius 2 is uniform from 0 to 4: the Legendre polynomials.
 Rule DiscRule() {
   Eigen::VectorXd beside(kNodes - 1);
   for (int k = 1; k < kNodes; ++k) beside[k - 1] = k / std::sqrt(4.0 * k * k - 1);
@@ -51,7 +51,7 @@ BlurRatioOfBlur BlurRatioWithFalloff(const ThickLens& lens, Psf psf, double blur
   const double sigma_mm = blur_ratio * lens.aperture_radius_mm;
   const double d1_mm = ImageDistanceMm(lens, focus_depth_mm);
   const Eigen::ArrayXd square = sigma_mm * sigma_mm * rule.at;  // A^2, mm^2
-  // tan^2 of alpha and of beta, and what d ln w by the logarithms of zf and d1 is.
+  // tan^2(alpha), tan^2(beta), and the derivatives of ln w by the logarithms of zf and d1.
   const Eigen::ArrayXd front = square / (focus_depth_mm * focus_depth_mm);
   const Eigen::ArrayXd behind = square / (d1_mm * d1_mm);
   const Eigen::ArrayXd by_focus = front / (1 + front);
@@ -62,7 +62,7 @@ BlurRatioOfBlur BlurRatioWithFalloff(const ThickLens& lens, Psf psf, double blur
   const auto mean = [&](const Eigen::ArrayXd& of) { return (weight * of).sum() / sum; };
   const Eigen::ArrayXd half = 0.5 * rule.at;  // A_x^2/sigma^2, averaged over a circle
   const double variance_ratio = mean(half);
-  // Of the ratio of two means whose weights change by the factor exp(d ln w).
+  // Derivative of the ratio of two means whose weights change by the factor exp(d ln w).
   const auto slope = [&](const Eigen::ArrayXd& by) {
     return mean(half * by) - variance_ratio * mean(by);
   };
@@ -96,7 +96,7 @@ void ConvertFormerBlurRatio(Camera* camera) {
       BlurRatioWithFalloff(camera->lens, camera->psf, kappa.value, zf_mm);
   const double converted = std::sqrt(of_blur.squared);
   const double by_former = of_blur.by_blur_ratio / (2 * converted);
-  // zf follows from d1.
+  // Derivative by d1, through zf, which follows from d1.
   const double by_distance =
       of_blur.by_focus_depth / ImageDistanceSlope(camera->lens, zf_mm) / (2 * converted);
   const auto& order = calibration.covariance_order;
@@ -112,7 +112,7 @@ void ConvertFormerBlurRatio(Camera* camera) {
     jacobian(ratio, ratio) = by_former;
     if (distance < count) jacobian(ratio, distance) = by_distance;
     calibration.covariance = jacobian * calibration.covariance * jacobian.transpose();
-    // Rounding must not leave it without symmetry.
+    // Rounding must not destroy the symmetry.
     calibration.covariance =
         Eigen::MatrixXd(0.5 * (calibration.covariance + calibration.covariance.transpose()));
     if (distance < count) kappa.sigma = std::sqrt(calibration.covariance(ratio, ratio));

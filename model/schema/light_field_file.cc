@@ -95,11 +95,11 @@ void ReadGrid(const YamlNode& root, LightField* light_field) {
   light_field->grid = grid;
 }
 
-// The camera and what says how the samples lie in front of it: all or nothing.
+// The camera and the keys that position the samples in front of it. Either all are present or none.
 void ReadCameraAndGrid(const YamlNode& root, LightFieldDescription* description) {
   if (const auto camera = root.Find("camera")) {
     description->camera_file = camera->Text();
-    // What a light field from elsewhere names must come with it: no other file is opened.
+    // A light field from elsewhere must come with the files that it names; no other file is opened.
     const std::filesystem::path file = description->camera_file;
     const bool leads_out =
         file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end();
@@ -156,7 +156,7 @@ LightFieldOrigin ReadOrigin(const YamlNode& node) {
   return origin;
 }
 
-// YAML::Emitter quotes texts where needed; numbers are handed to it as text in their shortest form.
+// YAML::Emitter quotes texts where needed. Numbers are passed to it as text in their shortest form.
 class Writer {
  public:
   explicit Writer(const LightFieldDescription& description)
@@ -183,7 +183,7 @@ class Writer {
   }
 
  private:
-  // A number that the reader would refuse is not written.
+  // Throws Error for a number that the reader would not accept.
   static std::string NumberText(const char* key, double value) {
     if (!std::isfinite(value))
       throw Error(fmt::format("light field: {} is {}: it must be finite", key, value));

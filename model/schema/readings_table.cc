@@ -48,7 +48,7 @@ std::optional<double> ToNumber(const std::string& cell) {
   const char* end = cell.data() + cell.size();
   double value = 0;
   const auto [rest, status] = std::from_chars(begin, end, value);
-  constexpr double kMostMagnitude = 1e30;  // as of numbers in YAML
+  constexpr double kMostMagnitude = 1e30;  // the limit of numbers in YAML
   const bool is_number = status == std::errc() && rest == end && std::abs(value) <= kMostMagnitude;
   if (!is_number) return std::nullopt;
   return value;
@@ -69,8 +69,8 @@ std::vector<ReadingRow> ReadReadingsTable(const std::string& path) {
     throw Error(path + ": the CSV parser failed to start");
   csv_set_delim(&parser, static_cast<unsigned char>(DelimiterOf(text)));
   Table table;
-  // Line by line, so that the parser's rows can be told by their line; a quoted line break keeps
-  // its row open over several of them.
+  // The text is parsed line by line, so that the line of each row is known. A quoted line break
+  // continues its row over several lines.
   bool well_formed = true;
   table.line = 0;
   for (std::size_t begin = 0; begin < text.size() && well_formed;) {

@@ -10,12 +10,13 @@ namespace thicklens::model {
 struct ReadingRow {
   int line = 0;  // 1-based, for messages
   std::string file;
-  double reading = 0;  // in the table's own unit
+  double reading = 0;  // in the unit of the table
 };
 
-// A CSV table: column 1 the file, column 2 the reading; further columns are ignored. The first row
-// is a header if its second cell is no number. Comma, semicolon or tab, whichever the first row
-// has. Throws Error naming file and line for anything that is no such row, or a file named twice.
+// Reads a CSV table: column 1 is the file, column 2 the reading; further columns are ignored. The
+// first row is a header if its second cell is no number. The delimiter is the comma, semicolon or
+// tab that the first row contains. Throws Error, which names file and line, for an invalid row and
+// for a file that is named twice.
 std::vector<ReadingRow> ReadReadingsTable(const std::string& path);
 
 }  // namespace thicklens::model

@@ -1,4 +1,5 @@
-// A lens floor out of another calibration: taken into a sweep, and held against the sweep's camera.
+// A lens floor of another calibration: it is copied to a sweep and compared with the sweep's
+// camera.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -45,7 +46,7 @@ void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera) {
   if (!sweep.floor_origin) return;
   const FloorOrigin& origin = *sweep.floor_origin;
   const auto require_same = [&](const char* field, double theirs, double ours) {
-    // The same number may have been written with other digits.
+    // Both files may contain the same number with different digits.
     if (std::abs(theirs - ours) <= 1e-6 * std::max(std::abs(theirs), std::abs(ours))) return;
     throw Error(fmt::format(
         "{}{} has {} {}, the camera '{}' of this sweep {}: a blur floor holds for one lens, "

@@ -18,7 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Half-written outputs and what some systems lay beside every file ("._frame.png").
+// Whether the name begins with a dot: incomplete outputs, and the companion files that some systems
+// create for every file ("._frame.png").
 bool IsHidden(const fs::path& file) { return file.filename().string().rfind('.', 0) == 0; }
 
 bool IsPictureName(const fs::path& file) {
@@ -29,7 +30,7 @@ bool IsPictureName(const fs::path& file) {
   return kEndings.count(ending) > 0;
 }
 
-// The folder of the YAML file may have any name: only what stands in the file is a pattern.
+// The folder of the YAML file may have any name. Only the text in the file is a pattern.
 std::string EscapedForGlob(const std::string& folder) {
   std::string escaped;
   for (const char c : folder) {
@@ -51,8 +52,8 @@ std::vector<std::string> FilesMatching(const YamlNode& node) {
   return files;
 }
 
-// Pictures directly in the folder, or, where it has none, in its own sub-folders: a person points
-// at the folder that holds both the table and "frames/".
+// The images in the folder itself or, if it contains none, in its direct sub-folders: a user may
+// name the folder that contains both the table and "frames/".
 std::vector<std::string> PicturesIn(const std::string& folder) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) throw Error(fmt::format("{}: no such folder", folder));
@@ -74,7 +75,7 @@ std::vector<std::string> PicturesIn(const std::string& folder) {
   return files;
 }
 
-// Frames are read long after their names are known.
+// Checks a frame early, because frames are read long after their names are known.
 void RequireFrame(const std::string& path, const std::string& place) {
   TellInput(path);
   try {
@@ -84,7 +85,7 @@ void RequireFrame(const std::string& path, const std::string& place) {
   }
 }
 
-// Brings table rows and picture files together by name; each must have its partner.
+// Pairs table rows and image files by name; each must have its partner.
 std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
                                          const std::string& table,
                                          const std::vector<std::string>& files,
@@ -121,7 +122,7 @@ std::vector<SweepFrame> JoinRowsAndFiles(const std::vector<ReadingRow>& rows,
   for (const std::string& file : files) {
     if (used.count(fs::path(file).lexically_normal().string()) == 0) without_row.push_back(file);
   }
-  // A picture that was left out by mistake costs more than one that has to be moved away.
+  // An image that was left out by mistake costs more than one that has to be moved away.
   if (!without_row.empty()) {
     throw Error(fmt::format(
         "{}: has no row in {} ({} such file{}): add its reading, move it elsewhere, or "

@@ -9,14 +9,15 @@
 
 namespace thicklens::model {
 
-// The pictures of a sweep, each with its reading. Every row must have its picture and every picture
-// its row; whatever does not match throws Error with its place.
+// The images of a sweep, each with its reading. Every row must have its image and every image its
+// row; a row or an image without a partner throws Error with its place.
 
-// From the file's `frames`, or its `frames_csv` with `frames_dir` or `frames_glob`. `mm_per_unit`
-// turns the table's readings into mm; those of `frames` are in mm already.
+// Reads the frames from the key `frames` of the file, or from `frames_csv` with `frames_dir` or
+// `frames_glob`. `mm_per_unit` converts the readings of the table to mm; the readings of `frames`
+// are always in mm.
 std::vector<SweepFrame> ReadSweepFrames(const YamlNode& root, double mm_per_unit);
 
-// From a folder and a table in mm.
+// Reads the frames from a folder of images and a table in mm.
 std::vector<SweepFrame> FramesOfFolder(const std::string& folder, const std::string& readings_csv);
 
 }  // namespace thicklens::model

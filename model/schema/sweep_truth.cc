@@ -1,4 +1,4 @@
-// What a simulated sweep was made with: its file, read and written.
+// Reader and writer of the file with the parameters of a simulated sweep.
 #include <yaml-cpp/yaml.h>
 
 #include "model/schema/effect_yaml.h"

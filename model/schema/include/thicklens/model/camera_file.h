@@ -7,12 +7,13 @@
 
 namespace thicklens::model {
 
-// The camera file, schema thicklens/camera/2 (docs/file-formats.md). Unknown keys, wrong types,
-// values out of range: Error with file:line:column.
+// The camera file, schema thicklens/camera/2 (docs/file-formats.md). A file of the schema
+// thicklens/camera/1 is accepted and converted. Unknown keys, wrong types and values out of range
+// throw Error with file:line:column; `source_name` is the file name in these messages.
 Camera ReadCamera(const std::string& path);
 Camera ParseCamera(const std::string& text, const std::string& source_name);
 
-// Numbers are written so that reading them back gives the same bits.
+// The YAML text of a camera. Numbers read back from it have the same bits.
 std::string CameraToYaml(const Camera& camera);
 
 }  // namespace thicklens::model

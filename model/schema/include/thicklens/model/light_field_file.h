@@ -7,22 +7,25 @@
 
 namespace thicklens::model {
 
-// lightfield.yaml, schema thicklens/light-field/1 (docs/file-formats.md): all of a light field but
-// its values. The camera is a file of its own beside it.
+// Content of lightfield.yaml, schema thicklens/light-field/1 (docs/file-formats.md): a light field
+// without its values. The camera has a file of its own in the same folder.
 struct LightFieldDescription {
-  LightField light_field;       // without values; `camera` is left out
+  LightField light_field;       // without values and without `camera`
   std::string view_format;      // "png" (16 bit, stored values) or "tiff" (float, linear light)
-  bool has_confidence = false;  // of each ray: confidence/view_VV_UU.png
-  std::string camera_file;      // relative to the description; empty: none
+  bool has_confidence = false;  // true: each ray has a confidence in confidence/view_VV_UU.png
+  std::string camera_file;      // path relative to the description; empty: no camera
 };
 
-// "view_VV_UU" without the ending: two digits each, more where needed.
+// File name "view_VV_UU" of the view (k, l) without its extension. Each number has two digits, more
+// where needed.
 std::string ViewFileStem(int k, int l);
 
-// Unknown keys, wrong types, values out of range: Error with file:line:column.
+// Unknown keys, wrong types and values out of range throw Error with file:line:column;
+// `source_name` is the file name in these messages.
 LightFieldDescription ReadLightFieldDescription(const std::string& path);
 LightFieldDescription ParseLightFieldDescription(const std::string& text,
                                                  const std::string& source_name);
+// The YAML text of a description. Throws Error if a number is not finite.
 std::string LightFieldDescriptionToYaml(const LightFieldDescription& description);
 
 }  // namespace thicklens::model

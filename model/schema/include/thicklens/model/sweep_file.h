@@ -10,24 +10,26 @@
 
 namespace thicklens::model {
 
-// Which way the bench scale runs [D56]: z = offset + reading (away) or offset - reading (toward).
+// Direction of the bench scale [D56]: z = offset + reading (away) or z = offset - reading (toward),
+// where z is the depth from Ap, mm.
 enum class BenchDirection { kAway, kToward };
 std::string BenchDirectionName(BenchDirection direction);
 double DirectionSign(BenchDirection direction);  // +1 away, -1 toward
 
+// Kind of the photographed target.
 enum class SweepTarget { kAuto, kTexture, kPrintedEdge, kKnifeEdge };
 std::string SweepTargetName(SweepTarget target);
 
-// What is known of the lens floor beforehand: nothing, a value, or an interval.
+// Prior knowledge of the lens floor, px: nothing, a value, or an interval.
 struct FloorKnowledge {
   std::optional<Estimate> given_px;
-  std::optional<double> from_px, to_px;  // both or none
+  std::optional<double> from_px, to_px;  // both or neither are present
 };
 
-// Where a given floor comes from, if from another calibration. It is a floor of this lens on these
-// pixels and of no other.
+// Origin of a given floor that was taken from another calibration. The floor is valid only for this
+// lens on these pixels.
 struct FloorOrigin {
-  std::string place;  // "sweep.yaml:4:17: blur_floor_px.from_calibration: ", for messages
+  std::string place;  // for messages: "sweep.yaml:4:17: blur_floor_px.from_calibration: "
   std::string camera_path;
   ThickLens lens;
   double pixel_pitch_mm = 0;
@@ -38,15 +40,15 @@ struct RegionOfInterest {
 };
 
 struct SweepFrame {
-  std::string image;  // path as it can be opened
-  double reading_mm = 0;
+  std::string image;      // path that can be opened
+  double reading_mm = 0;  // what the scale of the bench shows; not a depth
 };
 
 // A focus sweep as its file describes it, schema thicklens/sweep/1 (docs/file-formats.md).
-// Readings are in mm here, whatever unit the file gives them in.
+// All readings are in mm, independent of the unit in the file.
 struct SweepFile {
-  std::string source;       // the file, for messages
-  std::string camera_path;  // resolved
+  std::string source;       // name of the file, for messages
+  std::string camera_path;  // path that can be opened
   double reading_sigma_mm = 0;
   bool reading_sigma_stated = false;
   std::optional<Estimate> offset_mm;  // absent: unknown
@@ -54,19 +56,20 @@ struct SweepFile {
   SweepTarget target = SweepTarget::kAuto;
   FloorKnowledge floor;
   std::optional<FloorOrigin> floor_origin;
-  std::optional<double> target_period_mm;  // of a periodic target (docs/file-formats.md)
+  std::optional<double> target_period_mm;  // period of a periodic target (docs/file-formats.md)
   RegionOfInterest roi;
-  std::vector<SweepFrame> frames;  // in the file's order
+  std::vector<SweepFrame> frames;  // in the order of the file
 };
 
-// Reads the YAML and, with `frames_csv`, the table. Throws Error with file:line:column, also for a
-// row without a file, a picture in `frames_dir` (or of `frames_glob`) without a row, duplicate rows
-// and rows that are no numbers. What was taken for granted is told in `notices`.
+// Reads the YAML file and, with `frames_csv`, the table. Throws Error with file:line:column for
+// invalid content, also for a row without a file, an image in `frames_dir` (or of `frames_glob`)
+// without a row, duplicate rows and readings that are no numbers. Assumptions about missing or
+// unusual content are added to `notices`, which may be null.
 SweepFile ReadSweep(const std::string& path, std::vector<std::string>* notices);
 
-// Takes value and sigma of calibration.blur_floor_px of a camera file into `sweep`. Throws Error
-// where the file holds none that was measured; `place` (where the path was given, with ": " at its
-// end) begins the message.
+// Copies value and sigma of calibration.blur_floor_px of a camera file to the floor of `sweep`.
+// Throws Error if the file contains no measured floor. The message begins with `place`, the place
+// where the path was given, with ": " at its end.
 void TakeFloorOfCalibration(const std::string& camera_path, const std::string& place,
                             SweepFile* sweep);
 
@@ -74,34 +77,37 @@ void TakeFloorOfCalibration(const std::string& camera_path, const std::string& p
 // `camera` has.
 void RequireFloorOfCamera(const SweepFile& sweep, const Camera& camera);
 
-// A sweep out of a folder and a table, all else at its default: `thicklens calibrate DIR
-// --readings`.
+// A sweep of a folder of images and a table of readings in mm; all other fields have their
+// defaults. The command `thicklens calibrate DIR --readings` uses it. Throws Error as ReadSweep
+// does for rows and images without partner; `notices` may be null.
 SweepFile SweepFromFolder(const std::string& folder, const std::string& readings_csv,
                           const std::string& camera_path, std::vector<std::string>* notices);
 
-// The YAML text. Paths in `sweep` are written as they stand, so they should be relative to where
-// the text will lie.
+// The YAML text of a sweep. Paths in `sweep` are written unchanged; they should therefore be
+// relative to the folder of the written file.
 std::string SweepToYaml(const SweepFile& sweep);
 
-// What a simulated sweep was made with, schema thicklens/sweep-truth/1.
+// Parameters with which a sweep was simulated, schema thicklens/sweep-truth/1.
 struct SweepTruth {
   double image_distance_mm = 0;
   double focus_depth_mm = 0;
   double blur_ratio = 0;
   double blur_floor_px = 0;
   double bench_offset_mm = 0;
-  double tilt_deg = 0;    // of the target, as TargetOptions has it
+  double tilt_deg = 0;    // tilt of the target, as in TargetOptions
   std::string pupil_law;  // PupilLawName; empty: not stated
   struct Frame {
     std::string image;
-    double depth_mm = 0;    // true z
-    double reading_mm = 0;  // as the bench showed it, with its error
-    // sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel box: the second moment.
+    double depth_mm = 0;    // true z from Ap
+    double reading_mm = 0;  // the reading of the bench with its error
+    // Second-moment sigma of the blur, sqrt(floor^2 + (kappa r_defocus/p)^2), without the pixel
+    // box.
     double blur_sigma_px = 0;
   };
   std::vector<Frame> frames;
-  EffectRecord effects;  // not read
+  EffectRecord effects;  // written, but not read
 };
+// Throws Error with file:line:column for invalid content.
 SweepTruth ReadSweepTruth(const std::string& path);
 std::string SweepTruthToYaml(const SweepTruth& truth);
 
