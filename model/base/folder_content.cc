@@ -27,7 +27,7 @@ Error WouldBeLost(const std::string& shown, const std::string& name) {
                   shown, name));
 }
 
-// The entries of a folder. Throws Error where they cannot be read.
+// The entries of a folder. Throws Error if they cannot be read.
 std::vector<fs::path> Entries(const fs::path& folder, const std::string& shown) {
   std::vector<fs::path> entries;
   std::error_code failure;
@@ -52,7 +52,8 @@ bool IsFolder(const fs::path& path) {
   return fs::is_directory(fs::symlink_status(path, ignored));
 }
 
-// Throws Error for what is in that folder of an output folder and matches none of the patterns.
+// Throws Error for an entry of the folder `name` in an output folder that is a folder itself or
+// matches none of the patterns.
 void RequireOwn(const fs::path& folder, const std::string& shown, const std::string& name,
                 const std::vector<std::string>& patterns) {
   for (const fs::path& entry : Entries(folder / name, shown)) {
@@ -96,7 +97,7 @@ void FolderContent::RequireReplaceable(const fs::path& folder, const std::string
     }
     if (own_entries.empty()) continue;
     if (std::find(own_entries.begin(), own_entries.end(), name) != own_entries.end()) continue;
-    std::vector<std::string> patterns;  // of what may be in it
+    std::vector<std::string> patterns;  // patterns of the entries that it may contain
     std::copy_if(own_entries.begin(), own_entries.end(), std::back_inserter(patterns),
                  [&](const std::string& own) { return own.rfind(name + "/", 0) == 0; });
     if (patterns.empty() || !IsFolder(entry)) throw WouldBeLost(shown, name);

@@ -7,23 +7,25 @@
 
 namespace thicklens {
 
-// The content that an output folder may have when it is replaced: see OutputFolder.
+// The content that an output folder may have when it is replaced (OutputFolder).
 struct FolderContent {
   std::string marker_file;
   std::vector<std::string> own_entries;
 
-  // Throws Error, which says `shown`, unless replacing that folder loses nothing of anybody else's.
-  // A folder that is not there, and an empty one, can be replaced. `in_place`: of a folder that is
-  // written into, what is ours for a while does not count, nor does what file systems keep in their
-  // roots. `without_marker`: what a killed run of ours has left needs no marker.
+  // Throws Error, which names `shown`, unless the folder can be replaced without the loss of
+  // foreign content. A missing and an empty folder can be replaced. `in_place`: the new content is
+  // written into the folder itself; parts of runs and "lost+found" are then ignored.
+  // `without_marker`: the marker is not required, because a killed run of this program left the
+  // content.
   void RequireReplaceable(const std::filesystem::path& folder, const std::string& shown,
                           bool in_place, bool without_marker) const;
 };
 
-// The part that a folder which is written into holds while that is done: ".thicklens.RANDOM.part".
+// Stem of the part ".thicklens.RANDOM.part" inside a folder that is being written in place.
 extern const char kInnerPartStem[];
 
-// Entries that go when such a folder gets new content: all but the parts of runs and "lost+found".
+// Entries that are removed when such a folder gets new content: all except the parts of runs and
+// "lost+found".
 std::vector<std::filesystem::path> EntriesInPlace(const std::filesystem::path& folder);
 
 }  // namespace thicklens

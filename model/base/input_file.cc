@@ -29,7 +29,7 @@ Error CannotBeRead(const std::string& path, int error) {
   return Error(fmt::format("{}: cannot be read: {}", path, std::strerror(error)));
 }
 
-// Whether the name stands for an open descriptor: /dev/stdin, /dev/fd/63, /proc/self/fd/63.
+// Whether the name is that of an open descriptor: /dev/stdin, /dev/fd/63, /proc/self/fd/63.
 bool IsDescriptor(const std::string& path) {
   if (path == "/dev/stdin") return true;
   std::error_code failure;
@@ -63,8 +63,8 @@ struct stat StatusOf(const std::string& path) {
 
 class OpenedFile {
  public:
-  // Since stat has seen it, the name may have got another meaning: opening waits for nobody, and
-  // the opened file is looked at again.
+  // The name may have got another meaning since the call of stat. Therefore opening never waits,
+  // and the opened file is checked again.
   explicit OpenedFile(const std::string& path)
       : fd_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY)) {
     if (fd_ < 0) throw CannotBeRead(path, errno);
@@ -118,7 +118,7 @@ std::string KindOfFile(unsigned mode) {
 void RequireRegularFile(const std::string& path) { RequireRegular(path, StatusOf(path).st_mode); }
 
 std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes) {
-  RequireRegularFile(path);  // a device may do something when it is opened
+  RequireRegularFile(path);  // opening a device may have side effects
   const OpenedFile file(path);
   if (file.bytes() > most_bytes) throw TooLarge(path, file.bytes(), most_bytes);
   std::string content;

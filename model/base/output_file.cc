@@ -19,7 +19,7 @@
 namespace thicklens {
 namespace {
 
-// The older file, opened to be written into, and locked for as long as this lives.
+// The existing file, opened for writing in place and locked during the lifetime of this object.
 class OlderFile {
  public:
   OlderFile(const std::string& path, const std::string& shown)
@@ -37,7 +37,7 @@ class OlderFile {
   OlderFile(const OlderFile&) = delete;
   OlderFile& operator=(const OlderFile&) = delete;
 
-  // A disk that is too full is found before the older content is touched.
+  // A full disk is detected before the older content is changed.
   void Write(const std::string& content, const std::string& shown) const {
     struct stat info {};
     if (::fstat(fd_, &info) != 0) throw CannotBeWritten(shown, errno);
@@ -63,7 +63,7 @@ class OlderFile {
 
 struct OutputFile::Impl {
   OutputTarget target;
-  std::optional<OutputPart> part;  // one of the two
+  std::optional<OutputPart> part;  // either `part` or `older` is present
   std::optional<OlderFile> older;
 };
 
@@ -95,7 +95,7 @@ void OutputFile::Commit(const std::string& content) {
   OutputPart& part = *impl_->part;
   if (::ftruncate(part.fd(), 0) != 0 || ::lseek(part.fd(), 0, SEEK_SET) != 0)
     throw CannotBeWritten(shown, errno);
-  // Before there is anything in it to be read.
+  // The permissions are set before the file has content that others could read.
   struct stat older {};
   if (::lstat(target.target.c_str(), &older) == 0 && S_ISREG(older.st_mode))
     KeepOwnerAndMode(part.fd(), older);

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A name beside the target that nothing has yet.
+// An unused name beside the target.
 fs::path NameToStepAside(const fs::path& target) {
   std::error_code ignored;
   for (int i = 1;; ++i) {
@@ -33,8 +33,8 @@ fs::path NameToStepAside(const fs::path& target) {
   }
 }
 
-// Gives two folders each the other's name, so that there is none at no moment. False where the file
-// system cannot.
+// Exchanges the names of two folders, so that both names exist at every moment. Returns false if
+// the file system cannot do it.
 bool ExchangeNames(const std::string& a, const std::string& b) {
 #ifdef RENAME_EXCHANGE
   return ::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0;
@@ -69,19 +69,19 @@ class Descriptor {
 
 struct OutputFolder::Impl {
   OutputTarget target;
-  std::string path;  // links followed
+  std::string path;  // path of the target with links followed
   FolderContent content;
   std::optional<OutputPart> part;  // beside the target, or in it
 
-  // The name of a file as it will be.
+  // The final path of a file.
   std::string Shown(const std::string& name) const { return (fs::path(path) / name).string(); }
 
-  // Where it is written, in a folder that is there.
+  // The path at which a file is written. Its folder is created if necessary.
   std::string Place(const std::string& name) const {
     part->RequireThere(Shown(name));
     const fs::path file = fs::path(part->path()) / name;
     std::error_code failure;
-    // Where the part has vanished after all, this makes no folder.
+    // create_directory creates no parents, so that a part that has vanished is not created again.
     if (fs::path(name).has_parent_path()) fs::create_directory(file.parent_path(), failure);
     if (failure)
       throw Error(fmt::format("{}: cannot be written: {}", Shown(name), failure.message()));
@@ -92,9 +92,10 @@ struct OutputFolder::Impl {
     content.RequireReplaceable(target.target, path, target.in_place, false);
   }
 
-  // Removes what a run has left which was killed while it wrote into this folder in place: its part
-  // and, where it was killed while its output came into place, content of which nothing is whole
-  // and which has no marker. This run may replace the folder as a whole (the mount is gone, say).
+  // Removes the remains of a run that was killed while it wrote into this folder in place: its part
+  // and, if the run was killed during Commit, the incomplete content, which has no marker. The
+  // present run may nevertheless replace the folder as a whole, e.g. if it is no longer a mount
+  // point.
   void RemoveLeftOver() const {
     if (!HasLeftOverPart(target.target, kInnerPartStem)) return;
     content.RequireReplaceable(target.target, path, true, true);
@@ -114,15 +115,17 @@ struct OutputFolder::Impl {
     }
   }
 
-  // The part takes the place of the folder that is there, which goes. False: nothing was done.
+  // Replaces the existing folder by the part and removes the former. Returns false if nothing was
+  // done.
   bool ReplaceAtOnce() {
-    // The old folder gets the part's name, under which other runs look for one that nobody holds.
+    // The old folder is locked, because it gets the name of the part, and other runs remove parts
+    // without a lock.
     const Descriptor old(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
     if (old.get() < 0 || ::flock(old.get(), LOCK_EX | LOCK_NB) != 0) return false;
     const std::optional<Temporary> replaced = PutInPlace(path, [&]() -> std::optional<std::string> {
       if (!ExchangeNames(part->path(), path)) return std::nullopt;
       try {
-        // Somebody may have put something into it, or into its place, since the last look.
+        // Another program may have added content or replaced the folder since the last check.
         content.RequireReplaceable(part->path(), path, false, false);
       } catch (const Error&) {
         ExchangeNames(part->path(), path);
@@ -133,14 +136,14 @@ struct OutputFolder::Impl {
     if (!replaced) return false;
     std::error_code failure, ignored;
     fs::remove_all(part->path(), failure);
-    // A rest that cannot be removed must not be in the way of the next run.
+    // Remains that cannot be removed must not obstruct the next run.
     if (failure) fs::rename(part->path(), NameToStepAside(path), ignored);
     part->Release();
     return true;
   }
 
-  // Not every file system can do it at once: the old folder steps aside first and comes back if the
-  // new one cannot take its place.
+  // Replaces the folder on file systems that cannot exchange two names: the old folder is renamed
+  // first, and renamed back if the new one cannot be moved to the target.
   void ReplaceByTwoNames() {
     std::error_code ignored;
     const std::optional<Temporary> replaced = PutInPlace(path, [&]() -> std::optional<std::string> {
@@ -166,7 +169,7 @@ struct OutputFolder::Impl {
     if (!replaced->path().empty()) fs::remove_all(replaced->path(), ignored);
   }
 
-  // The marker goes first and comes last: while it is there, the folder is whole.
+  // The marker is removed first and added last: while it exists, the folder is complete.
   void ReplaceContent() {
     PutInPlace(path, [&] {
       MoveContent();
@@ -208,7 +211,7 @@ OutputFolder::OutputFolder(const std::string& path, const std::string& marker_fi
   } else {
     impl.part.emplace(impl.target.parent(), target.filename().string(), PartKind::kFolder, path);
   }
-  // Without the lock, another run's Commit could be seen half done.
+  // This check needs the lock; otherwise it could see an incomplete Commit of another run.
   impl.RequireReplaceable();
 }
 
@@ -243,7 +246,7 @@ void OutputFolder::WriteWith(
 void OutputFolder::Commit() {
   Impl& impl = *impl_;
   impl.part->RequireThere(impl.path);
-  impl.RequireReplaceable();  // work may have taken hours
+  impl.RequireReplaceable();  // again, because the computation may have taken hours
   if (impl.target.in_place) {
     impl.ReplaceContent();
     return;

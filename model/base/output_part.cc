@@ -26,10 +26,10 @@ namespace fs = std::filesystem;
 
 constexpr char kEnding[] = ".part";
 constexpr std::size_t kRandomDigits = 16;
-// A file's name has at most 255 bytes, those of a part included.
+// The name of a part may have at most 255 bytes, as any file name.
 constexpr std::size_t kMaxStem = 200;
 
-// The beginning of a part's name. A hash keeps apart long names that begin alike.
+// The beginning of a part's name. A hash distinguishes long names with the same beginning.
 std::string Beginning(const std::string& stem) {
   if (stem.size() <= kMaxStem) return "." + stem + ".";
   return fmt::format(".{}~{:016x}.", stem.substr(0, kMaxStem - 17), std::hash<std::string>()(stem));
@@ -38,15 +38,15 @@ std::string Beginning(const std::string& stem) {
 std::uint64_t Unpredictable() {
   std::uint64_t bits = 0;
   if (::getrandom(&bits, sizeof bits, 0) == static_cast<ssize_t>(sizeof bits)) return bits;
-  // Without it names can be guessed, and still nothing that is there is opened.
+  // This fallback is predictable, but parts are only created, so that no existing file is opened.
   return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count()) *
              0x9E3779B97F4A7C15U ^
          static_cast<std::uint64_t>(::getpid());
 }
 
-// Runs that look for each other's parts do so one after the other: else two that start together
-// would each find the other's, and none would go on. Somebody who never lets go of the folder's
-// lock costs this much time, and then two runs may both be refused.
+// Runs search for each other's parts one after the other. Otherwise two runs that start together
+// would each find the other's part, and neither would continue. If another process never releases
+// the lock of the folder, the constructor stops waiting; two runs may then both be refused.
 class FolderTurn {
  public:
   explicit FolderTurn(const fs::path& folder)
@@ -80,7 +80,8 @@ std::vector<std::string> PartsIn(const fs::path& folder, const std::string& stem
 
 enum class Found { kNothing, kHeld, kLeftOver };
 
-// Another's part, opened and locked if nobody holds it. No link is followed, nobody waited for.
+// A part of another run, opened and locked if no run holds its lock. No link is followed, and no
+// call waits.
 class FoundPart {
  public:
   explicit FoundPart(const std::string& path) {
@@ -110,7 +111,7 @@ class FoundPart {
 
 struct NameIsTaken {};
 
-// Where what was opened lies now; empty if that cannot be known.
+// The present path of an opened file or folder; empty if it cannot be determined.
 std::string PathOf(int fd) {
   std::error_code failure;
   const fs::path path = fs::read_symlink(fmt::format("/proc/self/fd/{}", fd), failure);
@@ -168,7 +169,7 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
     }
     std::error_code failure;
     if (found.what() == Found::kLeftOver) fs::remove_all(path, failure);
-    // Whoever made it may be at removing it, too.
+    // Its owner may be removing it at the same time.
     if (failure == std::errc::no_such_file_or_directory) failure.clear();
     if (failure == std::errc::not_enough_memory) throw std::bad_alloc();
     if (failure) {
@@ -192,7 +193,8 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
     } catch (const NameIsTaken&) {
       continue;
     }
-    // A run that does not take turns may have taken it for one that was left behind.
+    // A run that did not wait for its turn may have mistaken the new part for one that was left
+    // behind.
     if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 && IsNamed(fd_, path_)) return;
     const int error = errno;
     const bool is_there = IsNamed(fd_, path_);
@@ -212,10 +214,10 @@ OutputPart::OutputPart(const fs::path& folder, const std::string& stem, PartKind
 OutputPart::~OutputPart() {
   if (fd_ < 0) return;
   std::error_code ignored;
-  // Somebody may have renamed the folder around it.
+  // Another program may have renamed the folder that contains the part.
   if (!IsNamed(fd_, path_)) path_ = PathOf(fd_);
   const bool is_ours = !path_.empty() && IsNamed(fd_, path_);
-  ::close(fd_);  // first: where descriptors are scarce, a folder cannot be emptied without
+  ::close(fd_);  // before remove_all, which needs a free descriptor to empty a folder
   if (is_ours) fs::remove_all(path_, ignored);
 }
 

@@ -11,24 +11,24 @@ namespace thicklens {
 enum class PartKind { kFile, kFolder };
 
 // The place where an output is made before it gets its name: a new file or folder
-// ".STEM.RANDOM.part", locked for as long as this lives. It is created, never opened, so that no
-// link and nothing of somebody else's can stand in its place. What killed runs left behind with the
-// same stem carries no lock and is removed; where another run holds one, the constructor throws
-// Error.
+// ".STEM.RANDOM.part", which is locked during the lifetime of this object. It is always created,
+// never an existing one opened, so that it cannot be a link or a foreign file. Parts with the same
+// stem that killed runs left behind have no lock and are removed. If another run has locked such a
+// part, the constructor throws Error.
 class OutputPart {
  public:
-  // `shown` is the output, for messages.
+  // `shown` is the name of the output in messages.
   OutputPart(const std::filesystem::path& folder, const std::string& stem, PartKind kind,
              const std::string& shown);
-  ~OutputPart();  // removes it, unless it got another name
+  ~OutputPart();  // removes the part unless it was released
   OutputPart(const OutputPart&) = delete;
   OutputPart& operator=(const OutputPart&) = delete;
 
   int fd() const { return fd_; }
   const std::string& path() const { return path_; }
-  // Throws Error where somebody has removed or renamed it.
+  // Throws Error if the part was removed or renamed by another program.
   void RequireThere(const std::string& shown) const;
-  // It has its name now.
+  // Gives up the part, which now has its final name.
   void Release();
 
  private:
@@ -37,11 +37,11 @@ class OutputPart {
   Temporary temporary_;
 };
 
-// Whether a run that this user started, and that no longer lives, has left such a part there.
+// Returns true if a run of this user that has ended left such a part in the folder.
 bool HasLeftOverPart(const std::filesystem::path& folder, const std::string& stem);
-// Removes such parts, as far as they can be removed.
+// Removes such parts as far as possible.
 void RemoveLeftOverParts(const std::filesystem::path& folder, const std::string& stem);
-// Whether the name is one of a part with that stem.
+// Returns true if `name` is the name of a part with that stem.
 bool IsPartName(const std::string& name, const std::string& stem);
 
 }  // namespace thicklens

@@ -37,7 +37,8 @@ void RequireName(const std::string& path, const std::string& what) {
                   what));
 }
 
-// The names of descriptors and devices, and what the system makes up, hold no files of a person.
+// Throws Error for a target in the folders of descriptors, devices and system files, which contain
+// no ordinary files.
 void RequireOrdinaryFolder(const std::string& path, const fs::path& target) {
   std::error_code failure;
   const std::string folder = fs::canonical(FolderOf(target), failure).string() + "/";
@@ -78,7 +79,8 @@ bool MayWrite(const fs::path& path, int rights) {
   return ::faccessat(AT_FDCWD, path.c_str(), rights, AT_EACCESS) == 0;
 }
 
-// In a folder such as /tmp, only an owner may rename.
+// Whether the folder is sticky, as /tmp is, and this user owns neither it nor the file: only an
+// owner may rename there.
 bool IsStickyOfOthers(const fs::path& parent, const struct stat& older) {
   struct stat folder {};
   const uid_t user = ::geteuid();
@@ -109,7 +111,7 @@ void DecideHow(int rights, OutputTarget* result) {
     if (!may_rename) throw CannotBeWritten(result->given, error);
     return;
   }
-  // A file that its owner has protected is not replaced behind that protection.
+  // A write-protected file is not replaced, although a rename would be possible.
   if (!MayWrite(result->target, rights)) throw CannotBeWritten(result->given, errno);
   result->in_place =
       !may_rename || IsStickyOfOthers(parent, *result->older) || IsMountPoint(result->target);
@@ -188,7 +190,7 @@ void KeepOwnerAndMode(int fd, const struct stat& older) {
 
 void RequireStored(int fd, const std::string& shown) {
   if (::fsync(fd) != 0 && errno != EINVAL) throw CannotBeWritten(shown, errno);
-  // Closing may fail on a full disk, too, and this descriptor is to stay open for its lock.
+  // Closing may also fail on a full disk, but this descriptor must stay open for its lock.
   const int copy = ::fcntl(fd, F_DUPFD_CLOEXEC, 0);
   if (copy >= 0 && ::close(copy) != 0) throw CannotBeWritten(shown, errno);
 }

@@ -11,20 +11,21 @@
 
 namespace thicklens {
 
-// Where an output goes, looked at before anything is computed.
+// The target of an output, which is checked before anything is computed.
 struct OutputTarget {
-  std::string given;             // for messages
-  std::filesystem::path target;  // links followed, so that a link stays one, as `cp` has it
-  std::optional<struct stat> older;
-  // The older one cannot be replaced by a new name, only written into: it is a mount point, or the
-  // folder that it lies in may not be written to.
+  std::string given;                 // the path as given, for messages
+  std::filesystem::path target;      // links are followed, so that a link is kept, as by `cp`
+  std::optional<struct stat> older;  // the existing file or folder
+  // True if the existing file or folder cannot be replaced by a rename and must be written in
+  // place: it is a mount point, or the rights in its folder do not permit a rename.
   bool in_place = false;
 
   std::filesystem::path parent() const;
 };
 
-// Throw Error: the name is empty, '-', or too long, what is there is of another kind, may not be
-// written to, or is a link to nothing, or there is no folder for it.
+// Check the target of a file or folder. They throw Error if the name is empty, '-' or too long, if
+// the existing target has another kind, is not writable or is a link to nothing, or if the parent
+// folder does not exist.
 OutputTarget FileTarget(const std::string& path);
 OutputTarget FolderTarget(const std::string& path);
 
@@ -32,19 +33,19 @@ Error CannotBeWritten(const std::string& target, int error);
 
 bool IsMountPoint(const std::filesystem::path& path);
 
-// Whether that is the name of what was opened.
+// Returns true if `name` is the path of the opened file or folder `fd`.
 bool IsNamed(int fd, const std::string& name);
 
-// Gives a new file or folder the owner, group and permission bits of the older one, as writing into
-// that one would have kept them. An owner or a group that this user may not give stays this user's;
-// the group then gets no more rights than all others have.
+// Gives a new file or folder the owner, group and permission bits of the older one, as if the older
+// one had been written in place. An owner or a group that this user may not set remains that of
+// this user; the group then gets no more rights than all other users have.
 void KeepOwnerAndMode(int fd, const struct stat& older);
 
-// Waits until the content written through `fd` is on the disk. Throws Error; some file systems
-// report a full disk or a quota only then.
+// Waits until the content written through `fd` is on the disk. Throws Error, because some file
+// systems report a full disk or a quota only then.
 void RequireStored(int fd, const std::string& shown);
 
-// A new name lasts beyond a power failure.
+// Syncs a folder, so that a new name in it survives a power failure.
 void SyncFolder(const std::filesystem::path& folder);
 
 }  // namespace thicklens

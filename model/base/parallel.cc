@@ -28,7 +28,8 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& work) {
       int index = 0;
       {
         const std::lock_guard<std::mutex> lock(mutex);
-        // Indices are handed out in order, so one below a failed index has already been started.
+        // Indices are assigned in order, so that every index below a failed one has already been
+        // started.
         if (next >= count || failure) return;
         index = next++;
       }
@@ -49,7 +50,7 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& work) {
   try {
     for (int i = 1; i < workers; ++i) pool.emplace_back(run);
   } catch (const std::system_error&) {
-    // The system gives no more threads: those there are do the work.
+    // The system provides no more threads; the existing ones do the work.
   }
   run();
   for (std::thread& thread : pool) thread.join();

@@ -11,8 +11,9 @@ std::mt19937_64 SeededEngine(std::uint64_t seed, RandomDraws::Purpose purpose, s
   return std::mt19937_64(sequence);
 }
 
-// ln(k!), k >= 0 a whole number. From 10 on by Stirling's series, whose first term left out is
-// below 1e-10 there. Not std::lgamma: it writes a global and so is not safe on several threads.
+// ln(k!) for an integer k >= 0. From 10 on it is Stirling's series, whose first omitted term is
+// below 1e-10 there. std::lgamma is not used, because it writes a global variable and so is not
+// thread-safe.
 double LogFactorial(double k) {
   static constexpr double kTable[10] = {0,
                                         0,
@@ -39,8 +40,8 @@ RandomDraws::RandomDraws(std::uint64_t seed, Purpose purpose, std::uint32_t item
 
 double RandomDraws::Uniform() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
 
-// Marsaglia's polar method [L5]: two independent normals from a point that is uniform in the unit
-// disc.
+// Marsaglia's polar method [L5] gives two independent normal numbers from a point that is uniform
+// in the unit disc.
 double RandomDraws::Normal() {
   if (has_spare_) {
     has_spare_ = false;
@@ -61,7 +62,8 @@ double RandomDraws::Normal() {
 double RandomDraws::Poisson(double mean) {
   if (!(mean > 0)) return 0;
   if (mean < 10) {
-    // Waiting times: the number of uniform factors until their product falls below exp(-mean).
+    // Waiting times: the draw is the largest number of uniform factors whose product still exceeds
+    // exp(-mean).
     const double limit = std::exp(-mean);
     double count = 0;
     double product = Uniform();
@@ -71,8 +73,8 @@ double RandomDraws::Poisson(double mean) {
     }
     return count;
   }
-  // Transformed rejection with squeeze, PTRS of W. Hoermann, "The transformed rejection method for
-  // generating Poisson random variables" (1993), valid for mean >= 10.
+  // Transformed rejection with squeeze, the algorithm PTRS of W. Hoermann, "The transformed
+  // rejection method for generating Poisson random variables" (1993), valid for mean >= 10.
   const double b = 0.931 + 2.53 * std::sqrt(mean);
   const double a = -0.059 + 0.02483 * b;
   const double inverse_alpha = 1.1239 + 1.1328 / (b - 3.4);

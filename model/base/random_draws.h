@@ -6,12 +6,12 @@
 
 namespace thicklens {
 
-// Seeded draws whose sequence is the same with every standard library: the distributions of
-// <random> are left to the implementation, std::mt19937_64 and std::seed_seq are not.
+// Seeded random draws with the same sequence under every standard library. The standard specifies
+// std::mt19937_64 and std::seed_seq completely, but not the distributions of <random>.
 class RandomDraws {
  public:
-  // What the draws are for. Each purpose has a stream of its own, so that switching one effect on
-  // or off leaves the others' draws as they were.
+  // Purpose of the draws. Each purpose has its own stream, so that switching one effect on or off
+  // does not change the draws of the others.
   enum class Purpose : std::uint32_t {
     kTexture = 1,
     kBench = 2,
@@ -22,12 +22,12 @@ class RandomDraws {
     kReadout = 7
   };
 
-  // `item` is the frame's index, so that a frame does not depend on which were drawn before.
+  // `item` is the index of the frame, so that a frame does not depend on the frames before it.
   RandomDraws(std::uint64_t seed, Purpose purpose, std::uint32_t item);
 
   double Uniform();  // in [0, 1), 53 bits
   double Normal();   // mean 0, variance 1
-  // Poisson distributed, exact at every mean. A mean <= 0 gives 0.
+  // A draw of the Poisson distribution, exact at every mean. A mean <= 0 gives 0.
   double Poisson(double mean);
 
  private:

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-// A path and what was made there.
+// A path and the identity of the file or folder that was made there.
 struct Entry {
   std::string path;
   dev_t device = 0;
@@ -34,7 +34,7 @@ struct Entry {
 };
 
 struct List {
-  std::timed_mutex mutex;  // of all that follows
+  std::timed_mutex mutex;  // protects the members below
   std::map<unsigned long long, Entry> entries;
   unsigned long long last_id = 0;
   std::vector<std::string> in_place;
@@ -42,7 +42,7 @@ struct List {
   std::atomic<bool> is_putting{false};  // a thread holds the mutex and puts an output in place
 };
 
-// Never destroyed: threads may need it while the process ends.
+// The list is never destroyed, because threads may need it while the process ends.
 List& TheList() {
   static List& list = *new List;
   return list;
@@ -65,7 +65,8 @@ class Putting {
   std::atomic<bool>* is_putting_;
 };
 
-// A folder may get new files from other threads while it is emptied: once more, then.
+// Other threads may create files in a folder while it is emptied; removal is then repeated until
+// the deadline.
 void Remove(const Entry& entry, Clock::time_point deadline) {
   constexpr auto kPause = std::chrono::milliseconds(5);
   std::error_code ignored;
@@ -128,7 +129,7 @@ std::optional<Temporary> PutInPlace(const std::string& shown,
   const Putting putting(&list.is_putting);
   const std::optional<std::string> replaced = put();
   if (!replaced) return std::nullopt;
-  // An output in a temporary folder goes with it, and is no news.
+  // An output in a temporary folder is removed with the folder and is not reported.
   const bool is_temporary =
       std::any_of(list.entries.begin(), list.entries.end(), [&](const auto& entry) {
         const std::string& folder = entry.second.path;
@@ -159,7 +160,8 @@ std::vector<std::string> AbandonOutputs(double limit_s) {
   std::vector<std::string> in_place;
   {
     std::unique_lock<std::timed_mutex> lock(list.mutex, deadline);
-    // An output that is being put in place would be torn: its end is waited for, however long.
+    // An output that is being moved to its target would be left incomplete. Its end is always
+    // waited for.
     constexpr auto kPause = std::chrono::milliseconds(20);
     while (!lock.owns_lock() && list.is_putting) static_cast<void>(lock.try_lock_for(kPause));
     if (!lock.owns_lock()) return {};
@@ -167,7 +169,7 @@ std::vector<std::string> AbandonOutputs(double limit_s) {
     entries = list.entries;
     in_place = list.in_place;
   }
-  // A folder is older than what was made in it.
+  // The newest entries are removed first, because a folder is older than its content.
   for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry)
     Remove(entry->second, deadline);
   return in_place;

@@ -11,7 +11,7 @@
 
 namespace thicklens {
 
-// Throws Error that says `shown`.
+// Writes the whole content to `fd`. Throws Error, which names `shown`.
 inline void WriteAll(int fd, const std::string& content, const std::string& shown) {
   std::size_t done = 0;
   while (done < content.size()) {

@@ -21,7 +21,7 @@ std::string Join(const std::vector<std::string>& items) {
   return fmt::format("{}", fmt::join(items, ", "));
 }
 
-// "pixel_pitch_mm" -> "pixel_pitch"; what has no unit suffix stays as it is.
+// "pixel_pitch_mm" -> "pixel_pitch"; a key without a unit suffix is unchanged.
 std::string WithoutUnit(const std::string& key) {
   static const std::set<std::string> kUnits = {
       "nm",  "um",  "mm",  "cm", "dm",        "m",      "in",      "inch",  "px",
@@ -58,7 +58,7 @@ std::string SuggestionFor(const std::string& key, const std::vector<std::string>
   return fmt::format("allowed here: {}", Join(allowed));
 }
 
-// A message shows what was found in full only where it is short.
+// Text for a message. A long text is shortened.
 std::string Shown(const std::string& text) {
   constexpr std::size_t kLongest = 80, kBegin = 40;
   if (text.size() <= kLongest) return text;
@@ -67,7 +67,8 @@ std::string Shown(const std::string& text) {
   return fmt::format("{}... ({} bytes)", text.substr(0, end), text.size());
 }
 
-// Beyond these no length, angle or count means anything, and products of several overflow.
+// Limits of numbers. Beyond them no length, angle or count is meaningful, and products of several
+// numbers overflow.
 constexpr double kMostMagnitude = 1e30, kLeastPositive = 1e-30;
 
 std::string KindOf(const YAML::Node& node) {
@@ -83,7 +84,7 @@ std::string KindOf(const YAML::Node& node) {
   }
 }
 
-// Where the documents of a text begin.
+// Collects the positions at which the documents of a text begin.
 class DocumentStarts : public YAML::EventHandler {
  public:
   const std::vector<YAML::Mark>& marks() const { return marks_; }
@@ -105,8 +106,8 @@ class DocumentStarts : public YAML::EventHandler {
   std::vector<YAML::Mark> marks_;
 };
 
-// YAML has no NUL, and yaml-cpp takes one for a part of a text. UTF-16 and UTF-32 are full of them;
-// yaml-cpp knows these by their first bytes.
+// YAML permits no NUL, but yaml-cpp accepts one as a part of a text. UTF-16 and UTF-32 contain many
+// NUL bytes; yaml-cpp recognises these encodings by their first bytes.
 void RequireNoNul(const std::string& text, const std::string& source_name) {
   const auto is_wide = [&text] {
     if (text.size() < 2) return false;
@@ -121,8 +122,8 @@ void RequireNoNul(const std::string& text, const std::string& source_name) {
                           source_name, 1 + std::count(text.begin(), end, '\n')));
 }
 
-// yaml-cpp finds empty documents without end where a text begins with, say, a comma: it is asked
-// for no more than two.
+// yaml-cpp finds endless empty documents in a text that begins with a comma, for example. Therefore
+// at most two documents are requested.
 void RequireOneDocument(const std::string& text, const std::string& source_name) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);

@@ -6,15 +6,16 @@
 
 namespace thicklens {
 
-// A wrong file, configuration or device. The message is one line that names the place (file, field
-// or frame), the value found there and what would be right. Modules throw it; only `tools` prints
-// it and turns it into an exit code.
+// An invalid file, configuration or device. The message is one line that names the place (file,
+// field or frame), the value found there and the expected value. Modules throw it; only `tools`
+// prints it and converts it to an exit code.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// The user asked to stop. Whoever holds a half-written output drops it while this passes by.
+// A cancellation by the user. The owner of an incomplete output discards it while the exception
+// propagates.
 class Interrupted : public Error {
  public:
   Interrupted() : Error("interrupted; nothing was written") {}

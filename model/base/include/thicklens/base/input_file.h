@@ -7,34 +7,38 @@
 
 namespace thicklens {
 
-// Every file that is read is a regular file (ordinary, with a size) of limited size. A folder, a
-// named pipe, a device or a socket is refused by its kind, without waiting for somebody to write to
-// it; so is a process substitution, which is a pipe with a name in /dev/fd.
+// Every input is a regular file (ordinary, with a size) of limited size. A folder, a named pipe, a
+// device or a socket throws Error, which names its kind, without waiting for a writer. A process
+// substitution, which is a pipe with a name in /dev/fd, throws Error as well.
 
-// Texts: YAML, CSV, JSON, parameters.cfg.
+// Maximum size of text files: YAML, CSV, JSON, parameters.cfg.
 constexpr std::uint64_t kMaxTextBytes = std::uint64_t{64} << 20;
-// All others: images and depth maps.
+// Maximum size of all other files: images and depth maps.
 constexpr std::uint64_t kMaxInputBytes = std::uint64_t{4} << 30;
 
-// The whole content of a text; throws Error naming the path and the reason.
+// Returns the whole content of a text file. Throws Error, which names the path and the reason.
 std::string ReadTextFile(const std::string& path);
 
-// What ReadWholeFile (output_file.h) and ReadTextFile do, for a file that is no input of the run,
-// such as an older output that is about to be replaced: the watch is not told.
+// Returns the whole content of a file that is no input of the run, such as an older output that is
+// about to be replaced. Unlike ReadWholeFile (output_file.h) and ReadTextFile it does not call the
+// InputWatch. Throws Error, which names the path and the reason, also above `most_bytes`.
 std::string ReadOwnFile(const std::string& path, std::uint64_t most_bytes = kMaxInputBytes);
 
 // Throws Error unless the path leads to a regular file. Opens nothing.
 void RequireRegularFile(const std::string& path);
 
-// "a folder", "a named pipe", "a socket", ...; "a file" for a regular one. `mode` is of stat(2).
+// The kind of a file in words: "a folder", "a named pipe", "a socket", ...; "a file" for a regular
+// one. `mode` is st_mode of stat(2).
 std::string KindOfFile(unsigned mode);
 
-// Called with the path of each input before it is read, and of each file that an input names as
-// soon as the name is read; from any thread. It may throw Error: a program that must not write over
-// what it reads learns here what that is. One for the whole process; empty: none.
+// A function that is called with the path of each input before it is read, and with the path of
+// each file that an input names as soon as the name is read. The calls may come from any thread.
+// The function may throw Error, so that a program can refuse to overwrite its inputs. There is one
+// for the whole process; empty: none.
 using InputWatch = std::function<void(const std::string& path)>;
-void WatchInputs(InputWatch watch);  // not while another thread reads
-// For readers of files that name other files.
+// Sets the InputWatch. Must not be called while another thread reads.
+void WatchInputs(InputWatch watch);
+// Calls the InputWatch. Readers of files that name other files call this function.
 void TellInput(const std::string& path);
 
 }  // namespace thicklens

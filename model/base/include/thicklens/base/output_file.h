@@ -8,19 +8,19 @@
 
 namespace thicklens {
 
-// An output file that appears whole or not at all.
+// An output file that becomes visible either completely or not at all.
 //
-// The constructor claims the name: it makes a new file ".NAME.RANDOM.part" beside the target and
-// locks it, so that an output that cannot be written, or that a second run is writing, is refused
-// before any work is done. Commit writes, syncs and renames. Without Commit the destructor removes
-// the part file and whatever stood at the target stays as it was. A part file that a killed run has
-// left behind is removed. A symbolic link stays one: what it leads to is replaced. The file that is
-// replaced leaves its owner, group and permissions, as far as this user may give them, to the new
-// one.
+// The constructor reserves the name: it creates a new file ".NAME.RANDOM.part" beside the target
+// and locks it. It thus throws Error, before any work is done, if the output cannot be written or
+// another run is writing it. Commit writes, syncs and renames. Without Commit the destructor
+// removes the part file, and an existing target is not changed. A part file that a killed run left
+// behind is removed. A symbolic link is kept, and the file to which it leads is replaced. The new
+// file gets the owner, group and permissions of the replaced one as far as the rights of this user
+// permit.
 //
-// A file that cannot be replaced, because it is a mount point or its folder may not be written to,
-// is written into at Commit; a full disk then leaves it as it was, too, where the file system can
-// reserve space.
+// A file that cannot be replaced, because it is a mount point or its folder is not writable, is
+// overwritten in place at Commit. A full disk leaves this file unchanged as well if the file system
+// can reserve space.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);  // throws Error
@@ -29,24 +29,25 @@ class OutputFile {
   OutputFile& operator=(OutputFile&&) noexcept;
 
   void Commit(const std::string& content);  // throws Error, e.g. on a full disk
-  const std::string& path() const;
+  const std::string& path() const;          // as given to the constructor
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-// The same for a folder: files are written into staging_path(), and Commit puts the folder in
-// place, replacing an older one. A folder at the target is replaced only if it is empty, or
-// contains `marker_file` (the sign that this program wrote it) and nothing but `own_entries`, where
-// these are given; else the constructor and Commit throw Error that names what would be lost. An
-// own entry is the name of a file or folder, the folder with all that is in it, or "FOLDER/PATTERN"
-// for a folder that holds nothing but files whose names match one of its shell patterns.
+// An output folder that becomes visible either completely or not at all. Files are written into
+// staging_path(), and Commit moves the folder to the target and replaces an older one. An older
+// folder is replaced only if it is empty, or if it contains `marker_file` (which shows that this
+// program wrote it) and, where `own_entries` are given, no other entries. Otherwise the constructor
+// and Commit throw Error, which names an entry that would be lost. An own entry is the name of a
+// file, the name of a folder with any content, or "FOLDER/PATTERN" for a folder that contains only
+// files whose names match one of its shell patterns.
 //
-// A folder that cannot be replaced, because it is a mount point or lies in a folder that may not be
-// written to, gets its new content at Commit entry by entry out of a part folder within it: the
-// older marker goes first, then the older content; the new marker comes last. "lost+found" in it is
-// left alone. What a run has left there that was killed meanwhile is removed by the next.
+// A folder that cannot be replaced, because it is a mount point or its parent folder is not
+// writable, gets its new content at Commit, entry by entry, from a part folder within it. The older
+// marker is removed first, then the older content; the new marker comes last. "lost+found" in the
+// folder is not touched. The next run removes what a killed run left there.
 class OutputFolder {
  public:
   OutputFolder(const std::string& path, const std::string& marker_file,
@@ -56,26 +57,26 @@ class OutputFolder {
   OutputFolder& operator=(OutputFolder&&) noexcept;
 
   const std::string& staging_path() const;
-  // Writes one file below the staging folder; `name` may have one folder in front. Throws Error.
+  // Writes one file below the staging folder; `name` may begin with one folder. Throws Error.
   void Write(const std::string& name, const std::string& content);
-  // The same for who writes a file himself: calls write(path, name to be shown) and sees to it that
-  // what was written reaches the disk.
+  // Lets the caller write one file: calls write(path, name for messages) and then ensures that the
+  // content reaches the disk. Throws Error.
   void WriteWith(
       const std::string& name,
       const std::function<void(const std::string& path, const std::string& shown)>& write);
-  void Commit();
-  const std::string& path() const;
+  void Commit();                    // throws Error
+  const std::string& path() const;  // of the target, with links followed
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-// Claims, writes and commits in one step.
+// Writes a file by OutputFile in one step. Throws Error.
 void WriteFileAtomically(const std::string& path, const std::string& content);
 
-// The whole content of a file that is an input; throws Error naming the path and the reason. See
-// input_file.h for what is refused, and for texts.
+// Returns the whole content of an input file. Throws Error, which names the path and the reason.
+// input_file.h describes which files are refused and declares the reader of text files.
 std::string ReadWholeFile(const std::string& path);
 
 }  // namespace thicklens

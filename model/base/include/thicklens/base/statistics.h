@@ -5,8 +5,8 @@
 
 namespace thicklens {
 
-// The middle one of the values, of an even number the upper of the two in the middle; 0 if there
-// are none.
+// The median of the values. For an even number it is the upper of the two in the middle; it is 0 if
+// there are no values.
 double Median(std::vector<double> values);
 
 }  // namespace thicklens

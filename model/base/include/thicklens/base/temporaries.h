@@ -6,63 +6,64 @@
 #include <string>
 #include <vector>
 
-// What a process has made and will remove or rename before it ends: the unfinished outputs and the
-// temporary folders. A process that has to end while a library computes, so that no destructor runs
-// in time, removes them by AbandonOutputs.
+// The list of the files and folders that a process has made and will remove or rename before it
+// ends: the unfinished outputs and the temporary folders. A process that must end while a library
+// computes, so that no destructor runs in time, removes them by AbandonOutputs.
 namespace thicklens {
 
-// What AbandonOutputs does with a folder that is not empty.
+// Treatment of a folder by AbandonOutputs: remove it with its content, or only if it is empty.
 enum class Abandon { kWhole, kIfEmpty };
 
 // The entry of one file or folder in the list of this process. Functions may be called from any
 // thread.
 class Temporary {
  public:
-  Temporary() = default;  // of nothing
-  // `create` makes the file or folder and returns its path; it must be short and must not make
-  // another Temporary. What it throws passes on. After AbandonOutputs it is not called: Interrupted
-  // is thrown.
-  // kIfEmpty: the folder is one of the person's, outputs come to lie in it, and it is removed only
-  // while nothing is in it.
+  Temporary() = default;  // no entry
+  // `create` makes the file or folder and returns its path. It must be short and must not make
+  // another Temporary. Its exceptions propagate. After AbandonOutputs, Interrupted is thrown and
+  // `create` is not called.
+  // kIfEmpty is for a folder of the user in which outputs are placed; it is removed only while it
+  // is empty.
   explicit Temporary(const std::function<std::string()>& create, Abandon abandon = Abandon::kWhole);
-  // Takes the entry out of the list. Removes nothing.
+  // Removes the entry from the list, but not the file or folder.
   ~Temporary();
   Temporary(Temporary&& other) noexcept;
   Temporary& operator=(Temporary&& other) noexcept;
 
-  // Takes the entry out of the list because the file is complete and stays. Throws Interrupted
-  // after AbandonOutputs, which has removed or is about to remove it.
+  // Removes the entry from the list because the file is complete and will be kept. Throws
+  // Interrupted after AbandonOutputs, which has removed the file or is about to remove it.
   void Keep();
 
-  const std::string& path() const { return path_; }  // empty: of nothing
+  const std::string& path() const { return path_; }  // empty: no entry
 
  private:
   friend std::optional<Temporary> PutInPlace(
       const std::string& shown, const std::function<std::optional<std::string>()>& put);
 
-  unsigned long long id_ = 0;  // 0: of nothing
+  unsigned long long id_ = 0;  // 0: no entry
   std::string path_;
 };
 
-// Runs `put`, which puts the output `shown` in place, typically by a rename. AbandonOutputs comes
-// either before all of it, and then Interrupted is thrown here and `put` is not called, or after
-// all of it. `put` must be short and must not make or destroy a Temporary. It returns the path of
-// what it has replaced, if that is still to be removed, or else an empty one: the result lists it.
-// std::nullopt: nothing was put in place, and the result is empty as well.
+// Runs `put`, which moves the output `shown` to its target, typically by a rename. AbandonOutputs
+// runs either before `put` or after it, never during it; if it ran before, Interrupted is thrown
+// and `put` is not called. `put` must be short and must not make or destroy a Temporary. It
+// returns the path of the replaced file or folder if that must still be removed, otherwise an empty
+// path. The result is the list entry of that path. If `put` returns std::nullopt, nothing was moved
+// and the result is std::nullopt as well.
 std::optional<Temporary> PutInPlace(const std::string& shown,
                                     const std::function<std::optional<std::string>()>& put);
 
-// The outputs that this process has put in place, those in temporary folders apart, as they were
-// named for messages.
+// The outputs that this process has moved to their targets, by their names for messages. Outputs in
+// temporary folders are not included.
 std::vector<std::string> OutputsInPlace();
 
-// Removes every file and folder in the list whose path still leads to what was made there, the
-// newest first. From
-// then on no output is put in place and no temporary is made. Meant for the last moment of a
-// process: other threads may be at work, and what they try afterwards fails. Returns
-// OutputsInPlace. Waits to its end for an output that is being put in place, and no longer than
-// `limit_s` for a thread that is about to create a temporary and for folders in which other threads
-// are still making files.
+// Removes every file and folder in the list whose path still leads to the file or folder that was
+// made there, the newest first. Afterwards no output is moved to its target and no temporary is
+// made. The function is for the end of a process: other threads may still run, and their later
+// attempts fail. Returns OutputsInPlace, or an empty list if the time limit passed before the list
+// was available. An output that is being moved to its target is always waited for. The wait for a
+// thread that is about to create a temporary, and for folders in which other threads are still
+// making files, is limited to `limit_s`, in seconds.
 std::vector<std::string> AbandonOutputs(double limit_s);
 
 }  // namespace thicklens

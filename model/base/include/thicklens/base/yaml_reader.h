@@ -10,46 +10,54 @@
 
 namespace thicklens {
 
-// A strict view of one node of a YAML document: every schema of the project is read through it.
-// Every error names file:line:column, the field's path, what was found and what would be right.
+// A strict view of one node of a YAML document. Every schema of the project is read through it.
+// Copies share the document, which lives as long as one of its nodes. Every Error names
+// file:line:column, the path of the field, the value found and the expected value. Every reader
+// throws Error if the node has the wrong type or value.
 class YamlNode {
  public:
+  // Read a file or a text that contains exactly one YAML document. `source_name` is the name of the
+  // text in messages.
   static YamlNode LoadFile(const std::string& path);
   static YamlNode Parse(const std::string& text, const std::string& source_name);
 
-  // Whether this is a map with that `schema`.
+  // Returns true if this is a map whose key `schema` has the given value.
   bool HasSchema(const std::string& schema) const;
-  // Throws unless this map's `schema` is the given one (e.g. "thicklens/camera/2").
+  // Throws Error unless HasSchema (e.g. for "thicklens/camera/2").
   void RequireSchema(const std::string& schema) const;
-  // Throws for the first key that is not in the list, with a suggestion where one is close; a key
-  // that differs only in its unit suffix is called a wrong unit. Throws if this is no map.
+  // Throws Error for the first key that is not in the list, with a suggestion if a similar key is
+  // allowed; a key that differs only in its unit suffix is reported as a wrong unit. Throws Error
+  // also for a key that occurs twice, and if this is no map.
   void RequireKeys(const std::vector<std::string>& allowed) const;
 
   bool Has(const std::string& key) const;
-  YamlNode At(const std::string& key) const;                   // throws if absent
+  YamlNode At(const std::string& key) const;                   // throws Error if absent
   std::optional<YamlNode> Find(const std::string& key) const;  // absent or null: nullopt
 
   bool IsMap() const;
   bool IsSequence() const;
   bool IsScalar() const;
-  std::vector<YamlNode> Elements() const;  // of a sequence
-  std::vector<YamlNode> ElementsExactly(std::size_t count) const;
+  std::vector<YamlNode> Elements() const;                          // the elements of a sequence
+  std::vector<YamlNode> ElementsExactly(std::size_t count) const;  // throws Error for other counts
 
-  // Scalars, checked in full: "6 um" is no number, NaN and infinities are refused.
+  // Scalars, of which the whole text is checked: "6 um" is no number. NaN, infinities and
+  // magnitudes above 1e30 throw Error; a positive number must be at least 1e-30. `min` and `max`
+  // are included.
   double Number() const;
   double PositiveNumber() const;
   double NonNegativeNumber() const;
   int Integer(int min, int max) const;
   bool Boolean() const;
   std::string Text() const;                                          // a non-empty scalar
-  std::string OneOf(const std::vector<std::string>& allowed) const;  // a scalar out of a list
+  std::string OneOf(const std::vector<std::string>& allowed) const;  // a scalar of the list
 
-  // "file:12:7: lens.aperture_radius_mm: " + what.
+  // The Error with the message "file:12:7: lens.aperture_radius_mm: " + what.
   Error ErrorHere(const std::string& what) const;
   const std::string& path() const;    // dotted path of the field
-  const std::string& source() const;  // file name
-  // `relative` as seen from the folder of this document's file. What a file names is an input of
-  // the run: the InputWatch (input_file.h) is called.
+  const std::string& source() const;  // name of the file
+  // The path `relative`, resolved against the folder of this document's file; an absolute path is
+  // unchanged. A file that a document names is an input of the run, so that the InputWatch
+  // (input_file.h) is called.
   std::string ResolvePath(const std::string& relative) const;
 
  private:
@@ -58,7 +66,7 @@ class YamlNode {
   std::shared_ptr<const Impl> impl_;
 };
 
-// A number in its shortest form that reads back to the same bits.
+// The shortest text of a number that is read back to the same bits.
 std::string YamlNumber(double value);
 
 }  // namespace thicklens
