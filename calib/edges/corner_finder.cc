@@ -12,7 +12,7 @@ constexpr double kSmallestRadius = 5;  // px of the scale
 constexpr double kLargestRadius = 40;
 constexpr int kSamples = 72;
 
-// Grey on a circle about a corner, less its mean.
+// Grey values on a circle about a corner, minus their mean.
 using Circle = std::array<double, kSamples>;
 
 std::optional<Circle> SampleCircle(const cv::Mat& grey, const Eigen::Vector2d& centre,
@@ -31,7 +31,7 @@ std::optional<Circle> SampleCircle(const cv::Mat& grey, const Eigen::Vector2d& c
   return circle;
 }
 
-// The directions in which the two edges leave, from 0 to pi, and the contrast.
+// The directions in which the two edges leave the corner, from 0 to pi, and the contrast.
 struct Crossing {
   double first_rad = 0, second_rad = 0;
   double contrast = 0;
@@ -41,7 +41,8 @@ double Between(double a_rad, double b_rad) {
   return std::abs(std::remainder(a_rad - b_rad, CV_PI));
 }
 
-// Four changes of sign, opposite ones in line, and four sectors of about the same height.
+// Finds a crossing: four changes of sign, of which opposite ones are in line, and four sectors of
+// about the same height.
 std::optional<Crossing> CrossingOn(const Circle& circle) {
   std::vector<double> changes;
   std::array<double, 4> peaks{};
@@ -67,7 +68,7 @@ std::optional<Crossing> CrossingOn(const Circle& circle) {
   return crossing;
 }
 
-// -det of the Hessian: large at saddles.
+// Minus the determinant of the Hessian, which is large at saddles.
 cv::Mat SaddleStrength(const cv::Mat& grey) {
   cv::Mat xx, yy, xy;
   cv::Sobel(grey, xx, CV_32F, 2, 0);
@@ -76,7 +77,7 @@ cv::Mat SaddleStrength(const cv::Mat& grey) {
   return xy.mul(xy) - xx.mul(yy);
 }
 
-// Widens the circle for as long as it shows the same crossing.
+// Widens the circle as long as it shows the same crossing.
 std::optional<FeatureCandidate> CornerAt(const FrameScale& scale, const Eigen::Vector2d& centre) {
   std::optional<Crossing> crossing;
   double reached = 0;
@@ -86,7 +87,7 @@ std::optional<FeatureCandidate> CornerAt(const FrameScale& scale, const Eigen::V
     if (!found) break;
     if (crossing && (Between(found->first_rad, crossing->first_rad) > 0.25 ||
                      Between(found->second_rad, crossing->second_rad) > 0.25)) {
-      // Counted from another start, the two may have changed places.
+      // Counted from another start, the two edges may have changed places.
       if (Between(found->first_rad, crossing->second_rad) > 0.25 ||
           Between(found->second_rad, crossing->first_rad) > 0.25) {
         break;
@@ -98,7 +99,7 @@ std::optional<FeatureCandidate> CornerAt(const FrameScale& scale, const Eigen::V
   if (reached < 1.5 * kSmallestRadius || !(crossing->contrast > 12 * scale.gradient_noise)) {
     return std::nullopt;
   }
-  // The more vertical edge is the one whose direction is nearer to that of y.
+  // The more vertical edge is the one whose direction is nearer to the y axis.
   const bool first =
       std::abs(std::sin(crossing->first_rad)) >= std::abs(std::sin(crossing->second_rad));
   const double direction = first ? crossing->first_rad : crossing->second_rad;
@@ -107,8 +108,8 @@ std::optional<FeatureCandidate> CornerAt(const FrameScale& scale, const Eigen::V
   feature.kind = EdgeFeature::Kind::kCorner;
   feature.centre_px = (centre.array() + 0.5) * scale.factor - 0.5;
   feature.angle_rad = std::remainder(direction - CV_PI / 2, CV_PI);
-  // The circle meets the next squares at their side's length; what belongs to this corner alone
-  // ends half way.
+  // The circle meets the next squares at a radius of one side length. Only the half of that radius
+  // belongs to this corner alone.
   feature.half_width_px = feature.half_length_px = reached * scale.factor / 2;
   candidate.strength = crossing->contrast * std::sqrt(2 * feature.half_length_px);
   return candidate;
@@ -134,7 +135,7 @@ std::vector<FeatureCandidate> CornerCandidates(const FrameScale& scale, int most
   }
   std::stable_sort(saddles.begin(), saddles.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
-  // Behind the strongest come those of the noise.
+  // The saddles after the strongest ones are noise.
   if (saddles.size() > static_cast<std::size_t>(2 * most)) {
     saddles.resize(static_cast<std::size_t>(2 * most));
   }

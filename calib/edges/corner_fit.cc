@@ -12,14 +12,14 @@ namespace {
 
 constexpr int kFewestPixels = 100;
 constexpr int kMostPixels = 16000;
-// Two edges closer in direction than this are none that cross.
+// Minimum angle between two edges that count as crossing.
 constexpr double kLeastAngleRad = 0.9;
 
 enum Parameter {
   kX,
   kY,
-  kTurn,                    // of the more vertical edge's normal
-  kSecondTurn = kTurn + 1,  // of the other's, from a right angle to the first
+  kTurn,                    // turn of the normal of the more vertical edge
+  kSecondTurn = kTurn + 1,  // turn of the other normal, from a right angle to the first
   kVariance,
   kSecondVariance,
   kMean,
@@ -27,13 +27,14 @@ enum Parameter {
   kParameters = kHalf + 3
 };
 
-// The grey around an X corner (derived here, [D84]):
-//   I = A + B [S1(d1) S2(d2) + 4 c E1'(d1) E2'(d2) + 2 c^2 E1''(d1) E2''(d2)], S = 2 E - 1,
-// A (mean) and B (half the contrast) planes, d the distances from the edges, E their profiles. The
-// product holds for edges at a right angle and blurs that separate; c = n1.n2 (sigma^2 + 1/12) is
-// the covariance, px^2, of blur and pixel along the two normals. For Gaussians dI/dc is I's
-// derivative by d1 and d2: two orders in c, good to 1e-3 B within 15 degrees of a right angle. A
-// disc does not separate: where both of its profiles rise, the pixels are left out.
+// Model of the grey values around an X corner (derived here, [D84]):
+//   I = A + B [S1(d1) S2(d2) + 4 c E1'(d1) E2'(d2) + 2 c^2 E1''(d1) E2''(d2)], S = 2 E - 1.
+// A (mean) and B (half the contrast) are planes, d the distances from the edges, E their profiles.
+// The product holds for edges at a right angle and blurs that separate; c = n1.n2 (sigma^2 + 1/12)
+// is the covariance, px^2, of blur and pixel along the two normals. For Gaussians dI/dc is the
+// derivative of I with respect to d1 and d2. Two orders in c are good to 1e-3 B within 15 degrees
+// of a right angle. A disc does not separate; the pixels where both of its profiles rise are
+// therefore left out.
 class CornerModel : public StepModel<kParameters> {
  public:
   using StepModel::StepModel;
@@ -58,7 +59,7 @@ class CornerModel : public StepModel<kParameters> {
       const double step1 = 2 * e1.level - 1, step2 = 2 * e2.level - 1;
       const double u = pixels_.x_px[pixel] * PlaneScale(), v = pixels_.y_px[pixel] * PlaneScale();
       const double half = p[kHalf] + p[kHalf + 1] * u + p[kHalf + 2] * v;
-      // E'' is twice the derivative by the variance.
+      // E'' is twice the derivative with respect to the variance.
       const double pattern =
           step1 * step2 + 4 * covariance_px2 * e1.slope * e2.slope +
           8 * covariance_px2 * covariance_px2 * e1.per_variance * e2.per_variance;
@@ -145,7 +146,8 @@ class CornerFit : StepSearch<CornerModel> {
     pixels_ = std::move(kept);
   }
 
-  // The sign of d1 d2 in the frame of the first normal; the second is nearly at a right angle.
+  // The side is the sign of d1 d2 in the frame of the first normal; the second normal is nearly at
+  // a right angle to it.
   bool StartLevels() {
     const double c = std::cos(strip_.normal_rad), s = std::sin(strip_.normal_rad);
     const auto means = MeansOfSides(
@@ -184,7 +186,7 @@ class CornerFit : StepSearch<CornerModel> {
     std::vector<double> bright(pixels_.size());
     const double sign = parameters_[kHalf] > 0 ? 1 : -1;
     for (std::size_t i = 0; i < pixels_.size(); ++i) {
-      // The column of the half contrast is the pattern, -1 to 1.
+      // The Jacobian's column of the half contrast is the pattern, from -1 to 1.
       bright[i] = (1 + sign * end.jacobian(static_cast<Eigen::Index>(i), kHalf)) / 2;
     }
     const auto judgement = Judge(end, bright, 2 * std::abs(parameters_[kHalf]));
@@ -202,7 +204,7 @@ class CornerFit : StepSearch<CornerModel> {
       std::swap(first, second);
       std::swap(angle1, angle2);
     }
-    // A corner's normal has no sense of direction.
+    // The normal of a corner has no sense of direction.
     fit.feature.angle_rad = std::remainder(angle1, CV_PI);
     fit.across_x = first;
     fit.across_y = second;

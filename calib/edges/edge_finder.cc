@@ -14,8 +14,9 @@ constexpr int kSmallestSide = 24;
 constexpr int kMostScales = 4;
 constexpr double kSmoothingSigma = 1;
 
-// Quiet places show the noise: the magnitude of a gradient with nothing but noise is distributed
-// after Rayleigh, a fifth of it below .668 sd of a component. From a part of the pixels.
+// Noise of a gradient component, measured at quiet places. The magnitude of a gradient that
+// contains only noise follows the Rayleigh distribution, of which a fifth lies below 0.668 standard
+// deviations of a component. Only a part of the pixels is sampled.
 double GradientNoise(const cv::Mat& magnitude) {
   cv::Mat part;
   const cv::Size size(std::min(magnitude.cols, 128), std::min(magnitude.rows, 128));
@@ -23,12 +24,12 @@ double GradientNoise(const cv::Mat& magnitude) {
   return Quantile(part, 0.2) / 0.668;
 }
 
-// Grows regions one after the other; a pixel belongs to one at most.
+// Grows the regions one after the other. A pixel belongs to at most one region.
 class RegionGrower {
  public:
   RegionGrower(const Gradient& gradient, double threshold)
       : gradient_(gradient), taken_(gradient.magnitude.size(), CV_8U, cv::Scalar(1)) {
-    // The frame's outermost pixels have no gradient.
+    // The outermost pixels of the frame have no gradient.
     for (int y = 1; y + 1 < taken_.rows; ++y) {
       const auto* magnitude = gradient.magnitude.ptr<float>(y);
       auto* taken = taken_.ptr<uchar>(y);
@@ -36,7 +37,7 @@ class RegionGrower {
     }
   }
 
-  // Free pixels in about descending order of magnitude.
+  // Pixels that belong to no region, in about descending order of magnitude.
   std::vector<cv::Point> Seeds() const {
     constexpr int kBins = 64;
     double largest = 0;
@@ -94,7 +95,8 @@ class RegionGrower {
   std::vector<cv::Point> pixels_;
 };
 
-// The line through the weighted pixels; nothing if they are no longish streak.
+// Fits the line through the weighted pixels. Returns std::nullopt if they do not form an elongated
+// streak.
 std::optional<StraightRegion> LineThrough(const std::vector<cv::Point>& pixels,
                                           const Gradient& gradient) {
   constexpr double kShortest = 8;
@@ -113,13 +115,13 @@ std::optional<StraightRegion> LineThrough(const std::vector<cv::Point>& pixels,
   region.centre /= region.weight;
   moments = moments / region.weight - region.centre * region.centre.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(moments);
-  // A uniform streak of length l has the variance l^2/12 along it.
+  // A uniform streak of length l has the variance l^2/12 along its axis.
   const double length = std::sqrt(12 * std::max(axes.eigenvalues()[1], 0.0));
   const double width = std::sqrt(12 * std::max(axes.eigenvalues()[0], 0.0));
   if (!(length >= kShortest) || !(length >= 1.5 * width)) return std::nullopt;
   region.half_length = length / 2;
-  // Wide and short streaks are cut askew by the frame and their own ends: there the gradients know
-  // the direction better.
+  // The frame and the streak's own ends cut wide and short streaks obliquely. The gradients then
+  // determine the direction better.
   Eigen::Vector2d normal = length > 6 * width ? Eigen::Vector2d(axes.eigenvectors().col(0))
                                               : towards_bright.normalized();
   if (normal.dot(towards_bright) < 0) normal = -normal;

@@ -9,15 +9,17 @@
 
 namespace thicklens::calib {
 
-// From the frame itself down to a quarter or an eighth; fewer of a small frame.
+// The scales of a frame, from full resolution down to a quarter or an eighth. A small frame has
+// fewer scales.
 std::vector<FrameScale> FrameScales(const cv::Mat& grey);
 
-// What looks like an edge with a plateau on each side, or like an X corner, in one scale.
+// The structures in one scale that look like an edge with a plateau on each side, or like an X
+// corner; at most `most` of them.
 std::vector<FeatureCandidate> EdgeCandidates(const FrameScale& scale, int most);
 std::vector<FeatureCandidate> CornerCandidates(const FrameScale& scale, int most);
 
-// Pixels above the threshold that touch and agree in direction, grown from the strongest on;
-// heaviest first.
+// Connected pixels above the threshold that agree in direction. The regions grow from the strongest
+// pixels on, and are sorted by weight, the heaviest first.
 std::vector<StraightRegion> StraightRegions(const Gradient& gradient, double threshold, int most);
 
 }  // namespace thicklens::calib

@@ -12,7 +12,7 @@ namespace {
 constexpr int kFewestPixels = 60;
 constexpr int kSeedPixels = 1500;
 constexpr int kMostPixels = 16000;
-// A sag beyond this part of the edge's length is a curve, not an edge bent by distortion.
+// A sag beyond this part of the edge's length is a curve, not an edge that distortion has bent.
 constexpr double kLargestSag = 0.02;
 
 enum Parameter {
@@ -27,15 +27,15 @@ enum Parameter {
   kParameters
 };
 
-// The grey of the pixels of a strip (derived here, [D83]):
-//   I = D + C E(d), d = x cos a + y sin a - shift - sag b, b = t^2/T^2 - 1/3,
-// t along the edge, T half its length, E the profile for the direction a and the blur's variance;
-// D (dark) and C (bright less dark) each a plane in x and y and, of an edge that is long in its
-// frame, a multiple of b + d^2/T^2: a lens that darkens towards its corners makes both fall off
-// with the square of the distance from the axis. Without that, the fit bends the edge to follow the
-// levels, and takes the bow for blur: a part of sigma^2 that grows with the fourth power of T. An
-// edge shorter than the strip is wide would not tell d^2 from blur, and its levels bend along it
-// alone.
+// Model of the grey values of the pixels in a strip (derived here, [D83]):
+//   I = D + C E(d), d = x cos a + y sin a - shift - sag b, b = t^2/T^2 - 1/3.
+// t is the coordinate along the edge, T half its length, E the profile for the direction a and the
+// variance of the blur. D (dark) and C (bright minus dark) are each a plane in x and y. For an edge
+// that is long relative to its frame they also contain a multiple of b + d^2/T^2, because with a
+// lens that darkens towards its corners both fall off with the square of the distance from the
+// axis. Without that term, the fit bends the edge to follow the levels, and takes the bow for blur:
+// a part of sigma^2 that grows with the fourth power of T. An edge shorter than the width of the
+// strip cannot separate d^2 from blur; its levels bend only along the edge.
 class EdgeModel : public StepModel<kParameters> {
  public:
   using StepModel::StepModel;
@@ -73,7 +73,7 @@ class EdgeModel : public StepModel<kParameters> {
     return true;
   }
 
-  // Distance from the edge, px, and level between dark and bright, of one pixel.
+  // Distance of one pixel from the edge, px, and its level between dark and bright.
   Eigen::Vector2d Normalised(const double* p, std::size_t pixel) const {
     const double angle = strip_.normal_rad + p[kTurn];
     const double c = std::cos(angle), s = std::sin(angle);
@@ -104,15 +104,15 @@ class EdgeModel : public StepModel<kParameters> {
   double PlaneScale() const { return 1 / std::max(strip_.half_width_px, strip_.half_length_px); }
 };
 
-// One fit after the other, each in a strip that suits what the one before has found.
+// Fits repeatedly, each time in a strip that suits the result of the previous fit.
 class EdgeFit : StepSearch<EdgeModel> {
  public:
   using StepSearch::StepSearch;
 
   std::optional<EdgeSpreadFit> Run(bool want_profile) {
     if (!EndsAreInside() || !Seed()) return std::nullopt;
-    // The second round in the right width moves the blur by less than its error; the third sees all
-    // pixels.
+    // The second round, in the right width, moves the blur by less than its error. The third round
+    // uses all pixels.
     for (const int most : {2 * kSeedPixels, kMostPixels}) {
       const double sigma_px = SigmaOf(parameters_[kVariance]);
       if (!(feature_.half_width_px >= LeastHalfWidthPx(sigma_px))) return std::nullopt;
@@ -126,7 +126,7 @@ class EdgeFit : StepSearch<EdgeModel> {
   }
 
  private:
-  // Sub-pixel ends may lie on the outermost pixels' far sides.
+  // The sub-pixel ends may lie on the far sides of the outermost pixels.
   bool EndsAreInside() const {
     const Eigen::Vector2d along(-std::sin(feature_.angle_rad), std::cos(feature_.angle_rad));
     for (const double sign : {-1.0, 1.0}) {
@@ -139,20 +139,21 @@ class EdgeFit : StepSearch<EdgeModel> {
   }
 
   bool Gather(double half_width_px, int most) {
-    // The shift and the turn found so far become the new middle line; the levels are linear and
-    // need no start.
+    // The shift and the turn found so far define the new middle line. The levels are linear and
+    // need no start value.
     const double angle = feature_.angle_rad + parameters_[kTurn];
     feature_.centre_px += parameters_[kShift] * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     feature_.angle_rad = angle;
     parameters_[kShift] = parameters_[kTurn] = 0;
     strip_ = {feature_.centre_px, angle, half_width_px, feature_.half_length_px};
-    // Shorter, the bow is a sixteenth of what it can be, and what bends may be a texture's.
+    // The bow of a shorter edge is at most a sixteenth of the largest possible bow, and a bend of
+    // its levels may come from a texture.
     strip_.is_long = 4 * feature_.half_length_px >= std::min(grey_.cols, grey_.rows);
     pixels_ = GatherPixels(grey_, strip_, most);
     return pixels_.size() >= kFewestPixels && pixels_.coverage > 0.5 && StartLevels();
   }
 
-  // The means of the two sides, and whether they differ and are numbers at all.
+  // Computes the means of the two sides. Returns whether they are finite and differ.
   bool StartLevels() {
     const double c = std::cos(strip_.normal_rad), s = std::sin(strip_.normal_rad);
     const auto means = MeansOfSides([&](double x, double y) {
@@ -216,7 +217,7 @@ class EdgeFit : StepSearch<EdgeModel> {
     return fit;
   }
 
-  // Means over a quarter pixel.
+  // Fills the profile with means over a quarter pixel.
   void FillProfile(const std::vector<Eigen::Vector2d>& points, const EdgeProfile& profile,
                    EdgeSpreadFit* fit) const {
     constexpr double kBinPx = 0.25;

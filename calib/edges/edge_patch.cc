@@ -7,17 +7,17 @@
 
 #include "thicklens/base/statistics.h"
 
-// An edge's surroundings resampled along its normal, and what they show.
+// The surroundings of an edge, resampled along its normal, and the properties measured in them.
 
 namespace thicklens::calib {
 namespace {
 
-constexpr int kHalfWidth = 32;  // of what is looked at, px of the scale
+constexpr int kHalfWidth = 32;  // half width of the patch, px of the scale
 constexpr int kColumns = 2 * kHalfWidth + 1;
 constexpr int kMostRows = 64;
 constexpr int kFewestRows = 7;
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-// Departures from a step that a plateau may show, of the contrast.
+// Maximum departure of a plateau from a step, relative to the contrast.
 constexpr double kTolerance = 0.06;
 
 struct Range {
@@ -43,16 +43,16 @@ class Patch {
     kept_ = {0, rows_ - 1};
   }
 
-  // Distance of a row from the line's middle.
+  // Distance of a row from the middle of the line.
   double Along(int row) const { return row * spacing_ - line_.half_length; }
   int rows() const { return rows_; }
   double spacing() const { return spacing_; }
   Range kept() const { return kept_; }
   double contrast() const { return contrast_; }
-  int reach() const { return reach_; }  // where the transition has ended, both sides
+  int reach() const { return reach_; }  // distance where the transition ends on both sides
   int plateau() const { return plateau_; }
 
-  // Profile, transition and plateaus over the rows kept. False if there is no step in them.
+  // Finds profile, transition and plateaus from the kept rows. Returns false if they show no step.
   bool Describe() {
     for (int d = -kHalfWidth; d <= kHalfWidth; ++d) SummariseColumn(d);
     if (!FindTransition()) return false;
@@ -74,7 +74,7 @@ class Patch {
     kept_ = best;
   }
 
-  // The line brought to where the rows kept have their edge.
+  // The line moved to the edge that the kept rows show.
   StraightRegion Aligned() const {
     double n = 0, st = 0, stt = 0, sd = 0, std = 0;
     for (int row = kept_.first; row <= kept_.last; ++row) {
@@ -112,21 +112,22 @@ class Patch {
   double Slope(int d) const { return 0.5 * (Profile(d + 1) - Profile(d - 1)); }
   double Spread(int d) const { return spread_[static_cast<std::size_t>(d + kHalfWidth)]; }
 
-  // Median of the rows kept, and the spread of a row about it.
+  // Median of the kept rows, and the spread of a row about it.
   void SummariseColumn(int d) {
     std::vector<double> values;
     for (int row = kept_.first; row <= kept_.last; ++row) {
       if (std::isfinite(At(row, d))) values.push_back(At(row, d));
     }
     const auto column = static_cast<std::size_t>(d + kHalfWidth);
-    // Where the frame has cut off too much of the column, the patch ends.
+    // The patch ends where the frame cuts off too much of the column.
     const bool is_there = static_cast<double>(values.size()) > 0.6 * kept_.Count();
     profile_[column] = is_there ? Median(values) : kMissing;
     for (double& value : values) value = std::abs(value - profile_[column]);
     spread_[column] = is_there ? 1.4826 * Median(std::move(values)) : kMissing;
   }
 
-  // The steepest place near the middle, and outward to where the slope has fallen to a twentieth.
+  // Finds the steepest place near the middle, and the distance outward at which the slope has
+  // fallen to a twentieth.
   bool FindTransition() {
     int steepest = 0;
     for (int d = -4; d <= 4; ++d) {
@@ -144,7 +145,7 @@ class Patch {
     return reach_ + 2 < kHalfWidth;
   }
 
-  // How far a side stays at its level, up to a lamp's slope.
+  // Distance over which a side stays at its level, apart from an illumination gradient.
   int Plateau(int side) const {
     const double tolerance = Tolerance();
     const double level = Profile(side * (reach_ + 1));
@@ -154,11 +155,13 @@ class Patch {
       ++d;
     }
     if (d > kHalfWidth || !std::isfinite(Profile(side * d))) return d - 1;
-    // What ended it reaches further in, below the tolerance, about as far as it is blurred.
+    // The structure that ended the plateau disturbs it further in, below the tolerance, about as
+    // far as the structure is blurred.
     return static_cast<int>(d - 1 - 0.4 * reach_);
   }
 
-  // Noise that is much of the contrast is a frame's texture: it excuses nothing.
+  // Noise that is a large part of the contrast is the texture of the frame, and does not widen the
+  // tolerance further.
   double Tolerance() const {
     return kTolerance * contrast_ + std::min(4 * noise_, 0.1 * contrast_);
   }
@@ -173,13 +176,13 @@ class Patch {
       ++count;
     }
     if (!(count > plateau_)) return false;
-    // A lamp's slope along the edge lifts a row as a whole.
+    // An illumination gradient along the edge shifts a whole row.
     const double mean = sum / count;
     const double bound = 1.2 * Tolerance();
     return squares / count - mean * mean < bound * bound && std::abs(mean) < 0.25 * contrast_;
   }
 
-  // Where a row has its edge: the centroid of its rise within the transition.
+  // Position of the edge in a row: the centroid of its rise within the transition.
   double EdgeOf(int row) const {
     double weight = 0, moment = 0;
     for (int d = -reach_ - 2; d <= reach_ + 2; ++d) {
@@ -231,8 +234,8 @@ std::optional<FeatureCandidate> UndisturbedStep(const FrameScale& scale,
   if (patch.kept().Count() < kFewestRows || !patch.Describe()) return std::nullopt;
   if (patch.plateau() < patch.reach() + 1) return std::nullopt;
 
-  // What lies beyond an end reaches in as far as the blur does; a row that it disturbs by more than
-  // the tolerance is out already.
+  // A structure beyond an end disturbs the rows as far as the blur reaches. The rows that it
+  // disturbs by more than the tolerance are already removed.
   const double margin = 0.5 * patch.reach() + 0.5;
   const Eigen::Vector2d normal(std::cos(line.normal_rad), std::sin(line.normal_rad));
   const Eigen::Vector2d along(-normal.y(), normal.x());

@@ -10,32 +10,33 @@
 
 namespace thicklens::calib {
 
-// A frame, reduced by a power of two and smoothed a little against noise.
+// A frame that is reduced by a power of two and smoothed slightly against noise.
 struct FrameScale {
   cv::Mat smoothed;
   Gradient gradient;
-  double factor = 1;          // px of the frame per px of this one
-  double gradient_noise = 0;  // sd of a component of the gradient
+  double factor = 1;          // px of the frame per px of this scale
+  double gradient_noise = 0;  // standard deviation of one component of the gradient
 };
 
 struct FeatureCandidate {
   EdgeFeature feature;  // in px of the frame
-  double strength = 0;  // contrast times the root of its length
+  double strength = 0;  // contrast times the root of the length
 };
 
-// A straight piece of strong gradient in a scale's px; the normal points to the bright side.
+// A straight piece of strong gradient, in px of a scale. The normal points to the bright side.
 struct StraightRegion {
   Eigen::Vector2d centre{0, 0};
   double normal_rad = 0;
   double half_length = 0;
-  double weight = 0;  // sum of its gradient magnitudes
+  double weight = 0;  // sum of the gradient magnitudes
 };
 
-// Bilinear; NaN outside.
+// Bilinear interpolation; NaN outside the frame.
 float SampleAt(const cv::Mat& grey, const Eigen::Vector2d& at);
 
-// Brings a region's line onto the edge and finds how far along it and to its sides the edge is an
-// undisturbed step; factor and noise as in the scale. Nothing if it is none.
+// Moves the line of a region onto the edge, and finds how far along the line and to its sides the
+// edge is an undisturbed step. Factor and noise are those of the scale. Returns std::nullopt if
+// there is no such step.
 std::optional<FeatureCandidate> UndisturbedStep(const FrameScale& scale,
                                                 const StraightRegion& region);
 

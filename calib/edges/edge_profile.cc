@@ -13,19 +13,19 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// Dividing the second difference by a narrower box would lose the digits; this one blurs by less
-// than 1e-9 px^2.
+// Minimum width of the pixel's box. Dividing the second difference by a narrower box would lose the
+// digits; this width blurs by less than 1e-9 px^2.
 constexpr double kNarrowestBoxPx = 1e-4;
 // Phi(-6) = 1e-9.
 constexpr double kGaussianReach = 6;
 constexpr double kLeastVariancePx2 = 0.02;
-// A narrower Gaussian behind a disc would only lengthen the series: the pixel's box is ten times as
-// wide.
+// Minimum width of the Gaussian behind a disc. A narrower one would only lengthen the series: the
+// pixel's box is ten times as wide.
 constexpr double kLeastFloorPx = 0.1;
 
 // The normal distribution Phi(x/sigma), its first antiderivative x Phi + sigma phi, px, and its
-// second one [(x^2 + sigma^2) Phi + x sigma phi]/2, px^2, all 0 at -infinity. Derived by parts
-// [D33].
+// second one [(x^2 + sigma^2) Phi + x sigma phi]/2, px^2, all 0 at -infinity. The formulas are
+// derived by integration by parts [D33].
 struct Antiderivatives {
   double none = 0, first = 0, second = 0;
 };
@@ -40,7 +40,7 @@ Antiderivatives Gaussian(double x, double sigma) {
 }  // namespace
 
 EdgeProfile::EdgeProfile(model::Psf psf, double variance_px2, double floor_px, double normal_rad) {
-  // A fit may try anything: what is not a number counts as the least.
+  // A fit may try any value; NaN is treated as the minimum.
   const double shown_px2 = variance_px2 > kLeastVariancePx2 ? variance_px2 : kLeastVariancePx2;
   const double gaussian_px2 = std::pow(std::max(floor_px, kLeastFloorPx), 2);
   if (psf == model::Psf::kDisc && shown_px2 > gaussian_px2) {
@@ -54,7 +54,7 @@ EdgeProfile::EdgeProfile(model::Psf psf, double variance_px2, double floor_px, d
 }
 
 void EdgeProfile::Allocate(double reach_px, double gaussian_px2) {
-  // A sixth of the narrowest detail: the cubic between two nodes is then good to 1e-5.
+  // The step is a sixth of the narrowest detail. The cubic between two nodes is then good to 1e-5.
   step_px_ = std::sqrt(gaussian_px2 + 0.02) / 6;
   half_ = static_cast<std::size_t>(std::ceil(reach_px / step_px_));
   reach_px_ = static_cast<double>(half_) * step_px_;
@@ -66,11 +66,12 @@ void EdgeProfile::Set(std::size_t node, const Value& value) {
   nodes_[half_ + node] = value;
 }
 
-// The pixel's box projected on the normal is the convolution of two boxes, a = |cos| and b = |sin|
-// of its angle wide. With F the second antiderivative of Phi(d/sigma) (derived here, [D32])
-//   E(d) = [F(d + (a+b)/2) - F(d + (a-b)/2) - F(d - (a-b)/2) + F(d - (a+b)/2)]/(a b),
-// its slope is the same with F', and dE/d(sigma^2) = E''/2 (the heat equation) half the same with
-// F''. Limit b = 0: E = [F'(d + 1/2) - F'(d - 1/2)].
+// The pixel's box projected on the normal is the convolution of two boxes whose widths are a =
+// |cos| and b = |sin| of its angle. With F the second antiderivative of Phi(d/sigma) (derived here,
+// [D32]),
+//   E(d) = [F(d + (a+b)/2) - F(d + (a-b)/2) - F(d - (a-b)/2) + F(d - (a+b)/2)]/(a b).
+// The slope has the same form with F' instead of F. dE/d(sigma^2) = E''/2 (the heat equation) is
+// half of the same form with F''. The limit for b = 0 is E = [F'(d + 1/2) - F'(d - 1/2)].
 void EdgeProfile::TabulateGaussian(double variance_px2, double normal_rad) {
   const double sigma = std::sqrt(variance_px2);
   const double a = std::max(std::abs(std::cos(normal_rad)), kNarrowestBoxPx);
@@ -92,11 +93,12 @@ void EdgeProfile::TabulateGaussian(double variance_px2, double normal_rad) {
   }
 }
 
-// A disc and a Gaussian together have no closed form. An edge at 0, back at L/2, and so on with
-// period L, behind the transfer T (derived here, [D34]):
+// A disc and a Gaussian together have no closed form. The series describes a step up at 0, a step
+// down at L/2, and so on with the period L, blurred with the transfer function T (derived here,
+// [D34]):
 //   E(d) = 1/2 + sum over odd k of 2/(pi k) T(k/L) sin(2 pi k d/L).
-// The two edges do not meet for L > 4 reach. The disc's transfer D = 2 J1(x)/x, x = 2 pi f R, with
-// R^2 = 4 (sigma^2 - floor^2), has dD/d(sigma^2) = -4 (2 pi f)^2 J2(x)/x^2.
+// The two edges do not overlap for L > 4 reach. The disc's transfer function D = 2 J1(x)/x, x = 2
+// pi f R, with R^2 = 4 (sigma^2 - floor^2), has dD/d(sigma^2) = -4 (2 pi f)^2 J2(x)/x^2.
 void EdgeProfile::TabulateDisc(double gaussian_px2, double variance_px2, double normal_rad) {
   const double gaussian_sigma_px = std::sqrt(gaussian_px2);
   const double radius_px = 2 * std::sqrt(variance_px2 - gaussian_px2);
@@ -141,7 +143,8 @@ EdgeProfile::Value EdgeProfile::At(double distance_px) const {
   const double t = position - static_cast<double>(node);
   const Value& left = nodes_[node];
   const Value& right = nodes_[node + 1];
-  // The cubic through both levels with both slopes; the derivatives need no more than a line.
+  // The levels use the cubic through both levels with both slopes; linear interpolation suffices
+  // for the derivatives.
   const double rise = right.level - left.level;
   const double bend_left = left.slope * step_px_ - rise;
   const double bend_right = rise - right.slope * step_px_;

@@ -11,11 +11,12 @@
 namespace thicklens::calib {
 namespace {
 
-// Of one scale; a frame full of texture has hundreds that are none.
+// Maximum number of candidates in one scale. A frame full of texture has hundreds of false
+// candidates.
 constexpr int kMostCandidates = 96;
 constexpr int kMostMeasured = 32;
 
-// Whether b shows what a shows: the same line where they lie side by side, or the same corner.
+// Whether a and b show the same line, side by side, or the same corner.
 bool IsSame(const EdgeFeature& a, const EdgeFeature& b) {
   const Eigen::Vector2d offset = b.centre_px - a.centre_px;
   if (a.kind != b.kind) return false;
@@ -30,7 +31,7 @@ bool IsSame(const EdgeFeature& a, const EdgeFeature& b) {
          std::abs(along) < a.half_length_px + b.half_length_px;
 }
 
-// A coarser scale looks further to the sides.
+// Takes over the wider plateau that a coarser scale finds, because it extends further to the sides.
 void Widen(const EdgeFeature& seen_again, EdgeFeature* feature) {
   if (feature->kind == EdgeFeature::Kind::kEdge &&
       seen_again.half_length_px > 0.9 * feature->half_length_px) {
@@ -43,7 +44,8 @@ struct Reading {
   double weight = 0;
 };
 
-// The value below which half of the weight lies, straight between the readings' middles.
+// Value below which half of the weight lies, interpolated linearly between the middles of the
+// readings.
 double WeightedMedian(const std::vector<Reading>& sorted, double total) {
   double below = 0, last_at = 0, last_value = sorted.front().blur.sigma_px;
   for (const Reading& reading : sorted) {
@@ -63,7 +65,7 @@ std::optional<BlurSigma> RobustMean(const std::vector<BlurSigma>& blurs) {
   if (blurs.empty()) return std::nullopt;
   std::vector<double> errors;
   for (const BlurSigma& blur : blurs) errors.push_back(blur.error_px);
-  // No reading may outweigh all others by its own claim.
+  // The minimum error prevents one reading from dominating because of its own small error estimate.
   const double least_error = 0.3 * Median(errors) + 1e-6;
   std::vector<Reading> readings;
   double total = 0;
@@ -85,14 +87,14 @@ std::optional<BlurSigma> RobustMean(const std::vector<BlurSigma>& blurs) {
     mean.error_px *= std::sqrt(std::max(1.0, chi2));
     return mean;
   }
-  // The median of a chi^2 of one degree of freedom is .455; a median scatters by sqrt(pi/2) more
-  // than a mean.
+  // The median of a chi^2 with one degree of freedom is 0.455; a median scatters by the factor
+  // sqrt(pi/2) more than a mean.
   const double scatter = std::sqrt(std::max(1.0, Median(squares) / 0.455));
   mean.error_px *= std::sqrt(CV_PI / 2) * scatter;
   return mean;
 }
 
-// One sigma for both axes: the mean of the variances.
+// One sigma for both axes: the root of the mean of the variances.
 BlurSigma Both(const BlurSigma& x, const BlurSigma& y) {
   BlurSigma both;
   both.sigma_px = std::sqrt((x.sigma_px * x.sigma_px + y.sigma_px * y.sigma_px) / 2);

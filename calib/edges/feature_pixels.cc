@@ -8,10 +8,10 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kCellPx = 4;
-// Fitted levels that count as plateau.
+// Fitted levels within this distance of 0 or 1 count as plateau.
 constexpr double kPlateau = 0.02;
 
-// Narrows [low, high] to where |slope x + offset| <= bound.
+// Narrows [low, high] to the range where |slope x + offset| <= bound.
 void Narrow(double slope, double offset, double bound, double* low, double* high) {
   if (std::abs(slope) < 1e-12) {
     if (std::abs(offset) > bound) *high = *low - 1;
@@ -34,8 +34,8 @@ struct Sums {
   }
 };
 
-// A camera cuts off at some grey value, which need not be its full scale: the values then pile up
-// at the largest one and lose their noise, whatever the fit makes of them.
+// A camera clips at some grey value, which need not be its full scale. The values then pile up at
+// the largest one and lose their noise, independently of the fit.
 bool IsClipped(const FeaturePixels& pixels, const std::vector<double>& bright) {
   const double largest = *std::max_element(pixels.grey.begin(), pixels.grey.end());
   Sums dark_steps, bright_steps;
@@ -106,8 +106,8 @@ FitQuality JudgeFit(const FeaturePixels& pixels, const Eigen::VectorXd& residual
   const double variance = residual.squaredNorm() / dof;
   quality.residual_sigma = std::sqrt(variance);
 
-  // A step, a slope and a plateau's wide structure all but vanish from the difference of two
-  // neighbours, whose variance is twice the noise's.
+  // A step, a slope and the wide structure of a plateau nearly vanish in the difference of two
+  // neighbours, whose variance is twice that of the noise.
   const auto is_plateau = [&bright](std::size_t i) {
     return bright[i] < kPlateau || bright[i] > 1 - kPlateau;
   };
@@ -125,7 +125,8 @@ FitQuality JudgeFit(const FeaturePixels& pixels, const Eigen::VectorXd& residual
   quality.noise_sigma = std::sqrt(noise_variance);
   quality.chi2_per_dof = noise_variance > 0 ? variance / noise_variance : 1;
 
-  // Independent noise of n pixels has sum^2/n = variance; what is above it is shared by the cell.
+  // Independent noise of n pixels has sum^2/n = variance; the excess is shared by the pixels of the
+  // cell.
   double full_cells = 0, ratio = 0, shared = 0;
   for (const Sums& cell : cells) {
     if (cell.count < 6) continue;

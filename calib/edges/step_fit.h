@@ -9,15 +9,17 @@
 
 namespace thicklens::calib {
 
-// Half the width of what is fitted: the edge itself and enough of both plateaus for their slopes.
+// Half the width of the fitted strip, which contains the edge and enough of both plateaus to
+// determine their slopes.
 inline double StripHalfWidthPx(double sigma_px) { return 5.5 * sigma_px + 6; }
-// Plateaus narrower than this on each side do not tell blur from slope.
+// Minimum half width. Narrower plateaus do not separate blur from slope.
 inline double LeastHalfWidthPx(double sigma_px) { return 2.2 * sigma_px + 1.5; }
 
 inline double SigmaOf(double variance_px2) { return std::sqrt(std::max(variance_px2, 0.0)); }
 
-// A variance, which may have come out below 0, as a sigma: one standard deviation up from it. Limit
-// error << variance: error/(2 sigma); variance 0: sqrt(error).
+// Converts a variance, which the fit may have found below 0, to a sigma. The error is the distance
+// to the sigma of the variance plus one standard deviation. Its limit for error << variance is
+// error/(2 sigma), and for a variance of 0 it is sqrt(error).
 inline BlurSigma SigmaWithError(double variance_px2, double error_px2) {
   const double sigma_px = SigmaOf(variance_px2);
   return {sigma_px, std::sqrt(sigma_px * sigma_px + error_px2) - sigma_px};
@@ -28,7 +30,7 @@ inline bool IsDetermined(const BlurSigma& blur) {
   return blur.error_px < 0.1 + 0.1 * blur.sigma_px;
 }
 
-// FitEdgeSpread for each kind.
+// FitEdgeSpread for an edge and for a corner. Throws Interrupted after a request to stop.
 std::optional<EdgeSpreadFit> FitEdge(const cv::Mat& grey, const EdgeFeature& feature,
                                      model::Psf psf, double floor_px, bool want_profile);
 std::optional<EdgeSpreadFit> FitCorner(const cv::Mat& grey, const EdgeFeature& feature,

@@ -18,13 +18,13 @@
 
 namespace thicklens::calib {
 
-// What the fits of an edge and of a corner have in common: the pixels they gather, the model they
-// make of them and how they search for its parameters. Both describe the grey between two levels
-// that change smoothly over the strip, in units of the contrast's 200th part, so that the solver's
-// absolute tolerances mean the same for every frame.
+// The common part of the fits of an edge and of a corner: the gathered pixels, their model, and the
+// search for its parameters. Both fits describe the grey value between two levels that change
+// smoothly over the strip. The unit is one 200th of the contrast, so that the absolute tolerances
+// of the solver have the same meaning for every frame.
 
-// What a model of the pixels in a strip needs to know. Derived: the residuals and their Jacobian,
-// as ceres::TinySolver asks for them.
+// The data that a model of the pixels in a strip needs. A derived class computes the residuals and
+// their Jacobian in the form that ceres::TinySolver requires.
 template <int kParameterCount>
 class StepModel {
  public:
@@ -43,7 +43,7 @@ class StepModel {
     return {jacobian, is_wanted ? static_cast<Eigen::Index>(pixels_.size()) : 0,
             is_wanted ? static_cast<Eigen::Index>(kParameterCount) : 0};
   }
-  // Beyond twice the strip a blur is a slope like any other.
+  // A blur of more than twice the strip cannot be distinguished from a slope.
   double LargestVariance() const { return 4 * strip_.half_width_px * strip_.half_width_px; }
 
   const FeaturePixels& pixels_;
@@ -53,7 +53,8 @@ class StepModel {
   double floor_px_;
 };
 
-// The state of a search. Derived: where to gather the pixels and what is plausible.
+// The state of a search. A derived class defines where to gather the pixels and which result is
+// plausible.
 template <class Model>
 class StepSearch {
  public:
@@ -66,8 +67,9 @@ class StepSearch {
 
   Model ModelOfPixels() const { return Model(pixels_, strip_, unit_, psf_, floor_px_); }
 
-  // The pixels' means on side 0 and side 1; `side_of` says on which a pixel is, -1: on none.
-  // Nothing where a side is empty or the means are no numbers.
+  // The means of the pixels on side 0 and on side 1. `side_of` returns the side of a pixel, or -1
+  // if it is on neither side. The result is std::nullopt where a side is empty or the means are not
+  // finite.
   template <class SideOf>
   std::optional<Eigen::Vector2d> MeansOfSides(const SideOf& side_of) const {
     double sum[2] = {0, 0}, count[2] = {0, 0};
@@ -83,18 +85,19 @@ class StepSearch {
     return means;
   }
 
-  // Goes to the nearest valley of the cost, which it returns.
+  // Moves the parameters to the nearest local minimum of the cost, and returns that cost.
   double Solve() {
     ceres::TinySolver<Model> solver;
     solver.options.max_num_iterations = 30;
-    solver.options.function_tolerance = 1e-3;  // of a cost where noise is about 1 a pixel
+    solver.options.function_tolerance = 1e-3;  // relative; noise costs about 1 per pixel
     const Model model = ModelOfPixels();
     solver.Solve(model, &parameters_);
     return solver.summary.final_cost;
   }
 
-  // From several blurs, because a start that is far too sharp sees no slope of its cost.
-  // `set_variance` puts a start's sigma^2 into the parameters. False: none ends plausibly.
+  // Starts the search from several blurs, because the cost has no slope at a start that is far too
+  // sharp. `set_variance` writes the sigma^2 of a start into the parameters. Returns false if no
+  // start ends plausibly.
   template <class SetVariance, class IsPlausible>
   bool SolveFromSeveral(double width_px, const SetVariance& set_variance,
                         const IsPlausible& is_plausible) {
@@ -110,14 +113,14 @@ class StepSearch {
       if (!(cost < best_cost) || !is_plausible()) continue;
       best_cost = cost;
       best = parameters_;
-      // Within 3 % of the contrast there is no other valley.
+      // No other local minimum exists where the residual is within 3 % of the contrast.
       if (std::sqrt(2 * cost / static_cast<double>(pixels_.size())) < 6) break;
     }
     parameters_ = best;
     return std::isfinite(best_cost);
   }
 
-  // The model at its end.
+  // Residual and Jacobian of the model at the end of the search.
   struct Ending {
     Eigen::VectorXd residual;
     Eigen::MatrixXd jacobian;
@@ -128,8 +131,8 @@ class StepSearch {
     ModelOfPixels()(parameters_.data(), end.residual.data(), end.jacobian.data());
     return end;
   }
-  // Covariance of the parameters where the end is that of a step; `bright` as JudgeFit has it.
-  // Nothing where it is none.
+  // Covariance of the parameters if the end of the search is a step; otherwise std::nullopt.
+  // `bright` is defined as for JudgeFit.
   struct Judgement {
     FitQuality quality;
     Eigen::MatrixXd covariance;
