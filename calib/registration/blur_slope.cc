@@ -8,13 +8,14 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestSamples = 5;
-// The error of an added variance: a part of it, and px^2.
+// The error of an added variance: a relative part and px^2.
 constexpr double kRelativeError = 0.2, kLeastErrorPx2 = 0.2;
 constexpr double kSignificant = 4;
 constexpr int kRounds = 8;
 constexpr double kCauchyWidth = 3;
-constexpr double kUsualRatio = 0.45;  // of lenses
-// Of its logarithm. The light of a whole aperture gives 0.5, and none more than 0.7.
+constexpr double kUsualRatio = 0.45;  // usual blur ratio of lenses
+// Standard deviations of the logarithm of the ratio. The light of a whole aperture gives 0.5, and
+// no lens gives more than 0.7.
 constexpr double kDeviationBelow = 0.3, kDeviationAbove = 0.25;
 constexpr double kImpossible = 1e3;
 
@@ -37,8 +38,8 @@ double ChiSquareOfRatio(double blur_ratio) {
   return std::min(off * off, kImpossible);
 }
 
-// sigma_i^2 - s_i^2 sigma_ref^2 with sigma^2 = S0 + A (s - s0)^2 is 0 at s = 1: it is
-// b (s - 1) + q (s - 1)^2 with q = A (1 - (1 - s0)^2) - S0, which is A where the reference is
+// The difference sigma_i^2 - s_i^2 sigma_ref^2 with sigma^2 = S0 + A (s - s0)^2 is 0 at s = 1. It
+// is b (s - 1) + q (s - 1)^2 with q = A (1 - (1 - s0)^2) - S0, which is A where the reference is
 // sharp.
 std::optional<BlurSlope> FindBlurSlope(const std::vector<ScaleSample>& samples) {
   std::vector<Eigen::Vector3d> rows;  // s - 1, (s - 1)^2, added variance
@@ -61,7 +62,7 @@ std::optional<BlurSlope> FindBlurSlope(const std::vector<ScaleSample>& samples) 
       normal += weight * rows[i].head<2>() * rows[i].head<2>().transpose();
       right += weight * rows[i].head<2>() * rows[i].z();
     }
-    // Scaled: the columns differ by the size of s - 1.
+    // The matrix is scaled, because its columns differ by the size of s - 1.
     const Eigen::Vector2d unit = normal.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
     const Eigen::Matrix2d scaled = unit.asDiagonal() * normal * unit.asDiagonal();
     if (!(scaled.determinant() > 1e-9)) return std::nullopt;

@@ -14,7 +14,8 @@ class CancelCallback : public ceres::IterationCallback {
   }
 };
 
-// ceres::Solve, which ends after an iteration by Interrupted where that is asked for.
+// Calls ceres::Solve. After a request to stop, it ends after the current iteration and throws
+// Interrupted.
 inline void SolveOrStop(ceres::Solver::Options options, ceres::Problem* problem,
                         ceres::Solver::Summary* summary) {
   ThrowIfCancelled();

@@ -15,12 +15,12 @@ namespace {
 
 constexpr int kCoarseSizePx = 160;
 constexpr int kAgreementSizePx = 100;
-constexpr int kSmallestFieldPx = 24;  // of shrunk pictures
+constexpr int kSmallestFieldPx = 24;  // px of shrunk images
 constexpr int kPadding = 2;
 constexpr int kIterations = 40;
 constexpr double kPrecision = 1e-4;      // of the correlation
-constexpr double kMinCorrelation = 0.3;  // blur alone may cost that much; judged better later
-// Width of the preference for small shifts, of the field.
+constexpr double kMinCorrelation = 0.3;  // blur alone may cost that much; later checks are stricter
+// Width of the preference for small shifts, relative to the field.
 constexpr double kLikelyShift = 0.1;
 
 // Catmull-Rom weights for a position t in [0, 1) between the middle two of four samples.
@@ -32,8 +32,8 @@ inline void CubicWeights(float t, float* w) {
   w[3] = 0.5F * (t3 - t2);
 }
 
-// Where the frame's content lies against the reference's, both of one size, from the peak of the
-// cross-correlation with half-whitened spectra; the peak is 1 where all phases agree.
+// Shift of the frame relative to the reference, both of one size, from the peak of the
+// cross-correlation with half-whitened spectra. The peak is 1 where all phases agree.
 struct PhasePeak {
   cv::Point2d shift{0, 0};
   double height = 0;
@@ -81,8 +81,8 @@ PhasePeak PeakByPhase(const cv::Mat& reference, const cv::Mat& frame) {
   return best;
 }
 
-// The information on the scale beside shift and rotation, over half the sum of |gradient|^2 |p|^2;
-// and the gradients' own tensor.
+// Information about the scale, independent of shift and rotation, relative to half the sum of
+// |gradient|^2 |p|^2, and about the shift from the tensor of the gradients.
 PictureInformation InformationOfShrunk(const cv::Mat& picture) {
   const Gradient gradient = CentralGradient(Smoothed(picture, 1));
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
@@ -110,7 +110,7 @@ PictureInformation InformationOfShrunk(const cv::Mat& picture) {
 }
 
 cv::Rect Inside(const cv::Rect2d& field, int factor) {
-  // Pixels of the shrunk picture that lie in the field entirely.
+  // Pixels of the shrunk image that lie entirely in the field.
   const int left = static_cast<int>(std::ceil((field.x + 0.5) / factor));
   const int top = static_cast<int>(std::ceil((field.y + 0.5) / factor));
   const int right = static_cast<int>(std::floor((field.x + field.width + 0.5) / factor));
@@ -118,13 +118,14 @@ cv::Rect Inside(const cv::Rect2d& field, int factor) {
   return {left, top, std::max(0, right - left), std::max(0, bottom - top)};
 }
 
-// Both pictures shrunk, one brought to the other's geometry by the scale and the centre alone.
+// Both images shrunk, the reference brought to the frame's geometry by the scale and the centre
+// alone.
 struct Start {
   FrameMap map;
   int factor = 1;
   cv::Mat small;     // the frame, shrunk
-  cv::Rect region;   // of it, what both show
-  cv::Mat expected;  // the reference there
+  cv::Rect region;   // part of `small` that both images show
+  cv::Mat expected;  // the reference in that region
 };
 
 int FactorFor(double field_px, int size_px) {
@@ -185,12 +186,13 @@ cv::Mat Shrunk(const cv::Mat& picture, int factor) {
 
 cv::Mat InFrameGeometry(const cv::Mat& reference, const FrameMap& map, int frame_factor,
                         cv::Rect region) {
-  // Shrunk first to about the resolution asked for, so that sampling does not alias.
+  // The reference is first shrunk to about the requested resolution, so that sampling does not
+  // alias.
   const double scale = std::sqrt(std::abs(map.linear.determinant()));
   const int factor = std::max(1, static_cast<int>(std::ceil(frame_factor / scale - 0.25)));
   const cv::Mat source = Shrunk(reference, factor);
   const Eigen::Matrix2d inverse = map.linear.inverse();
-  // What the pixel (x, y) of the frame moves in `source`: step (x, y) - bend |q|^2 q.
+  // The pixel (x, y) of the frame moves the position in `source` by step (x, y) - bend |q|^2 q.
   const Eigen::Matrix2d step = inverse * frame_factor / factor;
   const Eigen::Matrix2d bend = inverse * map.cubic / factor;
   const Eigen::Vector2d half(0.5, 0.5);
@@ -272,12 +274,12 @@ std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat
   const cv::Mat& expected = start->expected;
   const cv::Rect region = start->region;
   const cv::Point2d shift = PeakByPhase(expected, small(region)).shift;
-  // ECC takes what lies outside a picture for black, and mixes it into the outermost pixels.
+  // ECC treats everything outside an image as black, and mixes it into the outermost pixels.
   cv::Mat padded,
       mask = cv::Mat::zeros(small.rows + 2 * kPadding, small.cols + 2 * kPadding, CV_8U);
   cv::copyMakeBorder(small, padded, kPadding, kPadding, kPadding, kPadding, cv::BORDER_REPLICATE);
   mask(cv::Rect(kPadding, kPadding, small.cols, small.rows)).setTo(1);
-  // From the pixels of `expected` to those of `padded`.
+  // The warp maps the pixels of `expected` to those of `padded`.
   const Eigen::Vector2d place(region.x + kPadding, region.y + kPadding);
   cv::Mat warp = (cv::Mat_<float>(2, 3) << 1, 0, place.x() + shift.x, 0, 1, place.y() + shift.y);
   try {
@@ -287,7 +289,7 @@ std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat
         cv::findTransformECC(expected, padded, warp, cv::MOTION_AFFINE, criteria, mask, 5);
     if (!(correlation > kMinCorrelation)) return std::nullopt;
   } catch (const cv::Exception&) {
-    return std::nullopt;  // ECC says by an exception that it did not converge
+    return std::nullopt;  // ECC reports by an exception that it did not converge
   }
   Eigen::Matrix2d linear;
   Eigen::Vector2d offset;
@@ -295,9 +297,9 @@ std::optional<FrameMap> RegisterCoarsely(const cv::Mat& reference, const cv::Mat
     for (int j = 0; j < 2; ++j) linear(i, j) = static_cast<double>(warp.at<float>(i, j));
     offset[i] = static_cast<double>(warp.at<float>(i, 2));
   }
-  // As a map between places in the shrunk frame, expected and seen.
+  // The map between expected and observed places in the shrunk frame.
   offset -= linear * Eigen::Vector2d(region.x, region.y) + Eigen::Vector2d(kPadding, kPadding);
-  // Shrunk pixel w stands at full f (w + 1/2) - 1/2.
+  // Shrunk pixel w has the full-resolution coordinate f (w + 1/2) - 1/2.
   const Eigen::Vector2d half(0.5, 0.5);
   offset = start->factor * (offset + half - linear * half) - half + linear * half;
   FrameMap map = start->map;

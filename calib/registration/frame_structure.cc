@@ -15,7 +15,7 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kDarkest = 1e-3;  // of full scale, added before a logarithm
+constexpr double kDarkest = 1e-3;  // relative to full scale, added before a logarithm
 
 cv::Mat LogLight(const cv::Mat& grey) {
   cv::Mat light = cv::max(grey, 0) + kDarkest;
@@ -23,7 +23,7 @@ cv::Mat LogLight(const cv::Mat& grey) {
   return light;
 }
 
-// p in a frame to q in the reference: p = centre + shift + scale R (q - centre).
+// Maps p in a frame to q in the reference: p = centre + shift + scale R (q - centre).
 struct PlaceInReference {
   Registration registration;
   Eigen::Vector2d centre;
@@ -35,7 +35,7 @@ struct PlaceInReference {
   }
 };
 
-// Bilinear; false outside.
+// Bilinear interpolation; returns false outside the image.
 bool SampleAt(const cv::Mat& picture, const Eigen::Vector2d& at, double* value) {
   const int x = static_cast<int>(std::floor(at.x())), y = static_cast<int>(std::floor(at.y()));
   if (x < 0 || y < 0 || x + 1 >= picture.cols || y + 1 >= picture.rows) return false;
@@ -48,7 +48,7 @@ bool SampleAt(const cv::Mat& picture, const Eigen::Vector2d& at, double* value) 
   return true;
 }
 
-// The mean of values with errors, whose scatter may be larger than those say.
+// The mean of values with errors. Their scatter may be larger than these errors.
 std::optional<model::Estimate> Combined(const std::vector<model::Estimate>& values) {
   double weights = 0, sum = 0;
   for (const model::Estimate& value : values) {
@@ -99,7 +99,7 @@ class Structure {
   // ---- vignetting ----
   void FindVignetting() {
     constexpr std::size_t kMostFrames = 8;
-    constexpr double kLeastChange = 0.004;  // of scale
+    constexpr double kLeastChange = 0.004;  // change of scale
     const ScaleSample* reference = nullptr;
     std::vector<const ScaleSample*> others;
     for (const auto& [frame, sample] : registered_) {
@@ -135,7 +135,8 @@ class Structure {
                                               const cv::Mat& reference_small, int factor,
                                               cv::Size size) const {
     constexpr int kTerms = 4;
-    constexpr double kCorrelatedPixels = 12;  // of the small pictures share their errors
+    // Number of pixels of the small images that share their errors.
+    constexpr double kCorrelatedPixels = 12;
     const cv::Mat small = Small(Read(sample.frame), factor);
     const Eigen::Vector2d centre(places_.centre.x, places_.centre.y);
     const PlaceInReference place{sample.registration, centre};
@@ -184,7 +185,7 @@ class Structure {
   }
 
   // ---- bands ----
-  // Means over rows (or columns), of which a parabola is taken off.
+  // Means over rows (or columns), from which a parabola is subtracted.
   static std::vector<double> Profile(const cv::Mat& picture, bool of_rows) {
     cv::Mat means;
     cv::reduce(picture, means, of_rows ? 1 : 0, cv::REDUCE_AVG, CV_64F);
@@ -206,7 +207,7 @@ class Structure {
     return sum / static_cast<double>(profile.size());
   }
 
-  // Of the means of rows over that of columns, for a picture of independent parts 1.
+  // Variance of the row means over that of the column means; 1 for an image of independent parts.
   static double RowsOverColumns(const cv::Mat& picture, double* row_deviation,
                                 double* column_deviation) {
     const double rows = Variance(Profile(picture, true));
@@ -216,14 +217,14 @@ class Structure {
     return rows * picture.cols / std::max(columns * picture.rows, 1e-30);
   }
 
-  // How much larger the target is in frame `a` than in `b`, as far as it is known.
+  // Ratio of the target's size in frame `a` to that in `b`; 1 where it is unknown.
   double ScaleBetween(std::size_t a, std::size_t b) const {
     const auto of_a = registered_.find(a), of_b = registered_.find(b);
     if (of_a == registered_.end() || of_b == registered_.end()) return 1;
     return of_a->second->scale / of_b->second->scale;
   }
 
-  // No band is as fine as a pixel of a large sensor.
+  // The image is reduced, because no band is as fine as a pixel of a large sensor.
   static cv::Mat ForBands(const cv::Mat& grey) {
     constexpr int kMostPx = 1024;
     const int factor = 1 + std::max(grey.cols, grey.rows) / kMostPx;
@@ -235,7 +236,7 @@ class Structure {
 
   void FindBands() {
     constexpr std::size_t kMostPairs = 12;
-    constexpr double kAnisotropy = 10;  // of variances, that chance and a usual target do not reach
+    constexpr double kAnisotropy = 10;  // ratio of variances, above chance and usual targets
     const std::vector<std::size_t> order = ByReading();
     const std::size_t pairs = std::min(kMostPairs, order.size() - 1);
     std::vector<double> ratios, row_deviations, column_deviations;
@@ -260,7 +261,7 @@ class Structure {
       column_deviations.push_back(columns);
       mean = mean.empty() ? one.clone() : cv::Mat(mean + one);
     }
-    // Bands of their own in each frame average out of the mean; a striped target stays.
+    // Bands that differ from frame to frame average out of the mean; a striped target remains.
     double rows = 0, columns = 0;
     const double of_target = RowsOverColumns(mean / static_cast<double>(pairs), &rows, &columns);
     if (of_target > kAnisotropy || of_target < 1 / kAnisotropy) return;
@@ -273,7 +274,7 @@ class Structure {
     result_.bands_are_columns = ratio < 1;
     const std::vector<double>& deviations =
         result_.bands_are_columns ? column_deviations : row_deviations;
-    // The ratio of two frames has the bands of both, independent of each other.
+    // The ratio of two frames contains the bands of both, independent of each other.
     const double of_both = Median(deviations);
     std::vector<double> off;
     for (const double deviation : deviations) off.push_back(std::abs(deviation - of_both));
@@ -296,7 +297,7 @@ class Structure {
     std::stable_sort(order.begin(), order.end(), [](const ScaleSample* a, const ScaleSample* b) {
       return a->scale < b->scale;
     });
-    std::map<std::pair<int, int>, double> at;  // how far a product stands out, by the shift
+    std::map<std::pair<int, int>, double> at;  // excess of the product, by the shift
     std::size_t pairs = 0;
     for (std::size_t k = 0; k < kMostPairs; ++k) {
       const ScaleSample& small = *order[k];
@@ -315,17 +316,18 @@ class Structure {
     const double sigma = std::sqrt(squares / (count - 1));
     const double variance = at[{0, 0}] / static_cast<double>(pairs) - mean;
     const double size = std::sqrt(std::max(variance, 0.0));
-    // Near 0 the root's derivative grows without bound.
+    // Near 0 the derivative of the root grows without bound.
     result_.fixed_structure =
         model::Estimate{size, std::min(sigma / std::max(2 * size, 1e-12), std::sqrt(sigma))};
   }
 
-  // Where the target moved by enough between the two, at the same place and at places beside.
+  // Adds the products at the same place and at places beside it, where the target moved by enough
+  // between the two frames.
   bool AddProducts(const ScaleSample& one, const ScaleSample& other,
                    std::map<std::pair<int, int>, double>* at) const {
     constexpr double kFarPx = 6;
     constexpr int kStepPx = 11, kBesidePx = 5, kReachPx = 2 * kStepPx + kBesidePx;
-    constexpr double kLeastPart = 0.2;  // of the field
+    constexpr double kLeastPart = 0.2;  // part of the field
     const cv::Mat a = Fine(Read(one.frame));
     const cv::Mat b = Fine(Read(other.frame));
     const Eigen::Vector2d centre(places_.centre.x, places_.centre.y);
@@ -346,7 +348,8 @@ class Structure {
     const auto product = [&](int dx, int dy) {
       return masked.dot(b(inner + cv::Point(dx, dy))) / pixels;
     };
-    // What is left of a strongly blurred target is coarse, and looks alike a few pixels farther on.
+    // The remainder of a strongly blurred target is coarse, and looks alike a few pixels further
+    // away.
     for (int dy = -2 * kStepPx; dy <= 2 * kStepPx; dy += kStepPx) {
       for (int dx = -2 * kStepPx; dx <= 2 * kStepPx; dx += kStepPx) {
         const double around = product(dx - kBesidePx, dy) + product(dx + kBesidePx, dy) +

@@ -14,11 +14,12 @@ namespace {
 // Relative change of the image height at the corner.
 constexpr double kWorthTelling = 0.005, kGross = 0.05;
 constexpr double kSignificant = 4;
-// Of photographic lenses, one standard deviation: 40 % is beyond any that forms a plain picture.
+// One standard deviation for photographic lenses. A distortion of 40 % is beyond any lens that
+// forms a plain image.
 constexpr double kLensDeviation = 0.1;
 
-// The displacements go alike for all of the causes, to first order as k (s - 1). What differs is
-// what else each of them would show, which was looked for.
+// All causes give the same displacements, to first order k (s - 1). They differ only in the other
+// effects that each of them would show, which were looked for.
 Diagnosis Compare(const model::Estimate& distortion, const FrameStructureFinding& structure) {
   Diagnosis diagnosis;
   diagnosis.symptom = "radial displacement of the frames against one another";
@@ -36,7 +37,7 @@ Diagnosis Compare(const model::Estimate& distortion, const FrameStructureFinding
   return diagnosis;
 }
 
-// What this sweep is too small or too short to show.
+// Names the structure that this sweep is too small or too short to show.
 std::string HiddenInWords(const FrameStructureFinding& structure) {
   const bool vignetting = !VignettingIsExcluded(structure);
   const bool fixed = !FixedStructureIsExcluded(structure);

@@ -9,24 +9,24 @@
 
 namespace thicklens::calib {
 
-// Causes that displace the frames against one another as distorted images would be.
+// Causes that displace the frames relative to one another as distorted images would be.
 inline constexpr char kLensDistorts[] = "the lens distorts";
 inline constexpr char kTargetIsNotFlat[] = "the target is not flat";
 inline constexpr char kVignettingShifts[] = "vignetting";
 inline constexpr char kFixedStructureShifts[] = "structure that stays on the sensor";
 
-// Whether the registrations show a radial distortion that is large enough to speak of.
+// Whether the registrations show a significant radial distortion that is large enough to report.
 bool ShowsDistortion(const Calibration& calibration);
 
-// Adds the comparison of the causes to the calibration's diagnoses, where there is a distortion
-// (`calibration->structure` measured before), and a warning; a refusal where it is beyond what can
-// be allowed for.
+// If there is a distortion, adds the comparison of its causes to the calibration's diagnoses, and
+// adds a warning. `calibration->structure` must have been measured before. Returns a refusal
+// instead of the warning where the distortion is too large for a result.
 std::optional<std::string> CheckDistortion(Calibration* calibration);
 
-// The warning of readings that bend against the image scale names what `calibration.structure`
-// shows.
+// The warning about readings that bend against the image scale. It names the structure found in
+// `calibration.structure`.
 std::string BendInWords(const Bend& bend, const Calibration& calibration);
-// The remedy makes the bend, or what it does to the bench zero, smaller.
+// A remedy that makes the bend smaller, or its effect on the bench zero.
 std::string BendRemedy(const FrameStructureFinding& structure);
 
 }  // namespace thicklens::calib

@@ -9,9 +9,9 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestSamples = 5;
-constexpr int kBlocks = 8;  // of the jackknife
+constexpr int kBlocks = 8;  // blocks of the jackknife
 constexpr int kRounds = 20;
-constexpr double kDefined = 16;     // squares of the responses over those of their errors
+constexpr double kDefined = 16;     // sum of squares of the responses over that of their errors
 constexpr double kCauchyWidth = 2;  // in standard deviations
 
 struct Term {
@@ -22,9 +22,9 @@ double Distance(const Term& term, double k) {
   return (term.cubic - k * term.response) / term.sigma;
 }
 
-// k and its standard deviation, from robust weights; nothing where no term tells anything.
+// k and its standard deviation, from robust weights; std::nullopt where no term determines it.
 std::optional<model::Estimate> Solve(const std::vector<Term>& terms) {
-  // Start: the median of what each frame says, each with the weight of what it can tell.
+  // The start is the median over the frames, each with the weight of its information.
   std::vector<std::pair<double, double>> slopes;
   double total = 0;
   for (const Term& t : terms) {
@@ -61,7 +61,8 @@ std::optional<model::Estimate> Solve(const std::vector<Term>& terms) {
   return model::Estimate{k, spread / std::sqrt(information)};
 }
 
-// Frames of nearly one scale share the reference's errors: each run of them is left out once.
+// Frames of nearly equal scale share the errors of the reference. Each run of them is left out
+// once.
 double JackknifeSigma(std::vector<Term> terms) {
   std::sort(terms.begin(), terms.end(),
             [](const Term& a, const Term& b) { return a.response < b.response; });
@@ -94,7 +95,8 @@ std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample
       terms.push_back({response, s.registration.cubic, s.registration.cubic_sigma});
   }
   if (terms.size() < kFewestSamples) return std::nullopt;
-  // Where the scales differ by no more than their own errors, the response is made of these.
+  // Where the scales differ by no more than their own errors, the response consists of these
+  // errors.
   double squares = 0, errors = 0;
   for (const ScaleSample& s : samples) {
     squares += std::pow(CubicPerDistortion(s.scale), 2);

@@ -8,15 +8,15 @@
 
 namespace thicklens::calib {
 
-// How the cubic term of a registration answers to radial distortion. Where every frame has
-// x' = X (1 + k X^2), X the place that a pinhole would give, a frame of scale s shows at R what the
-// reference shows at R/s and, to first order in k, is displaced beyond s by k (R^3 - R^3/s^2):
-// cubic = k (1 - 1/s^2). Derived here [D62]; k in px^-2, pincushion positive. At s = 1 it cannot be
-// seen.
+// Response of the cubic term of a registration to radial distortion. Let every frame have x' = X (1
+// + k X^2), where X is the position that a pinhole would give. A frame of scale s then shows at R
+// what the reference shows at R/s and, to first order in k, is displaced beyond s by k (R^3 -
+// R^3/s^2), so that cubic = k (1 - 1/s^2). Derived here [D62]; k is in px^-2, positive for
+// pincushion distortion. At s = 1 the distortion is not visible.
 double CubicPerDistortion(double scale);
 
-// k from the cubic terms of a sweep's registrations, robust against single wrong ones. Nothing from
-// fewer than five.
+// Fits k to the cubic terms of a sweep's registrations, robust against single outliers. Returns
+// std::nullopt for fewer than five samples.
 std::optional<model::Estimate> FitRadialDistortion(const std::vector<ScaleSample>& samples);
 
 }  // namespace thicklens::calib

@@ -16,10 +16,10 @@ namespace {
 
 constexpr double kFarOff = 6;  // standard deviations
 
-// A frame whose scale says another reading than the one that was written.
+// A frame whose scale contradicts the written reading.
 struct WrongReading {
   std::size_t frame = 0;
-  double error_mm = 0;  // written minus what the scale says
+  double error_mm = 0;  // written reading minus the reading that the scale gives
   double sigma_mm = 0;
 };
 
@@ -40,7 +40,7 @@ std::vector<WrongReading> FindWrongReadings(const FocusSweep& sweep,
   return wrong;
 }
 
-// Two frames each of which has the other's reading.
+// Finds another frame such that each of the two has the other's reading.
 std::optional<std::size_t> SwappedWith(const WrongReading& one,
                                        const std::vector<WrongReading>& all,
                                        const FocusSweep& sweep) {
@@ -55,7 +55,7 @@ std::optional<std::size_t> SwappedWith(const WrongReading& one,
   return std::nullopt;
 }
 
-// The same pixels at different readings: nobody can say which reading is theirs.
+// Rejects identical frames at different readings, because nothing shows which reading is theirs.
 void RejectRepeated(std::vector<FrameMeasurement>* frames) {
   std::map<std::uint64_t, std::vector<std::size_t>> same;
   for (std::size_t i = 0; i < frames->size(); ++i) {
@@ -98,7 +98,7 @@ std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameM
   if (!was_tried || law.done || law.shows_no_scale || IsStatedEdge(sweep) ||
       2 * registered >= used.size())
     return "";
-  // Of what is seen only strong bands are known to keep frames from being registered.
+  // Among the structures found, only strong bands are known to prevent the registration of frames.
   const std::string seen = StructureInWords(structure);
   constexpr char kNeeded[] =
       "every frame must show the same part of the target, sharp enough to be recognised. If it is "
@@ -182,11 +182,11 @@ void RejectUnregistered(const std::vector<ScaleSample>& samples,
   }
 }
 
-// [D64] Least squares of reading = a + b/scale + c (b/scale)^2 + jump H, scanned over where the
-// jump is. The square takes up what a real lens or rail bends smoothly.
+// [D64] Least squares of reading = a + b/scale + c (b/scale)^2 + jump H, scanned over the position
+// of the jump. The square describes the smooth bend of a real lens or rail.
 std::optional<Slip> FindSlip(std::vector<ScaleSample> samples, const ScaleLaw& law) {
   constexpr std::size_t kFewestOnEachSide = 4;
-  constexpr double kExplained = 0.6;  // of the squares may be left
+  constexpr double kExplained = 0.6;  // maximum remaining part of the squares
   const std::size_t n = samples.size();
   if (!law.done || n < 3 * kFewestOnEachSide) return std::nullopt;
   std::sort(samples.begin(), samples.end(),

@@ -14,16 +14,17 @@ namespace {
 
 constexpr double kMaxAnisotropy = 0.015;
 constexpr double kMinAgreement = 0.6;
-constexpr double kMaxDisagreement = 0.015;  // of scale, between the shrunk pictures and the tiles
+// Maximum relative difference of scale between the shrunk images and the tiles.
+constexpr double kMaxDisagreement = 0.015;
 constexpr double kMaxScaleSigma = 3e-3;
-// What the method itself may be wrong by, measured on simulated pictures of known scale.
+// Error of the method itself, measured on simulated images of known scale.
 constexpr double kScaleBias = 1e-5;
-constexpr int kLeastFieldPx = 60;          // that can be registered at all
-constexpr double kLargestBlurPart = 0.06;  // sigma of blur, of the field
+constexpr int kLeastFieldPx = 60;          // minimum shared field for a registration
+constexpr double kLargestBlurPart = 0.06;  // sigma of blur, relative to the field
 constexpr int kCoarserRounds = 3;
-constexpr double kClosePx = 0.5;    // of shrunk pixels
-constexpr double kCloseBlur = 0.3;  // relative, of a variance
-constexpr double kSignificant = 4;  // of a cubic term, in its standard deviations
+constexpr double kClosePx = 0.5;    // shrunk pixels
+constexpr double kCloseBlur = 0.3;  // relative difference of a variance
+constexpr double kSignificant = 4;  // standard deviations of a cubic term
 
 // The map followed by shift + linear (p - centre) + cubic |p - centre|^2 (p - centre).
 FrameMap Followed(const FrameMap& map, const Eigen::Vector2d& shift_px,
@@ -35,7 +36,8 @@ FrameMap Followed(const FrameMap& map, const Eigen::Vector2d& shift_px,
   return result;
 }
 
-// What an affine map alone takes of the displacement: the stretch that stands for the cubic term.
+// The displacement that an affine map alone describes: it includes the stretch equivalent to the
+// cubic term.
 Eigen::Matrix2d AffinePart(const DisplacementField& field) {
   return field.linear - field.stretch_cubic_covariance / field.cubic_variance * field.cubic *
                             Eigen::Matrix2d::Identity();
@@ -45,13 +47,13 @@ bool IsBent(const DisplacementField& field) {
   return field.cubic * field.cubic > kSignificant * kSignificant * field.cubic_variance;
 }
 
-// The map with the displacement, the cubic term only where it is more than an error.
+// The map with the displacement. The cubic term is included only where it is significant.
 FrameMap Corrected(const FrameMap& map, const DisplacementField& field) {
   return IsBent(field) ? Followed(map, field.shift_px, field.linear, field.cubic)
                        : Followed(map, field.shift_px, AffinePart(field), 0);
 }
 
-// How far the affine part of the displacement reaches at the corners of the field.
+// Maximum of the affine part of the displacement at the corners of the field.
 double Largest(const DisplacementField& field, double field_px) {
   return field.shift_px.norm() + 0.7 * field_px * AffinePart(field).norm();
 }
@@ -92,7 +94,8 @@ std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const c
   const double field_px = std::min(shared.width, shared.height);
   if (!(field_px >= kLeastFieldPx)) return std::nullopt;
   const double longer_px = std::max(shared.width, shared.height);
-  // Half resolution first: it brings the map close, and says how the blurs differ.
+  // The first passes use half resolution. They bring the map close, and determine the difference of
+  // the blurs.
   const int finest = TileFactor(longer_px, 0);
   const int coarser = std::max(finest, std::min(2 * finest, TileFactor(field_px, 1e9)));
   const double most_px2 = std::pow(kLargestBlurPart * field_px, 2);

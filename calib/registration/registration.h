@@ -8,20 +8,21 @@
 
 namespace thicklens::calib {
 
-// A registration with the cubic term left free, whose scale is that at the centre and several times
-// less certain than the scale would be if the cubic term were known.
+// A registration with a free cubic term. Its scale is that at the centre, and several times less
+// certain than it would be for a known cubic term.
 struct FreeRegistration {
   Registration free;
-  // d scale/d cubic along the valley of the fit, px^2: the scale for a known cubic term c is
+  // d scale/d cubic along the valley of the fit, px^2. The scale for a known cubic term c is
   // free.scale + scale_per_cubic (free.cubic - c).
   double scale_per_cubic = 0;
 
-  // The registration for a cubic term known to be `cubic` with `cubic_sigma`; what was measured of
-  // the cubic term stays as it is.
+  // The registration for a cubic term that is known to be `cubic` with `cubic_sigma`. The measured
+  // cubic term remains in the result.
   Registration WithCubic(double cubic, double cubic_sigma) const;
 };
 
-// As Register, for those who know more about the cubic term than one pair of frames tells.
+// Registers as Register does, for callers that know the cubic term better than one pair of frames
+// shows it. Throws Interrupted after a request to stop.
 std::optional<FreeRegistration> RegisterFreely(const cv::Mat& reference, const cv::Mat& frame,
                                                double expected_scale, cv::Point2d centre);
 

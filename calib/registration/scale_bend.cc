@@ -10,25 +10,25 @@ namespace {
 
 constexpr std::size_t kFewestSamples = 9;
 constexpr double kSignificant = 5;  // standard deviations
-constexpr int kBlocks = 8;          // runs of neighbours
+constexpr int kBlocks = 8;          // runs of neighbours in the jackknife
 constexpr int kRounds = 10;
 constexpr double kCauchyWidth = 3;  // in standard deviations
 
-// u: the depth that the scale says, from -1 at the nearest frame to 1 at the farthest.
+// u is the depth that the scale gives, from -1 at the nearest frame to 1 at the farthest.
 struct Point {
   double u = 0, reading_mm = 0;
-  double sigma_mm = 0;  // of the reading against the law, as stated
+  double sigma_mm = 0;  // stated error of the reading against the law
 };
 using Points = std::vector<Point>;
 
 struct Curve {
   Eigen::Vector3d coefficients{0, 0, 0};  // reading = c0 + c1 u + c2 u^2
-  double curvature_sigma = 0;             // of c2, with the scatter if it is larger than stated
+  double curvature_sigma = 0;  // error of c2, with the scatter if it exceeds the stated error
 };
 
 Eigen::Vector3d Powers(double u) { return {1, u, u * u}; }
 
-// Weighted least squares; single wrong readings weigh less (Cauchy).
+// Weighted least squares. Outliers among the readings have less weight (Cauchy).
 Curve FitCurve(const Points& points) {
   Curve curve;
   double spread = 1;
@@ -59,9 +59,9 @@ Curve FitCurve(const Points& points) {
   return curve;
 }
 
-// Neighbours share errors (a scale that is uneven, a texture that registers badly). Then the means
-// over runs of neighbours scatter more than single frames tell: by which factor, 1 at least.
-// `points` in the order of u.
+// Neighbours share errors (an uneven scale, a texture that registers badly). The means over runs of
+// neighbours then scatter more than single frames do. Returns the factor between them, at least 1.
+// `points` is in the order of u.
 double NeighbourFactor(const Points& points, const Curve& curve) {
   const auto n = static_cast<int>(points.size());
   std::array<double, kBlocks> sums{}, counts{};
@@ -77,17 +77,18 @@ double NeighbourFactor(const Points& points, const Curve& curve) {
   double of_means = 0;
   for (std::size_t b = 0; b < kBlocks; ++b) of_means += sums[b] * sums[b] / counts[b];
   const double variance = squares / (n - 3);
-  // Five degrees of freedom know a variance badly: half as much again.
+  // A variance with five degrees of freedom is poorly determined; the factor 1.5 allows for that.
   return variance > 0 ? std::sqrt(std::max(1.0, 1.5 * of_means / ((kBlocks - 3) * variance))) : 1;
 }
 
 }  // namespace
 
-// With reading = c0 + c1 u + c2 u^2 and u = (Z - m)/h, Z the depth that the scale says:
-//   in the middle the curve lies -c2 off the chord through its ends;
-//   the chord through the middle and one end has the slope c1 -+ c2 and meets Z = 0, u = -m/h, at
-//   c0 - (c1 -+ c2) m/h, which is -sign times the bench zero: far less near = 2 sign c2 m/h.
-// Derived here [D63]; m and h are the middle and half the range of the depths, sign that of
+// The formulas hold for reading = c0 + c1 u + c2 u^2 and u = (Z - m)/h, where Z is the depth that
+// the scale gives.
+//   In the middle the curve lies -c2 off the chord through its ends.
+//   The chord through the middle and one end has the slope c1 -+ c2 and meets Z = 0, u = -m/h, at
+//   c0 - (c1 -+ c2) m/h, which is -sign times the bench zero: far minus near = 2 sign c2 m/h.
+// Derived here [D63]; m and h are the middle and half the range of the depths, sign is that of the
 // direction.
 std::optional<Bend> FindBend(const std::vector<ScaleSample>& samples, const ScaleLaw& law,
                              const FocusSweep& sweep) {

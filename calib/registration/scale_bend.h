@@ -9,18 +9,20 @@
 
 namespace thicklens::calib {
 
-// The image scale goes as 1/z, but the readings bend against it: the rail's scale is not linear,
-// the pictures are distorted, or the pupil moves with the reading (a lens that breathes).
+// A systematic bend of the readings against an image scale that is proportional to 1/z. The rail's
+// scale is not linear, the images are distorted, or the pupil moves with the reading (a lens that
+// breathes).
 struct Bend {
-  // By how much the readings in the middle of the sweep lie off the straight line through its ends.
+  // Distance of the readings in the middle of the sweep from the straight line through its ends.
   model::Estimate bow_mm;
-  // Bench zero that the farther half of the sweep alone would give, less that of the nearer half.
+  // Bench zero from the farther half of the sweep alone minus that from the nearer half.
   double zero_spread_mm = 0;
 };
 
-// The curvature of the readings against 1/scale, if it lies beyond five standard deviations: of the
-// readings' scatter, of the scales' own errors, of errors that neighbours share. Single wrong
-// readings do not count. Nothing without a law, or from fewer than nine frames.
+// Finds the curvature of the readings against 1/scale. Returns it if it lies beyond five standard
+// deviations, which include the scatter of the readings, the scales' own errors, and errors that
+// neighbours share. Single outliers among the readings do not affect it. Returns std::nullopt
+// without a law, or for fewer than nine frames.
 std::optional<Bend> FindBend(const std::vector<ScaleSample>& samples, const ScaleLaw& law,
                              const FocusSweep& sweep);
 

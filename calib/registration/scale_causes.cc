@@ -19,22 +19,22 @@ constexpr std::array<ReadingUnit, 7> kUnits = {{{"inches", 25.4},
                                                 {"thousandths of an inch", 0.0254},
                                                 {"tenths of a millimetre", 0.1},
                                                 {"feet", 304.8}}};
-constexpr double kScaleBias = 3e-5;  // of registrations, from frame to frame
-constexpr double kZeroBias = 0.01;   // of a bench zero from the scale, relative to the depth
+constexpr double kScaleBias = 3e-5;  // error of registrations, from frame to frame
+constexpr double kZeroBias = 0.01;   // error of a bench zero from the scale, relative to the depth
 constexpr double kCauchyWidth = 3;
 constexpr int kRounds = 12;
 constexpr std::size_t kMostForMedians = 300;
-constexpr double kNearDioptres = 0.15;  // relative, of 1000/f
+constexpr double kNearDioptres = 0.15;  // relative difference from 1000/f
 
 struct Point {
   double reading_mm = 0, value = 0, sigma = 0;
 };
 using Points = std::vector<Point>;
 
-// value = intercept + slope reading, robust against single wrong ones.
+// value = intercept + slope reading, fitted robustly against outliers.
 struct Line {
   double intercept = 0, slope = 0;
-  double zero_sigma_mm = 0;  // of the reading at which the value is 0
+  double zero_sigma_mm = 0;  // error of the reading at which the value is 0
   double chi2 = 0;
   double Zero() const { return -intercept / slope; }
 };
@@ -53,9 +53,10 @@ Points PointsOf(const std::vector<ScaleSample>& samples, bool inverse) {
   return points;
 }
 
-// The slope that half of the pairs have, and the intercept that half of the points then have.
+// The slope is the median over pairs of points, and the intercept is the median over the points
+// with that slope.
 Line MedianLine(const Points& points) {
-  // A start is all that is wanted of it: not every pair of a long sweep is looked at.
+  // The line is only a start; a long sweep therefore uses only a part of its pairs.
   const std::size_t step = 1 + points.size() / kMostForMedians;
   std::vector<double> slopes, intercepts;
   for (std::size_t i = 0; i < points.size(); i += step) {
@@ -71,7 +72,8 @@ Line MedianLine(const Points& points) {
   return line;
 }
 
-// Errors of the readings count by the slope; `widening` stretches all errors.
+// The errors of the readings contribute in proportion to the slope; `widening` stretches all
+// errors.
 Line FitLine(const Points& points, double reading_sigma_mm, double widening) {
   Line line = MedianLine(points);
   double middle_mm = 0;
@@ -114,7 +116,7 @@ double ChiSquareOfConstant(const Points& points, double slope, double reading_si
   return sum;
 }
 
-// Cost of a bench zero that the scale puts elsewhere than it was given.
+// Cost of a bench zero for which the scale gives another value than the given one.
 double ChiSquareOfZero(const FocusSweep& sweep, double offset_mm, double sigma_mm,
                        double depth_mm) {
   if (!sweep.offset_mm) return 0;
@@ -123,7 +125,7 @@ double ChiSquareOfZero(const FocusSweep& sweep, double offset_mm, double sigma_m
   return RobustSquare(off);
 }
 
-// Whether the best of the causes explains what is seen, or is only less bad than the others.
+// Whether the best cause explains the observations, and is not only better than the others.
 bool IsExplained(const ScaleCauses& causes) {
   const Diagnosis& diagnosis = causes.diagnosis;
   return diagnosis.named > 0 &&
@@ -142,7 +144,7 @@ class Comparison {
 
   ScaleCauses Run() {
     const double stated_mm = std::max(sweep_.reading_sigma_mm, 0.0);
-    // What the better of the two laws leaves over is scatter that neither explains.
+    // The remainder that the better of the two laws leaves is scatter that neither explains.
     const double freedom = std::max(1.0, static_cast<double>(inverse_points_.size()) - 2);
     const double least = std::min(FitLine(inverse_points_, stated_mm, 1).chi2,
                                   FitLine(linear_points_, stated_mm, 1).chi2);
@@ -176,26 +178,28 @@ class Comparison {
     return inverse_.slope * model::DirectionSign(sweep_.direction) > 0;
   }
 
-  // In mm and in each other unit; where the scale goes the other way, it may as well not go at all.
+  // Adds the moving target in mm and in each other unit. If the scale changes in the opposite
+  // direction, the law is no better than a constant scale.
   void AddMovingTarget(bool as_stated) {
     const std::string name = as_stated ? kTargetMoves : kReversedReadings;
     const bool agrees = FollowsStatedDirection() == as_stated;
     const double of_scale = agrees ? inverse_.chi2 : constant_;
     // 1/scale = (offset + sign reading)/depth, so that the offset is the intercept times the depth.
     const double offset_mm = inverse_.intercept * result_.reference_depth_mm;
-    // Readings from the other end of the scale have another zero, too.
+    // Readings from the other end of the scale have another zero.
     const double of_zero_in_mm =
         as_stated
             ? ChiSquareOfZero(sweep_, offset_mm, inverse_.zero_sigma_mm, result_.reference_depth_mm)
             : 0;
     Add(name, of_scale + OfDepth(1) + of_zero_in_mm);
-    // A zero that is free explains whatever a given one does: it is a cause where that one fails.
+    // A free zero explains everything that a given zero explains. It is a cause only where the
+    // given one fails.
     if (of_zero_in_mm >= Diagnosis::kDecisive) Add(kZeroIsWrong, of_scale + OfDepth(1));
-    // A unit is a matter of the blur: without it, any depth would do.
+    // Only the blur determines a unit: without it, any depth is possible.
     if (!result_.blur_slope || !agrees) return;
     for (const ReadingUnit& unit : kUnits) {
       const double u = unit.millimetres;
-      // The zero may have been given in the readings' unit too, or in mm.
+      // The zero may have been given in the unit of the readings or in mm.
       const double of_zero =
           as_stated ? std::min(of_zero_in_mm,
                                ChiSquareOfZero(sweep_, u * offset_mm, u * inverse_.zero_sigma_mm,
@@ -209,7 +213,7 @@ class Comparison {
     return fmt::format("{}, readings in {}", law, unit.name);
   }
 
-  // Of the blur ratio that the depth asks for; nearer than the focal point there is no image.
+  // Cost of the blur ratio that the depth requires. Nearer than the focal point there is no image.
   double OfDepth(double unit) const {
     const double depth_mm = unit * result_.reference_depth_mm;
     if (!(depth_mm > sweep_.camera.lens.front_focal_length_mm)) return ChiSquareOfRatio(-1);
@@ -353,7 +357,7 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
     if (frame.image_scale) depths_mm.push_back(law.reference_depth_mm / *frame.image_scale);
   }
   if (depths_mm.empty()) return "";
-  // A lens that moves is named by ReasonOfScaleCauses, beside the unit where both are possible.
+  // ReasonOfScaleCauses names a lens that moves, together with the unit where both are possible.
   if (causes.diagnosis.Names(kLensMoves) && !causes.ReadingsMayBeRight()) return "";
   const auto [nearest, farthest] = std::minmax_element(depths_mm.begin(), depths_mm.end());
   const double f1_mm = sweep.camera.lens.front_focal_length_mm;
@@ -375,7 +379,7 @@ std::string UnitAdvice(const FocusSweep& sweep, const std::vector<FrameMeasureme
         "mm, and is the focal length right?",
         placed, f1_mm);
   }
-  // The blur may say that the target is so near: magnifications above 1 are nothing unusual.
+  // The blur may confirm that the target is so near: magnifications above 1 are not unusual.
   if (!(*farthest < 2 * f1_mm) || (causes.blur_slope && causes.ReadingsMayBeRight())) return "";
   return fmt::format(
       "{}, less than two focal lengths ({:.3g} mm), where the image is larger than the target: are "

@@ -15,27 +15,30 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestSamples = 5;
-// A law holds if this part of the frames follows it: a fifth may be wrong.
+// A law holds if this part of the frames follows it; a fifth may be wrong.
 constexpr double kLeastFollowing = 0.75;
-// To follow: within this part of the readings' range, or that many standard deviations.
+// A frame follows a law within this part of the range of the readings, or within that many standard
+// deviations.
 constexpr double kFollowsWithin = 0.03;
 constexpr double kFollowsSigmas = 5;
 constexpr double kSortedWithin = 0.01, kSortedFollowing = 0.9;
-constexpr double kStatedScatter = 1.5;  // of the stated error, that the readings may scatter by
-// Scale that changes by less than this over the sweep is constant, if no target within the longest
-// bench would have let it.
+// Maximum scatter of the readings, relative to the stated error.
+constexpr double kStatedScatter = 1.5;
+// A scale that changes by less than this over the sweep is constant, unless a target within the
+// longest bench would explain the change.
 constexpr double kConstantChange = 1e-3;
 constexpr double kLongestBenchMm = 1e4;
 constexpr double kSignificant = 4;
-// What the registrations may be wrong by together, from one end of a sweep to the other: measured
-// on simulated sweeps, whose scales are known.
+// Common error of the registrations from one end of a sweep to the other, measured on simulated
+// sweeps of known scale.
 constexpr double kScaleBias = 3e-5;
-// What a distortion does to the scale of an affine map, as a part of its change of the image height
-// at the corner: the tiles reach less far.
+// Effect of a distortion on the scale of an affine map, as a part of its change of the image height
+// at the corner. The tiles do not reach the corner.
 constexpr double kScalePerCornerDistortion = 0.4;
-constexpr double kLikelyDistortion = 0.02;  // at the corner, the most that is reckoned with
-constexpr double kKnownDistortion = 0.01;   // sigma at the corner from which even none is stated
-constexpr int kBlocks = 8;                  // of the jackknife
+constexpr double kLikelyDistortion = 0.02;  // maximum assumed distortion at the corner
+// Sigma at the corner below which even a zero distortion is stated.
+constexpr double kKnownDistortion = 0.01;
+constexpr int kBlocks = 8;  // blocks of the jackknife
 
 // 1/scale = (offset + sign reading)/reference_depth.
 struct Law {
@@ -57,8 +60,8 @@ Points PointsOf(const std::vector<ScaleSample>& samples) {
   return points;
 }
 
-// reading = sign (z_reference/scale - offset): the readings carry most of the error, and that of
-// the scale is carried over to them.
+// reading = sign (z_reference/scale - offset). The readings carry most of the error, and the error
+// of the scale is converted to an error of the reading.
 double ReadingError(const Point& p, const Law& law, double sign) {
   return p.reading_mm - sign * (law.reference_depth_mm * p.inverse_scale - law.offset_mm);
 }
@@ -110,11 +113,11 @@ std::optional<Law> SolveLaw(const Points& points, double sign, double reading_si
   return law;
 }
 
-// The straight line 1/scale = intercept + slope reading by repeated medians (Siegel 1982) [L7]: up
+// The straight line 1/scale = intercept + slope reading by repeated medians (Siegel 1982) [L7]. Up
 // to half of the points may be wrong by any amount.
 struct Line {
   double intercept = 0, slope = 0;
-  double slope_sigma = 0;  // from the scatter about it, stated errors at least
+  double slope_sigma = 0;  // from the scatter about the line, at least the stated errors
 };
 
 Line FitLine(const Points& points, double reading_sigma_mm) {
@@ -148,7 +151,8 @@ Line FitLine(const Points& points, double reading_sigma_mm) {
   return line;
 }
 
-// The range of the readings, a tenth at each end left out and made up for: wrong ones do not count.
+// The range of the readings, extrapolated from the inner part without a tenth at each end. Outliers
+// therefore do not affect it.
 double RobustRange(const Points& points) {
   std::vector<double> readings;
   for (const Point& p : points) readings.push_back(p.reading_mm);
@@ -159,8 +163,8 @@ double RobustRange(const Points& points) {
          static_cast<double>(readings.size() - 1) / kept;
 }
 
-// Leaves out one run of neighbouring readings after the other: errors that neighbours share (a
-// scale that is not quite linear, a lens that distorts) show in how far the result moves.
+// Leaves out one run of neighbouring readings after the other. Errors that neighbours share (a
+// scale that is not quite linear, a lens that distorts) appear as changes of the result.
 double JackknifeSigma(Points points, double sign, double reading_sigma_mm, const Law& law) {
   const int n = static_cast<int>(points.size());
   const int blocks = std::min(kBlocks, n / 2);
@@ -183,8 +187,8 @@ double JackknifeSigma(Points points, double sign, double reading_sigma_mm, const
   return std::sqrt((count - 1) / count * sum);
 }
 
-// The error of the readings that makes the law's residuals as large as they are, at least the one
-// stated.
+// The error of the readings that explains the size of the law's residuals, at least the stated
+// error.
 double ScatterOfReadings(const Points& points, const Law& law, double sign,
                          double reading_sigma_mm) {
   std::vector<double> errors, from_scale;
@@ -198,7 +202,8 @@ double ScatterOfReadings(const Points& points, const Law& law, double sign,
   return std::max({reading_sigma_mm, std::sqrt(std::max(0.0, rest)), 1e-6});
 }
 
-// What an unknown rest of distortion does to the offset: the scales with and without it.
+// Effect of an unknown remainder of distortion on the offset: the difference between the scales
+// with and without it.
 double DistortionSigma(const Points& points, double sign, double reading_sigma_mm, const Law& law,
                        double corner_sigma) {
   Points bent = points;
@@ -220,7 +225,7 @@ class LawFinder {
         reading_sigma_mm_(std::max(reading_sigma_mm, 0.0)),
         direction_(direction) {}
 
-  // Which of the laws holds, with the reason if it is not the one wanted.
+  // Determines which law holds, with the reason if it is not the wanted one.
   void Classify(ScaleLaw* result) {
     range_mm_ = RobustRange(points_);
     line_ = FitLine(points_, reading_sigma_mm_);
@@ -236,13 +241,14 @@ class LawFinder {
     }
   }
 
-  // The offset with its error. False, with the reason, if the fit fails.
+  // Fits the offset with its error. Returns false, with the reason, if the fit fails.
   bool Solve(const std::optional<model::Estimate>& distortion_at_corner, ScaleLaw* result) const {
     const double sign = model::DirectionSign(direction_);
     Law law{line_.intercept * sign / line_.slope, sign / line_.slope};
     double sigma_mm = reading_sigma_mm_;
     Eigen::Matrix2d covariance;
-    // The scatter of the readings about the law sets the scale of the loss; a few rounds settle it.
+    // The scatter of the readings about the law is the scale of the loss; a few rounds are enough
+    // to converge.
     for (int round = 0; round < 4; ++round) {
       sigma_mm = ScatterOfReadings(points_, law, sign, reading_sigma_mm_);
       const std::optional<Law> solved = SolveLaw(points_, sign, sigma_mm, law, &covariance);
@@ -277,13 +283,13 @@ class LawFinder {
 
  private:
   void ClassifySloped(ScaleLaw* result) const {
-    // On the line, whichever way it falls.
+    // The law of the fitted line, independent of its direction.
     const double own_sign = line_.slope > 0 ? 1 : -1;
     const Law law{own_sign * line_.intercept / line_.slope, 1 / std::abs(line_.slope)};
     const double sigma_mm = ScatterOfReadings(points_, law, own_sign, reading_sigma_mm_);
     const std::size_t following = CountFollowing(law, own_sign, reading_sigma_mm_);
-    // What the readings scatter by themselves counts, not what was stated of them: a coarse scale
-    // of the bench is no reason to doubt a law that its readings follow.
+    // The criterion is the scatter of the readings themselves, not their stated error. A bench with
+    // a coarse scale is no reason to doubt a law that its readings follow.
     const double own_mm = ScatterOfReadings(points_, law, own_sign, 0);
     const bool is_close =
         own_mm < std::max(kFollowsWithin * range_mm_, kStatedScatter * reading_sigma_mm_);
@@ -376,9 +382,9 @@ class LawFinder {
         following == points_.size() ? "all" : std::to_string(following));
   }
 
-  // How many frames follow the law if the smallest reading belongs to the largest image and so on
-  // (or to the smallest): if they are far more than chance lets sorted values follow it, the
-  // readings are those of the sweep and stand beside other frames.
+  // Number of frames that follow the law if the smallest reading is assigned to the largest image
+  // and so on (or to the smallest). If they are many more than sorted random values would give, the
+  // readings belong to the sweep but are assigned to wrong frames.
   std::size_t FollowingWhenSorted(bool larger_reading_is_farther) const {
     std::vector<double> readings, inverses;
     for (const Point& p : points_) {
@@ -450,8 +456,8 @@ ScaleLaw FitScaleLaw(const std::vector<ScaleSample>& samples, int reference_fram
   LawFinder finder(samples, reading_sigma_mm, direction);
   finder.Classify(&result);
   const auto distortion = DistortionAtCorner(samples, corner_radius_px);
-  // Frames that do not follow the law may not show one target, and where the scale stays the same a
-  // distortion does not show at all.
+  // Frames that do not follow the law may not show one target. Where the scale is constant, a
+  // distortion is not visible at all.
   if ((result.kind == ScaleKind::kInverseDepth || result.kind == ScaleKind::kReversed) &&
       distortion &&
       (distortion->sigma < kKnownDistortion ||

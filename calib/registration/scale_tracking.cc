@@ -16,16 +16,16 @@ namespace {
 constexpr double kSmallestScale = 0.1, kLargestScale = 10;
 constexpr std::size_t kFirstWave = 4;
 constexpr std::size_t kEnoughToLearn = 5;
-// Steps of the ladder are half of what a registration finds its way over.
+// The steps of the ladder are half of the range within which a registration converges.
 constexpr double kRung = 1.1;
-constexpr int kRungs = 12;  // up, and as many down: 1.1^12 = 3.1
+constexpr int kRungs = 12;  // rungs up, and as many down: 1.1^12 = 3.1
 constexpr std::ptrdiff_t kTriedRungs = 4;
-// Relative change of the image height at the corner that a lens is expected to have at most.
+// Maximum relative change of the image height at the corner that is expected of a lens.
 constexpr double kLikelyDistortion = 0.02;
 
-// Predicts the scale at a reading: 1/scale is a straight line. It is drawn through the frames as
-// they are registered, by medians, so that neither a wrong reading, the reference's included, nor a
-// registration that went wrong moves it.
+// Predicts the scale at a reading: 1/scale is a straight line. The line is fitted by medians to the
+// frames registered so far, so that neither a wrong reading (including that of the reference) nor a
+// failed registration moves it.
 class ScalePrediction {
  public:
   ScalePrediction(const FocusSweep& sweep, std::size_t reference,
@@ -60,11 +60,11 @@ class ScalePrediction {
   }
 
  private:
-  double slope_ = 0, intercept_ = 1;  // of 1/scale against the reading
+  double slope_ = 0, intercept_ = 1;  // line of 1/scale against the reading
   bool is_known_ = false;
 };
 
-// Starts from the scale expected, then from those of a ladder at which the phases agree best.
+// Starts from the expected scale, then from the scales of a ladder at which the phases agree best.
 std::optional<FreeRegistration> RegisterAnyhow(const cv::Mat& reference, const cv::Mat& frame,
                                                double expected, cv::Point2d centre) {
   if (auto found = RegisterFreely(reference, frame, expected, centre)) return found;
@@ -82,13 +82,13 @@ std::optional<FreeRegistration> RegisterAnyhow(const cv::Mat& reference, const c
   return std::nullopt;
 }
 
-// Radial distortion is common to all frames, so that all together know it better than each.
+// All frames share the radial distortion, so that together they determine it better than each one.
 void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& registrations,
                        std::vector<ScaleSample>* samples) {
   const double likely = kLikelyDistortion / (corner_px * corner_px);
   double k = 0, variance = likely * likely;
   if (const auto fitted = FitRadialDistortion(*samples)) {
-    // Weighed against the expectation that there is none.
+    // The fitted value is weighted against the expectation of no distortion.
     const double part = variance / (variance + fitted->sigma * fitted->sigma);
     k = part * fitted->value;
     variance = part * fitted->sigma * fitted->sigma;
@@ -103,14 +103,14 @@ void TakeOutDistortion(double corner_px, const std::vector<FreeRegistration>& re
   }
 }
 
-// The scales are the readings', as they stand; the shifts are measured. The reference alone where
-// the depths are not known.
+// Takes the scales from the readings and measures the shifts. Returns only the reference where the
+// depths are not known.
 std::vector<ScaleSample> TrackShifts(const FocusSweep& sweep,
                                      const std::function<cv::Mat(std::size_t)>& read_grey,
                                      const std::vector<std::size_t>& frames, std::size_t reference,
                                      std::optional<double> known_offset_mm, int threads,
                                      const std::function<void()>& tick) {
-  const auto depth_mm = [&](std::size_t frame) {  // without an offset no frame has one
+  const auto depth_mm = [&](std::size_t frame) {  // without an offset no frame has a depth
     return known_offset_mm.value_or(-1e300) +
            model::DirectionSign(sweep.direction) * sweep.frames[frame].reading_mm;
   };
@@ -175,7 +175,7 @@ std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
   std::vector<FreeRegistration> registrations(1);
   ScalePrediction prediction(sweep, reference, known_offset_mm);
   std::size_t done = 0;
-  // Waves that double: within one, every start comes from the law of the waves before.
+  // The waves double in size. Within a wave, every start comes from the law of the previous waves.
   while (done < order.size()) {
     const std::size_t count = std::min(std::max(kFirstWave, done), order.size() - done);
     std::vector<std::optional<FreeRegistration>> found(count);

@@ -11,22 +11,25 @@
 
 namespace thicklens::calib {
 
-// Registers the frames of a sweep to one reference, from the nearest readings outward: the law
-// found so far says where the next registration starts, so that a periodic target cannot catch it a
-// period off. Where that fails (a wrong reading), a ladder of scales is tried. `known_offset_mm`
-// starts it off where the bench zero is given. `read_grey` gives the linear grey light of a frame
-// (CV_32F) and is called from several threads; `tick` is called once a frame. Radial distortion
-// that the frames show together is taken out of the scales, and what is not known of it goes into
-// their errors. On a target that looks the same at every scale (ShowsShiftAlone; a knife edge is
-// left to the meter of edges) the scales are taken from the readings and only shifts are measured;
-// where no offset is known either, the reference is returned alone. Such samples say so.
+// Registers the frames of a sweep to one reference, from the nearest readings outward. The law
+// found so far predicts the start of the next registration, so that a periodic target does not
+// cause an error of one period. Where that fails (a wrong reading), a ladder of scales is tried.
+// `known_offset_mm`, the bench zero if it is given, defines the first prediction. `read_grey`
+// returns the linear grey light of a frame (CV_32F) and is called from several threads; `tick` is
+// called once per frame. The radial distortion that the frames show together is removed from the
+// scales, and its uncertainty is added to their errors.
+//
+// On a target that looks the same at every scale (ShowsShiftAlone; the edge meter handles a knife
+// edge) the scales are taken from the readings and only shifts are measured. If no offset is known
+// either, only the reference is returned. Such samples have `scale_is_from_reading` set.
 std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
                                     const std::function<cv::Mat(std::size_t)>& read_grey,
                                     const std::vector<std::size_t>& frames, std::size_t reference,
                                     std::optional<double> known_offset_mm, int threads,
                                     const std::function<void()>& tick);
 
-// Where the optical axis meets the region of interest, and how far its farthest corner is.
+// Pixel of the region of interest on the optical axis, and the distance of the farthest corner from
+// it.
 cv::Point2d RegionCentre(const FocusSweep& sweep);
 double RegionCornerRadiusPx(const FocusSweep& sweep);
 

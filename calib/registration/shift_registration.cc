@@ -14,10 +14,10 @@ constexpr double kLeastShiftInformation = 0.1;
 constexpr double kMinAgreement = 0.6;
 constexpr double kMaxShiftSigmaPx = 0.3;
 constexpr int kLeastFieldPx = 60;
-constexpr double kLargestBlurPart = 0.06;  // sigma of blur, of the field
+constexpr double kLargestBlurPart = 0.06;  // sigma of blur, relative to the field
 constexpr int kCoarserRounds = 4;
-constexpr double kClosePx = 0.2;    // of shrunk pixels
-constexpr double kCloseBlur = 0.3;  // relative, of a variance
+constexpr double kClosePx = 0.2;    // shrunk pixels
+constexpr double kCloseBlur = 0.3;  // relative difference of a variance
 
 // p_frame = centre + shift + scale R (p_reference - centre).
 FrameMap MapOf(const Registration& registration, cv::Point2d centre) {
@@ -30,7 +30,7 @@ FrameMap MapOf(const Registration& registration, cv::Point2d centre) {
   return map;
 }
 
-// The registration followed by a turn about the centre and a shift, both small.
+// Applies a small rotation about the centre and a small shift to the registration.
 void Follow(const RigidDisplacement& step, Registration* registration) {
   const Eigen::Vector2d before = registration->shift_px;
   registration->shift_px +=
@@ -56,7 +56,8 @@ std::optional<Registration> RegisterShift(const cv::Mat& reference, const cv::Ma
   const cv::Rect2d shared = SharedField(*coarse, reference.size(), frame.size());
   const double field_px = std::min(shared.width, shared.height);
   if (!(field_px >= kLeastFieldPx)) return std::nullopt;
-  // Half resolution first: it brings the map close, and says how the blurs differ.
+  // The first passes use half resolution. They bring the map close, and determine the difference of
+  // the blurs.
   const int finest = TileFactor(std::max(shared.width, shared.height), 0);
   const int coarser = std::max(finest, std::min(2 * finest, TileFactor(field_px, 1e9)));
   const double most_px2 = std::pow(kLargestBlurPart * field_px, 2);

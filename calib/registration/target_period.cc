@@ -19,9 +19,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr int kLargestSide = 1024;  // px of the picture in which a period is looked for
+constexpr int kLargestSide = 1024;  // px of the image in which a period is searched
 
-// Reciprocal lattice: every line of the pattern is at m first + n second. A ruling has no second.
+// Reciprocal lattice: every line of the pattern is at m first + n second. A ruling has no second
+// vector.
 struct Lattice {
   Frequency first{0, 0};
   std::optional<Frequency> second;
@@ -31,7 +32,7 @@ struct Lattice {
   }
 };
 
-// Gauss: the two shortest vectors that span the same lattice, the shorter one first.
+// Gauss reduction: the two shortest vectors that span the same lattice, the shorter one first.
 void Reduce(Eigen::Vector2d* a, Eigen::Vector2d* b) {
   for (int i = 0; i < 20; ++i) {
     if (b->squaredNorm() < a->squaredNorm()) std::swap(*a, *b);
@@ -57,18 +58,18 @@ std::optional<Lattice> FindLattice(const LineSpectrum& spectrum) {
   return lattice;
 }
 
-// Amplitudes of one line under 3 x 3 Hann windows of half the frame each. Where the frequency is
-// right, their phases are equal.
+// Amplitudes of one line under 3 x 3 Hann windows of half the frame each. Their phases are equal if
+// the frequency is correct.
 constexpr int kTiles = 3;
 using Tiles = std::array<Complex, kTiles * kTiles>;
 
-// Places of the windows' middles, in px from the frame's.
+// Centre of a window, px, relative to the centre of the frame.
 Eigen::Vector2d TilePlace(cv::Size size, int tile) {
   return {(tile % kTiles - 1) * 0.25 * size.width, (tile / kTiles - 1) * 0.25 * size.height};
 }
 
 Tiles TileAmplitudes(const cv::Mat& grey, const Frequency& f) {
-  // One window's weights times the wave, along an axis of `length` px.
+  // The weights of one window times the wave, along an axis of `length` px.
   const auto wave = [](int length, double frequency, int tile) {
     std::vector<Complex> values(static_cast<std::size_t>(length));
     for (int i = 0; i < length; ++i) {
@@ -102,19 +103,19 @@ Tiles TileAmplitudes(const cv::Mat& grey, const Frequency& f) {
   return amplitudes;
 }
 
-// The lattice refined, with the covariance of its two or four frequencies.
+// The refined lattice, with the covariance of its two or four frequencies.
 struct RefinedLattice {
   Lattice lattice;
   Eigen::MatrixXd covariance;
 };
 
-// [D67] Of every line that stands out, the phase under each window is c + 2 pi (m df1 + n df2) . r:
-// linear in the errors of the frequencies, solved by least squares with weights |amplitude|^2. The
-// residuals give the covariance.
+// [D67] For every line that stands out, the phase under each window is c + 2 pi (m df1 + n df2) .
+// r. It is linear in the errors of the frequencies, which are solved by least squares with weights
+// |amplitude|^2. The residuals give the covariance.
 std::optional<RefinedLattice> Refine(const cv::Mat& grey, const LineSpectrum& spectrum,
                                      Lattice lattice) {
   constexpr int kRounds = 4;
-  constexpr double kWorstPhase = 0.35;  // rad rms; lines of no pattern have 1 and more
+  constexpr double kWorstPhase = 0.35;  // rad rms; lines without a pattern have 1 and more
   RefinedLattice result;
   for (int round = 0; round < kRounds; ++round) {
     ThrowIfCancelled();
@@ -134,7 +135,7 @@ std::optional<RefinedLattice> Refine(const cv::Mat& grey, const LineSpectrum& sp
         const Tiles amplitudes = TileAmplitudes(grey, f);
         Complex sum = 0;
         for (const Complex& a : amplitudes) sum += std::abs(a) * a;
-        // Phases against their mean, which is taken out together with the mean place.
+        // Phases relative to their mean, which is subtracted together with the mean place.
         std::array<double, kTiles * kTiles> phase{}, weight{};
         double total = 0, mean_phase = 0;
         Eigen::Vector2d mean_place(0, 0);
@@ -170,8 +171,8 @@ std::optional<RefinedLattice> Refine(const cv::Mat& grey, const LineSpectrum& sp
     if (lattice.second) *lattice.second += step.tail<2>();
     const double left = std::max(0.0, weighted_squares - right.dot(step));
     if (std::sqrt(left / weights) > kWorstPhase) return std::nullopt;
-    // Windows that overlap by half share about a quarter of what they see: four tiles of nine
-    // count.
+    // Windows that overlap by half share about a quarter of their data: effectively four tiles of
+    // nine are independent.
     const double scale = left / (observations - parameters) * (9.0 / 4);
     result.covariance = scale * solver.solve(Eigen::MatrixXd::Identity(parameters, parameters));
   }
@@ -181,9 +182,10 @@ std::optional<RefinedLattice> Refine(const cv::Mat& grey, const LineSpectrum& sp
 
 enum class Pattern { kGrid, kCheckerboard, kUnclear };
 
-// A checkerboard turns into its negative when it is shifted by the sum of its two shortest periods'
-// halves; so it has no line at m + n even. A grid has (2, 0), (0, 2) and dots (1, 1) as well, and
-// of the odd ones beside the axes, (2, 1), which a checkerboard has, next to nothing.
+// A checkerboard becomes its negative when it is shifted by the sum of half of its two shortest
+// periods. It therefore has no line at m + n even. A grid has (2, 0), (0, 2), and a dot grid also
+// has (1, 1). Of the odd lines off the axes, (2, 1), a grid has almost nothing, but a checkerboard
+// has them.
 Pattern PatternOf(const LineSpectrum& spectrum, const Lattice& lattice) {
   const auto power = [&](std::initializer_list<std::pair<int, int>> lines) {
     double sum = 0;
@@ -203,7 +205,7 @@ Pattern PatternOf(const LineSpectrum& spectrum, const Lattice& lattice) {
   return Pattern::kUnclear;
 }
 
-// Of the pattern's own lattice, px: f_i . a_j = 1 for i = j, else 0.
+// Cell of the pattern's own lattice, px: f_i . a_j = 1 for i = j, otherwise 0.
 struct Cell {
   Eigen::Vector2d a{0, 0}, b{0, 0};
   bool IsSquare() const {
@@ -224,7 +226,7 @@ Cell CellOf(const Frequency& first, const Frequency& second) {
 double PeriodOf(const Lattice& lattice, bool is_square) {
   if (!lattice.second) return 1 / lattice.first.norm();
   const Cell cell = CellOf(lattice.first, *lattice.second);
-  // Of a square cell both sides count: the root of its area.
+  // The period of a square cell is the root of its area, so that both sides contribute.
   if (is_square) return std::sqrt(std::abs(cell.a.x() * cell.b.y() - cell.a.y() * cell.b.x()));
   return cell.a.norm();
 }
@@ -264,8 +266,8 @@ std::optional<PeriodEstimate> MeasureIn(const cv::Mat& grey) {
 std::optional<PeriodEstimate> MeasurePeriodPx(const cv::Mat& grey) {
   const int side = std::max(grey.cols, grey.rows);
   if (side <= kLargestSide) return MeasureIn(grey);
-  // The middle at full resolution, where fine patterns are not lost; the whole frame, shrunk, for
-  // those of which the middle shows too few periods.
+  // Fine patterns are searched in the middle at full resolution, which does not lose them. Patterns
+  // with too few periods in the middle are searched in the whole frame, shrunk.
   const cv::Size part(std::min(grey.cols, kLargestSide), std::min(grey.rows, kLargestSide));
   const cv::Rect middle({(grey.cols - part.width) / 2, (grey.rows - part.height) / 2}, part);
   const auto fine = MeasureIn(grey(middle));

@@ -12,16 +12,18 @@ struct PeriodEstimate {
   double sigma_px = 0;
 };
 
-// What counts as the period, so that a length stated for it is one and the same:
-// - a line grid, a dot grid, a ruling: the distance of neighbouring lines or dots, the shorter one
+// Measures the period of a target. The period is defined so that a stated length of it is
+// unambiguous:
+// - line grid, dot grid or ruling: the distance of neighbouring lines or dots, the shorter one
 //   where it differs along the two directions;
-// - a checkerboard: two squares along their sides, the way from a black square to the next one in
-//   its row. (The shortest shift that maps it onto itself is the diagonal of one square, shorter by
-//   sqrt(2).) A checkerboard and a square grid are told from each other by their harmonics.
+// - checkerboard: two squares along their sides, the distance from a black square to the next one
+//   in its row. (The shortest shift that maps it onto itself is the diagonal of one square, shorter
+//   by sqrt(2).) Their harmonics distinguish a checkerboard from a square grid.
 //
-// `grey` is CV_32F; the pattern may be turned by any angle, has to be seen four times across the
-// frame's shorter side and may be no finer than 2.3 px. Nothing where there is no period: an
-// aperiodic texture, or a pattern so defocused that it may be checkerboard or grid.
+// `grey` is CV_32F. The pattern may have any rotation. It must have at least four periods across
+// the frame's shorter side and a period of at least 2.3 px. Returns std::nullopt where there is no
+// period: for an aperiodic texture, or for a pattern so defocused that it may be checkerboard or
+// grid. Throws Interrupted after a request to stop.
 std::optional<PeriodEstimate> MeasurePeriodPx(const cv::Mat& grey);
 
 }  // namespace thicklens::calib

@@ -11,24 +11,24 @@ namespace {
 
 constexpr std::size_t kFewestTiles = 6;
 constexpr int kRounds = 8;
-constexpr double kCut = 5;  // of Tukey's weights, in standard deviations
-// Shifts are not better than this, whatever their spectra say: interpolation, sampling of the blur.
+constexpr double kCut = 5;  // cut of Tukey's weights, in standard deviations
+// Minimum error of a shift, independent of its spectrum: interpolation and sampling of the blur.
 constexpr double kLeastShiftSigmaPx = 0.002;
-// Tiles overlap, so that neighbours share a part of their errors: of the variance, measured on
-// simulated sweeps.
+// Factor for the variance, because tiles overlap and neighbours share a part of their errors. It
+// was measured on simulated sweeps.
 constexpr double kOverlap = 1.5;
 constexpr double kMedianOfChi2 = 1.386;  // two degrees of freedom
 constexpr double kLeastCondition = 1e-9;
 
-// What a displacement is made of, at one place.
+// The terms of a displacement at one place.
 template <int kParameters>
 using Design = Eigen::Matrix<double, 2, kParameters>;
 using FieldDesign = Design<7>;  // shift, linear map, cubic term
 using RigidDesign = Design<3>;  // shift, turn
 
-// Lengths in units of `unit_px`, so that the columns are of one size. With a weight symmetric about
-// the tile's centre q and of second moment m along each axis, the mean of |p|^2 p over it is
-// (|q|^2 + 4 m) q (derived here, [D59]).
+// Lengths are in units of `unit_px`, so that the columns have similar sizes. With a weight
+// symmetric about the tile's centre q and of second moment m along each axis, the mean of |p|^2 p
+// over the tile is (|q|^2 + 4 m) q (derived here, [D59]).
 FieldDesign FieldDesignAt(const Eigen::Vector2d& place_px, double moment_px2, double unit_px) {
   const Eigen::Vector2d q = place_px / unit_px;
   const Eigen::Vector2d cubic = (q.squaredNorm() + 4 * moment_px2 / (unit_px * unit_px)) * q;
@@ -38,7 +38,7 @@ FieldDesign FieldDesignAt(const Eigen::Vector2d& place_px, double moment_px2, do
   return design;
 }
 
-// The information left where every shift has an error of variance `extra_px2` besides.
+// The remaining information if every shift has an additional error of variance `extra_px2`.
 Eigen::Matrix2d WithScatter(const Eigen::Matrix2d& information, double extra_px2) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(information);
   Eigen::Vector2d values = eigen.eigenvalues().cwiseMax(0);
@@ -56,17 +56,17 @@ template <int kParameters>
 struct Solution {
   Eigen::Matrix<double, kParameters, 1> value;
   Eigen::Matrix<double, kParameters, kParameters> covariance;
-  int tiles = 0;  // that agree with it
+  int tiles = 0;  // tiles that agree with the fit
 };
 
-// Least squares with Tukey's weights and a scatter of the tiles that settles with them.
+// Least squares with Tukey's weights and a scatter of the tiles that converges with them.
 template <int kParameters>
 std::optional<Solution<kParameters>> FitRobustly(const std::vector<TileShift>& shifts,
                                                  const std::vector<Design<kParameters>>& designs) {
   if (shifts.size() < kFewestTiles) return std::nullopt;
   Solution<kParameters> solution;
   std::vector<double> robust(shifts.size(), 1);
-  double scatter_px2 = 0.01;  // wide at first, so that no tile rules by what its spectrum promises
+  double scatter_px2 = 0.01;  // wide at first, so that no tile dominates by its formal error
   double chi2 = 0, dof = 0;
   for (int round = 0; round < kRounds; ++round) {
     decltype(solution.covariance) normal;

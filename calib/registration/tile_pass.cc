@@ -8,15 +8,16 @@
 namespace thicklens::calib {
 namespace {
 
-// Larger fields are shrunk to this: more pixels would cost time and tell nothing more of the scale.
+// Larger fields are shrunk to this size. More pixels would cost time without more information on
+// the scale.
 constexpr int kLargestFieldPx = 640;
-constexpr int kSmallestFieldPx = 96;  // that a field is shrunk to
+constexpr int kSmallestFieldPx = 96;  // minimum size to which a field is shrunk
 constexpr int kTilesAcross = 4;
-constexpr double kTilePart = 0.36;  // of the field's shorter side
-// A picture blurred by this many shrunk pixels holds nothing that shrinking loses.
+constexpr double kTilePart = 0.36;  // relative to the field's shorter side
+// An image blurred by this many shrunk pixels contains no detail that shrinking loses.
 constexpr double kBlurPerShrunkPixel = 1.3;
 
-// Sides of tiles, which have fast transforms.
+// Side of a tile, chosen among sizes with fast transforms.
 int TileSize(int field_px) {
   static constexpr std::array<int, 18> kSizes = {24, 30, 32, 36,  40,  48,  54,  60,  64,
                                                  72, 80, 96, 108, 120, 128, 144, 160, 180};
@@ -27,8 +28,8 @@ int TileSize(int field_px) {
   return size;
 }
 
-// The added blur of the softer picture is put on the sharper one: else what a window cuts off
-// differs between the two, and looks like a shift.
+// Applies the added blur of the more blurred image to the sharper one. Otherwise the parts that a
+// window cuts off would differ between the two, and look like a shift.
 void MatchBlur(double variance_px2, cv::Mat* reference, cv::Mat* frame) {
   const double sigma_px = std::sqrt(std::abs(variance_px2));
   if (!(sigma_px > 0.3)) return;
@@ -51,7 +52,7 @@ std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& fr
       whole;
   const int size = TileSize(std::min(field.width, field.height));
   if (std::min(field.width, field.height) < size + kTilesAcross) return std::nullopt;
-  // What lies around the field is blurred into it.
+  // The margin contains the surroundings, because the blur moves their light into the field.
   const int margin = static_cast<int>(std::ceil(3 * blur_px));
   const cv::Rect region = cv::Rect(field.x - margin, field.y - margin, field.width + 2 * margin,
                                    field.height + 2 * margin) &
@@ -78,7 +79,7 @@ std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& fr
   }
   pass.weight_variance_px2 = phases.weight_variance_px2() * factor * factor;
   pass.agreement = phases.agreement();
-  // What was matched before is added.
+  // The blur matched before is added.
   if (phases.added_variance_px2())
     pass.added_variance_px2 = variance_px2 + *phases.added_variance_px2() * factor * factor;
   return pass;

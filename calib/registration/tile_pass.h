@@ -10,21 +10,23 @@
 
 namespace thicklens::calib {
 
-// The shifts of tiles over the whole of the field that two pictures share.
+// The shifts of tiles over the whole field that two images share.
 struct TilePass {
-  // Beyond the map, in px of full resolution, their centres from the map's.
+  // Shifts beyond the map, in px of full resolution. The tile centres are relative to the centre of
+  // the map.
   std::vector<TileShift> shifts;
-  double weight_variance_px2 = 0;            // second moment of a tile, as TilePhases has it
+  double weight_variance_px2 = 0;            // second moment of a tile, as in TilePhases
   double agreement = 0;                      // correlation, 0 to 1
-  std::optional<double> added_variance_px2;  // what the frame's blur has over the reference's
+  std::optional<double> added_variance_px2;  // blur of the frame minus that of the reference
 };
 
-// With the frame shrunk by `factor`, and with `variance_px2`, what is known so far of the added
-// blur, put on the sharper picture. Nothing where the shared field is too small for tiles.
+// Measures the tiles with the frame shrunk by `factor`. The blur added by `variance_px2`, the
+// present estimate, is applied to the sharper image. Returns std::nullopt where the shared field is
+// too small for tiles.
 std::optional<TilePass> MeasureTiles(const cv::Mat& reference, const cv::Mat& frame,
                                      const FrameMap& map, int factor, double variance_px2);
 
-// By how much to shrink a field: more pixels than that cost time and tell nothing more.
+// Factor by which to shrink a field. More pixels would cost time without more information.
 int TileFactor(double field_px, double blur_px);
 
 }  // namespace thicklens::calib

@@ -9,16 +9,17 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// Below, a slope of the illumination shows; above, the interpolation does.
+// Below this limit a slope of the illumination has an effect; above the next one the interpolation
+// has.
 constexpr double kLowestCyclesPerTile = 2.2;
 constexpr double kHighestFrequency = 0.2;  // cycles per px
-constexpr double kLeastCoherence = 0.1;    // of frequencies that count
-constexpr double kBlurCoherence = 0.2;     // of those that tell the blur
-// Variance of a phase, rad^2, besides what the coherence says.
+constexpr double kLeastCoherence = 0.1;    // minimum coherence of a frequency that counts
+constexpr double kBlurCoherence = 0.2;  // minimum coherence of a frequency that determines the blur
+// Variance of a phase, rad^2, in addition to the part that follows from the coherence.
 constexpr double kPhaseVariance = 1e-3;
-constexpr float kLargestSine = 0.9F;  // of the phase left over
+constexpr float kLargestSine = 0.9F;  // sine of the remaining phase
 constexpr int kFewestFrequencies = 12;
-// Radii, in cycles per px, up to which the first rounds go: their phases are small.
+// Maximum radii of the first rounds, in cycles per px. Their phases are small.
 constexpr float kFirstRounds[] = {0.06F, 0.12F, 0.24F};
 
 }  // namespace
@@ -36,7 +37,7 @@ struct TilePhases::Turns {
     }
   }
 
-  // The cross-spectrum with the shift taken back.
+  // The cross-spectrum with the shift removed.
   void At(const Frequency& k, const Bin& bin, float* real, float* imaginary) const {
     const auto i = static_cast<std::size_t>(k.column), j = static_cast<std::size_t>(k.row);
     const float c = column_cosine[i] * row_cosine[j] - column_sine[i] * row_sine[j];
@@ -94,7 +95,8 @@ void TilePhases::Add(const cv::Mat& reference, const cv::Mat& frame, cv::Point c
   }
   mean_r /= total * total;
   mean_f /= total * total;
-  // Both in one complex transform: the reference as its real part, the frame as its imaginary one.
+  // One complex transform serves both images: the reference is its real part, the frame its
+  // imaginary part.
   cv::Mat both(size_px_, size_px_, CV_32FC2);
   for (int y = 0; y < size_px_; ++y) {
     const float* r = reference.ptr<float>(corner.y + y) + corner.x;
@@ -157,7 +159,7 @@ void TilePhases::Step(std::size_t count, Tile* tile) const {
       static_cast<double>(yy);
   information *= 4 * kPi * kPi;
   const Eigen::Vector2d right(2 * kPi * static_cast<double>(x), 2 * kPi * static_cast<double>(y));
-  // A direction without information stays where it is.
+  // The ridge keeps a direction without information unchanged.
   const Eigen::Matrix2d ridge = 1e-6 * (information.trace() + 1e-30) * Eigen::Matrix2d::Identity();
   tile->shift.shift_px += (information + ridge).inverse() * right;
   tile->shift.information = information / std::max(static_cast<double>(chi2) / (used - 2), 1e-6);
@@ -180,9 +182,9 @@ void TilePhases::SumRings() {
   }
 }
 
-// Of two spectra of coherence c^2, one a filtered copy of the other with noise, a phase has the
-// variance (1/c^2 - 1)/2 times the mean power over the bin's own (derived here [D60]; small
-// variances).
+// For two spectra of coherence c^2, one of which is a filtered copy of the other with noise, a
+// phase has the variance (1/c^2 - 1)/2 times the mean power over the power of the bin (derived here
+// [D60]; small variances).
 void TilePhases::Weigh(Tile* tile) const {
   for (std::size_t i = 0; i < frequencies_.size(); ++i) {
     const Ring& ring = rings_[static_cast<std::size_t>(frequencies_[i].ring)];
@@ -200,8 +202,8 @@ void TilePhases::Weigh(Tile* tile) const {
 
 void TilePhases::Summarise() {
   double cross = 0, frame = 0, reference = 0;
-  // ln |H| = -2 pi^2 V k^2 [D61], over the frequencies that agree well. The part of
-  // F that comes from R is R H, so that noise and what the window cut off do not count.
+  // ln |H| = -2 pi^2 V k^2 [D61], over the frequencies that agree well. The part of F that comes
+  // from R is R H, so that noise and the parts that the window cut off do not count.
   double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, wz = 0, wxz = 0;
   int count = 0;
   for (std::size_t i = 0; i < rings_.size(); ++i) {

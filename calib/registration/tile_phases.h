@@ -9,40 +9,40 @@
 
 namespace thicklens::calib {
 
-// How one tile of a frame lies against the same tile of a reference that was brought to the frame's
-// geometry.
+// Shift of one tile of a frame relative to the same tile of a reference that was brought to the
+// geometry of the frame.
 struct TileShift {
   Eigen::Vector2d centre_px{0, 0};
   Eigen::Vector2d shift_px{0, 0};  // frame(p) shows reference(p - shift)
-  // Inverse covariance of the shift, px^-2. A tile that holds one straight edge has next to none
-  // along it.
+  // Inverse covariance of the shift, px^-2. A tile that contains one straight edge has almost no
+  // information along it.
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
 };
 
-// The shifts of square tiles of two pictures by the phases of their cross-spectra. A blur that is
-// symmetric leaves the phases alone; frequencies where it turns the sign (beyond the first zero of
-// a disc) do not agree and drop out. Gain and offset of the illumination do not matter, a slope
-// only below the lowest frequency used. Shifts of up to 1.5 px or so.
+// Measures the shifts of square tiles of two images by the phases of their cross-spectra. A
+// symmetric blur leaves the phases unchanged; frequencies where it changes the sign (beyond the
+// first zero of a disc) do not agree and are excluded. Gain and offset of the illumination do not
+// matter; a slope matters only below the lowest frequency used. Shifts may be up to about 1.5 px.
 class TilePhases {
  public:
   explicit TilePhases(int size_px);
 
-  // The tiles at `corner` of two pictures of one geometry, CV_32F.
+  // Adds the tiles at `corner` of two CV_32F images of one geometry.
   void Add(const cv::Mat& reference, const cv::Mat& frame, cv::Point corner);
 
-  // A plane through the phases of each tile. Every frequency has the weight that the coherence of
-  // all tiles at its radius gives it: noise counts there, and what the window cuts off a blurred
-  // picture but not off a sharp one. Tiles without texture are left out.
+  // Fits a plane to the phases of each tile. Every frequency has the weight that follows from the
+  // coherence of all tiles at its radius. That accounts for noise, and for the parts that the
+  // window cuts off a blurred image but not off a sharp one. Tiles without texture are left out.
   std::vector<TileShift> Solve();
 
-  // After Solve, over the frequencies that agree at all: the correlation coefficient, 1 where the
-  // pictures differ by a linear filter alone.
+  // Correlation coefficient after Solve, over the frequencies that agree at all; 1 where the images
+  // differ only by a linear filter.
   double agreement() const { return agreement_; }
-  // By how much the frame's blur exceeds the reference's, as the variance of a Gaussian; negative
-  // where the reference is the softer one. Nothing if too few frequencies tell.
+  // Blur of the frame minus that of the reference, as the variance of a Gaussian; negative where
+  // the reference is the more blurred one. It is std::nullopt if too few frequencies determine it.
   std::optional<double> added_variance_px2() const { return added_variance_px2_; }
-  // Second moment about the tile's centre, along one axis, of the weight with which its parts enter
-  // the shift (the square of the window), px^2.
+  // Second moment about the centre of the tile, along one axis, of the weight with which its parts
+  // contribute to the shift (the square of the window), px^2.
   double weight_variance_px2() const { return weight_variance_px2_; }
 
  private:
@@ -57,13 +57,13 @@ class TilePhases {
   };
   struct Tile {
     TileShift shift;
-    std::vector<Bin> bins;  // of frequencies_
+    std::vector<Bin> bins;  // one bin per frequency of frequencies_
   };
   struct Ring {
     double count = 0, cross = 0, frame = 0, reference = 0;
     double Coherence() const;  // squared, 0 where the phases oppose
   };
-  // Of exp(2 pi i k shift) along both axes, for every k of a transform.
+  // exp(2 pi i k shift) along both axes, for every k of a transform.
   struct Turns;
 
   void Step(std::size_t count, Tile* tile) const;
@@ -74,9 +74,9 @@ class TilePhases {
   int size_px_;
   std::vector<float> window_;  // along one axis
   double weight_variance_px2_ = 0;
-  std::vector<Frequency> frequencies_;  // of a half plane, lowest first
+  std::vector<Frequency> frequencies_;  // frequencies of a half plane, lowest first
   std::vector<Tile> tiles_;
-  std::vector<Ring> rings_;  // one cycle per tile wide
+  std::vector<Ring> rings_;  // rings one cycle per tile wide
   double agreement_ = 0;
   std::optional<double> added_variance_px2_;
 };
