@@ -19,7 +19,7 @@ struct Axis {
   int first = 0, count = 0;
   double weight_sum = 0, weight_square_sum = 0;
   Eigen::VectorXf weights;
-  Eigen::MatrixXf waves;  // count x 2 (orders): w cos, w sin in turn
+  Eigen::MatrixXf waves;  // count x 2 (orders): w cos and w sin alternate
 };
 
 std::optional<Axis> MakeAxis(int pixels, double origin_px, double shift_px, double scale,
@@ -86,7 +86,7 @@ std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::V
                                              const FramePlace& place, const TargetWindow& window,
                                              const std::vector<Mode>& modes, std::size_t count) {
   int order_x = 0, order_y = 0;
-  int step = 0;  // the orders asked for are all multiples of it
+  int step = 0;  // common divisor of all requested orders
   for (std::size_t k = 0; k < count; ++k) {
     order_x = std::max(order_x, modes[k].jx);
     order_y = std::max(order_y, std::abs(modes[k].jy));
@@ -110,7 +110,7 @@ std::optional<FrameSpectrum> MeasureSpectrum(const cv::Mat& grey, const Eigen::V
   spectrum.noise_gain =
       x->weight_square_sum * y->weight_square_sum / (total * total * spectrum.mean * spectrum.mean);
 
-  // The mean goes before the sums, not after: what is left of it would be float rounding.
+  // The mean is subtracted before the sums, because a later subtraction would leave float rounding.
   const RowMajor centred = pixels.array() - static_cast<float>(spectrum.mean);
   const Eigen::MatrixXf rows = centred * x->waves;           // y pixels x 2 orders
   const Eigen::MatrixXf sums = y->waves.transpose() * rows;  // 2 orders x 2 orders

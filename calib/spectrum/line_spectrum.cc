@@ -86,7 +86,7 @@ LineSpectrum::Surroundings LineSpectrum::Beside(int kx, int ky) const {
 
 std::optional<Frequency> LineSpectrum::StrongestLine(
     const std::function<bool(const Frequency&)>& wanted) const {
-  constexpr double kLone = 10;  // a random texture's largest is about 3
+  constexpr double kLone = 10;  // the largest value of a random texture is about 3
   constexpr int kTries = 60;
   struct Peak {
     double power;
@@ -130,8 +130,8 @@ Frequency LineSpectrum::Fundamental(Frequency f) const {
   return f;
 }
 
-// Whether the multiples of f/divisor that are none of f stand out, on the average of their
-// logarithms: of noise that is 0 or less.
+// Whether the multiples of f/divisor that are no multiples of f stand out, on the average of their
+// logarithms. For noise that average is 0 or less.
 bool LineSpectrum::HasLinesBetween(const Frequency& f, int divisor) const {
   constexpr double kStandsOut = 1.5;
   double sum = 0;
@@ -154,7 +154,7 @@ double LineSpectrum::LargestNear(int kx, int ky) const {
   return largest;
 }
 
-// The top of a parabola through the logarithms, along each axis.
+// The maximum of a parabola through the logarithms, along each axis.
 Frequency LineSpectrum::Refined(int kx, int ky) const {
   const auto shift = [](double before, double here, double after) {
     const double a = std::log(before), b = std::log(here), c = std::log(after);

@@ -1,4 +1,4 @@
-// What a fit of relative blur has seen of each frame's transfer function, ring by ring.
+// The transfer function of each frame as a fit of relative blur has measured it, ring by ring.
 #include <algorithm>
 #include <cmath>
 #include <complex>

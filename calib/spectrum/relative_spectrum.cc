@@ -16,15 +16,16 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 constexpr int kMostSteps = 30;
-// By how much neighbouring modes, which share a sixth of their noise and of the texture's amplitude
-// (the transform of the squared Hann window), widen the variances of independent ones: (1 +
-// 2/36)^2.
+// Factor by which neighbouring modes widen the variances of independent ones. They share a sixth of
+// their noise and of the texture's amplitude (the transform of the squared Hann window), so that it
+// is (1 + 2/36)^2.
 constexpr double kSharedNoise = 1.114;
-// N is the noise of a complex value; the derivatives see its real part alone.
+// N is the noise of a complex value. The derivatives are affected only by its real part.
 constexpr double kRealPart = 0.5;
 
 // Gauss-Newton with T projected out. Amplitudes (ln g, V) and shifts do not mix in the normal
-// equations: the derivatives of the ones are real multiples of the model, of the others imaginary.
+// equations: the derivatives by the amplitudes are real multiples of the model, and those by the
+// shifts are imaginary.
 class Fit {
  public:
   Fit(const std::vector<SpectrumSample>& samples, std::size_t reference, const TargetWindow& window,
@@ -66,7 +67,8 @@ class Fit {
       result_.message = fmt::format("spectra of {} frames, at least 3 are needed", samples_.size());
       return result_;
     }
-    // The band, the leakage and the noise follow the blur found; three rounds settle them.
+    // The band, the leakage and the noise depend on the fitted blur; three rounds are enough to
+    // converge.
     for (int round = 0; round < 3; ++round) {
       ChooseBands();
       TakeLeakageOut();
@@ -107,7 +109,7 @@ class Fit {
     const double base = state_.variance[static_cast<Eigen::Index>(reference_)];
     for (Eigen::Index i = 0; i < n(); ++i) {
       const auto s = static_cast<std::size_t>(i);
-      // What leaks has the frame's own gain and the shift that is left over.
+      // The leakage has the frame's own gain and the remaining shift.
       Eigen::ArrayXcd leaked =
           leakage_.At(state_.variance[i] - base, static_cast<std::size_t>(Count(i)));
       for (Eigen::Index k = 0; k < leaked.size(); ++k) {
@@ -118,7 +120,7 @@ class Fit {
     }
   }
 
-  // M_i(k) = g_i H_i(k) exp(-2 pi i nu.t_i), with d ln M/dV beside it.
+  // M_i(k) = g_i H_i(k) exp(-2 pi i nu.t_i), and d ln M/dV.
   void Model(const State& state, Eigen::Index i, Eigen::ArrayXcd* model,
              Eigen::ArrayXd* slope) const {
     const double scale = samples_[static_cast<std::size_t>(i)].scale;
@@ -142,7 +144,7 @@ class Fit {
     std::vector<Eigen::ArrayXd> slopes;
   };
 
-  // T by linear least squares at every mode, and what is left.
+  // T by linear least squares at every mode, and the residuals.
   Evaluation Evaluate(const State& state) const {
     Evaluation e;
     e.models.resize(samples_.size());
@@ -198,7 +200,8 @@ class Fit {
     return true;
   }
 
-  // Without the reference's rows: its gain and variance are held, they would only move T.
+  // Solves the equations without the reference's rows: its gain and variance are held, because they
+  // would only change T.
   static Eigen::VectorXd Solved(const Eigen::MatrixXd& normal, const Eigen::VectorXd& gradient,
                                 double damping) {
     Eigen::MatrixXd damped = normal;
@@ -225,8 +228,8 @@ class Fit {
     return next;
   }
 
-  // Of (ln g, V) of every frame: sum over modes of |T|^2 |M|^2/N d d^T within a frame, minus the
-  // projection on T. The lower triangle alone.
+  // Normal matrix of (ln g, V) of every frame: sum over modes of |T|^2 |M|^2/N d d^T within a
+  // frame, minus the projection on T. Only the lower triangle is filled.
   Eigen::MatrixXd AmplitudeNormal(const Evaluation& e, Eigen::VectorXd* gradient) const {
     const Eigen::Index size = 2 * (n() - 1);
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
@@ -257,8 +260,8 @@ class Fit {
     return normal;
   }
 
-  // d M/dt = -2 pi i nu M. The frames' shifts hang together through T only weakly: a step of their
-  // own for each frame converges as well, and nobody asks for their covariance.
+  // d M/dt = -2 pi i nu M. The shifts of the frames are coupled only weakly through T. A separate
+  // step for each frame therefore converges as well, and their covariance is not needed.
   Eigen::Matrix2Xd ShiftSteps(const Evaluation& e) const {
     Eigen::Matrix2Xd steps = Eigen::Matrix2Xd::Zero(2, n());
     for (Eigen::Index i = 0; i < n(); ++i) {
@@ -271,14 +274,16 @@ class Fit {
       const Eigen::Matrix2Xd d = -2 * kPi * nu_.leftCols(c);
       const Eigen::Matrix2Xd weighted = d.array().rowwise() * (model.abs2() * weight).transpose();
       const Eigen::Matrix2d normal = weighted * d.transpose();
-      // Along a lone edge a shift shows nothing: that direction stays where it is.
+      // A shift along a single edge has no effect. The decomposition keeps that direction
+      // unchanged.
       steps.col(i) = normal.completeOrthogonalDecomposition().solve(d * pull.matrix());
     }
     return steps;
   }
 
-  // From the residuals, each by its frame's own degrees of freedom; never far below what the pixel
-  // noise explains in the other frames: a frame that alone holds a mode fits itself.
+  // The noise follows from the residuals, each with its frame's own degrees of freedom. A lower
+  // limit applies, relative to the pixel noise and the other frames, because a frame that alone
+  // contains a mode fits itself.
   void EstimateNoise() {
     Eigen::VectorXd found(n());
     std::vector<double> ratios;
@@ -300,8 +305,9 @@ class Fit {
       noise_[i] = std::max(found[i], 0.5 * typical * expected_noise_[i]);
   }
 
-  // The tails by one Gauss-Newton step, gains, variances and T eliminated: d ln M/d tails = 4 u^2
-  // is real, as those of the amplitudes are. `solve` applies the inverse of their normal matrix.
+  // The tails by one Gauss-Newton step, with gains, variances and T eliminated. d ln M/d tails = 4
+  // u^2 is real, as the derivatives by the amplitudes are. `solve` applies the inverse of their
+  // normal matrix.
   template <typename Solve>
   void FillTails(const Evaluation& e, const Eigen::VectorXd& gradient, const Solve& solve) {
     const Eigen::ArrayXd power = e.texture.abs2();
@@ -343,7 +349,7 @@ class Fit {
       result_.variance_by_tails[i] = -answer[2 * row + 1];
       ++row;
     }
-    // Without defocus, or at one blur alone, nothing tells the shape.
+    // Without defocus, or at one blur alone, the data do not determine the shape.
     if (!(information > 1e-12 * own)) {
       result_.tails = {0, std::numeric_limits<double>::infinity()};
       return;
@@ -357,8 +363,8 @@ class Fit {
     Eigen::VectorXd gradient;
     Eigen::MatrixXd normal = AmplitudeNormal(Evaluate(state_), &gradient);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    // The gains first: what is left of the factor for the variances is that of their own normal
-    // matrix with the gains eliminated.
+    // The gains come first. The remaining factor, that of the variances, is then the factor of
+    // their own normal matrix with the gains eliminated.
     std::vector<Eigen::Index> order;
     for (const Eigen::Index first : {0, 1}) {
       for (Eigen::Index k = first; k < size; k += 2) order.push_back(k);
@@ -372,7 +378,7 @@ class Fit {
       }
     }
     const Eigen::VectorXd full_scale = scale;
-    normal.resize(0, 0);  // matrices of this size are what a long sweep's memory goes to
+    normal.resize(0, 0);  // these matrices need most of the memory of a long sweep
     scaled.diagonal().array() += 1e-12;
     const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(scaled);  // in place
     if (factor.info() != Eigen::Success) {

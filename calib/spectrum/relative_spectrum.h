@@ -11,27 +11,27 @@
 
 namespace thicklens::calib {
 
-// Blur of the frames of a sweep relative to each other [D77], whatever the texture: the windowed
-// spectra of all frames at once are fitted by
-//   G_i(nu) = g_i H_i(nu) exp(-2 pi i nu.t_i) T(nu),
-// T the texture's own spectrum (free at every frequency: variable projection), g_i a gain near 1,
-// t_i a shift that the registration left over, H_i the blur's transfer function:
+// Blur of the frames of a sweep relative to each other [D77], independent of the texture. The
+// windowed spectra of all frames are fitted together by
+//   G_i(nu) = g_i H_i(nu) exp(-2 pi i nu.t_i) T(nu).
+// T is the texture's own spectrum (free at every frequency: variable projection), g_i a gain near
+// 1, t_i a shift that the registration left over, and H_i the transfer function of the blur:
 //   Gaussian: exp(-2 pi^2 V_i |nu|^2);  disc: the lens floor's Gaussian times the disc's.
-// V_i, px^2 of the target: blur variance over scale^2, without the pixel box. T takes up any common
-// blur: V is known up to a constant (Gaussian; a disc's shape would fix it, but the reference's is
-// held there too).
+// V_i, px^2 of the target, is the blur variance over scale^2, without the pixel box. T contains any
+// common blur, so that V is known only up to a constant. (The shape of a disc would determine the
+// constant, but the reference's V is held there, too.)
 
 struct SpectrumSample {
   double scale = 1;
   FrameSpectrum spectrum;
   double pixel_noise = 0;         // standard deviation of a pixel of the frame
-  double start_variance_px2 = 0;  // V, relative to the reference for a Gaussian, else absolute
+  double start_variance_px2 = 0;  // V, relative to the reference for a Gaussian, otherwise absolute
 };
 
 struct RelativeBlurOptions {
   model::Psf psf = model::Psf::kGaussian;
-  // A mode is used in a frame where 2 pi^2 (V - Vmin) nu^2 is below: 2 for a Gaussian; a disc's
-  // first zero is at 1.84, stay well below.
+  // A mode is used in a frame where 2 pi^2 (V - Vmin) nu^2 is below this limit. It is 2 for a
+  // Gaussian. A disc's first zero is at 1.84; its limit must be well below.
   double band = 2;
   double floor_variance_px2 = 0.25;  // disc: sigma^2 of the lens floor, sensor px
 };
@@ -39,17 +39,17 @@ struct RelativeBlurOptions {
 struct RelativeBlur {
   bool done = false;
   std::string message = "not run";
-  Eigen::VectorXd variances_px2;  // V of each sample; the reference keeps its start value
-  Eigen::MatrixXd covariance;     // of V; row and column of the reference are 0
+  Eigen::VectorXd variances_px2;  // V of each sample; that of the reference is held
+  Eigen::MatrixXd covariance;     // covariance of V; 0 in row and column of the reference
   Eigen::VectorXd gains;          // g
   Eigen::Matrix2Xd shifts_px;     // t
   Eigen::VectorXd noise_ratio;    // scatter about the fit over what the pixel noise explains
-  std::vector<int> modes_used;    // of each sample
-  double chi2_per_dof = 0;        // against the pixel noise, all samples
-  // How the shape departs from the family's [D79]: H exp(4 tails u^2), u = 2 pi^2 v nu^2 with v the
-  // defocus alone; the same in all frames, and no change of the second moment. 0: the family
-  // itself; a disc is a Gaussian with -1/24 to the first order. One step of the fit from 0, and how
-  // V answers.
+  std::vector<int> modes_used;    // number of modes of each sample
+  double chi2_per_dof = 0;        // of all samples, relative to the pixel noise
+  // Departure of the shape from the family [D79]: H exp(4 tails u^2), u = 2 pi^2 v nu^2, where v is
+  // the defocus alone. It is the same in all frames and does not change the second moment. 0 is the
+  // family itself; to first order a disc is a Gaussian with -1/24. The value is one step of the fit
+  // from 0; `variance_by_tails` is the response of V.
   model::Estimate tails;
   Eigen::VectorXd variance_by_tails;  // dV/d tails, px^2
   Eigen::ArrayXcd texture;            // T
@@ -63,8 +63,8 @@ RelativeBlur FitRelativeBlur(const std::vector<SpectrumSample>& samples, std::si
 double BlurTransfer(const RelativeBlurOptions& options, double variance_px2, double scale,
                     double nu);
 
-// For the eye: what was measured of H of one sample, averaged over rings of |nu| against the
-// texture that was fitted.
+// Measured H of one sample, for a plot: averaged over rings of |nu|, relative to the fitted
+// texture.
 struct TransferRing {
   double nu = 0;  // cycles per target px
   double measured = 0;
@@ -75,9 +75,9 @@ std::vector<TransferRing> MeasuredTransfer(const SpectrumSample& sample, const R
                                            const std::vector<Mode>& modes,
                                            const WindowLeakage& leakage);
 
-// Of all modes those with the largest power in `power`, up to `most_per_ring` in each of 24 rings
-// of equal width in ln|nu|, so that strongly and weakly blurred frames both keep some. In the order
-// of |nu|.
+// Selects the modes with the largest values in `power` above `least_power`, up to `most_per_ring`
+// in each of 24 rings of equal width in ln|nu|, so that strongly and weakly blurred frames both
+// keep some. The result is in the order of |nu|.
 std::vector<Mode> StrongestModes(const std::vector<Mode>& modes, const Eigen::ArrayXd& power,
                                  const TargetWindow& window, double least_power, int most_per_ring);
 

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kFewestFrames = 5;
-// The window over the largest blur in it: wide where enough frames are left so, else less.
+// Ratio of the window to the largest blur in it: large where enough frames remain, otherwise
+// smaller.
 constexpr double kWindowOverBlur[] = {35, 25, 16};
 constexpr std::size_t kEnoughFrames = 9;
 constexpr double kLonelyGain = 1.25;
@@ -20,13 +21,13 @@ constexpr double kLowestMode = 2.5;         // cycles per window: the Hann windo
 constexpr double kHighestFrequency = 0.33;  // cycles per px of the reference
 constexpr double kHighestInFrame = 0.38;    // cycles per px of any frame
 constexpr double kBandMargin = 3.2;         // 2 pi^2 dV nu^2 up to which modes are measured
-constexpr double kLeakageMargin = 1.4;      // of the largest sigma expected
-// Rotation times field below which it is left in: it blurs by (rotation size)^2/30 px^2, less than
-// resampling the frame would.
+constexpr double kLeakageMargin = 1.4;      // relative to the largest expected sigma
+// Maximum product of rotation and field for which the rotation is not corrected. It blurs by
+// (rotation size)^2/30 px^2, less than resampling the frame would.
 constexpr double kSmallRotationPx = 0.17;
 constexpr double kSignalToNoise = 4;
 
-// What every one of the frames shows of the target, X of its corners.
+// The part of the target that all frames show, as X of its corners.
 struct Box {
   Eigen::Vector2d low{-1e9, -1e9}, high{1e9, 1e9};
 };
@@ -60,7 +61,7 @@ std::size_t ModesInBand(const std::vector<Mode>& modes, const TargetWindow& wind
   return count;
 }
 
-// The rotation taken out about where the frame shows the origin.
+// Removes the rotation about the point where the frame shows the origin.
 cv::Mat Derotated(const cv::Mat& grey, const SpectralMeterSetup& setup, const MeterFrame& frame) {
   if (std::abs(frame.rotation_rad) * std::max(grey.cols, grey.rows) < kSmallRotationPx) return grey;
   const double c = std::cos(frame.rotation_rad), s = std::sin(frame.rotation_rad);
@@ -97,8 +98,8 @@ std::vector<Mode> ChooseModes(const SpectralMeterSetup& setup, const MeterRegion
   return StrongestModes(all, power, region.window, kSignalToNoise * noise, setup.modes_per_ring);
 }
 
-// Frames without which the others would share much more of the target: those that were shifted far
-// aside.
+// Removes the frames without which the others would share much more of the target. They were
+// shifted far aside.
 void DropLonely(const SpectralMeterSetup& setup, std::vector<std::size_t>* frames) {
   const auto smaller_side = [&](const std::vector<std::size_t>& chosen) {
     const Box box = SeenByAll(setup, chosen);
@@ -128,7 +129,7 @@ std::optional<MeterRegion> PlanRegion(const SpectralMeterSetup& setup, double pa
   MeterRegion region;
   for (std::size_t f = 0; f < setup.frames.size(); ++f) region.frames.push_back(f);
   DropLonely(setup, &region.frames);
-  // The frames with the largest blur go one by one: each lets the window grow.
+  // The frames with the largest blur are removed one by one; each removal lets the window grow.
   while (region.frames.size() >= kFewestFrames) {
     const Box box = SeenByAll(setup, region.frames);
     const Eigen::Vector2d size = (box.high - box.low) * part;

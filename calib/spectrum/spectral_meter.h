@@ -13,23 +13,23 @@
 
 namespace thicklens::calib {
 
-// A frame as the meter needs it.
+// The data of a frame that the meter needs.
 struct MeterFrame {
   std::size_t frame = 0;  // index into the sweep
   FramePlace place;       // relative to the reference
   double rotation_rad = 0;
-  double expected_variance_px2 = 0;  // V = sigma^2/scale^2 to be expected, of the target
+  double expected_variance_px2 = 0;  // expected V = sigma^2/scale^2, px^2 of the target
   double pixel_noise = 0;
 };
 
-// A part of the target whose blur is fitted by itself.
+// A part of the target whose blur is fitted separately.
 struct MeterRegion {
   TargetWindow window;
   std::vector<std::size_t>
-      frames;                 // index into SpectralMeterSetup::frames, the reference among them
+      frames;                 // index into SpectralMeterSetup::frames, including the reference
   std::size_t reference = 0;  // index into `frames`
   std::vector<Mode> modes;
-  std::vector<SpectrumSample> samples;  // one a frame
+  std::vector<SpectrumSample> samples;  // one sample per frame
   WindowLeakage leakage;
 };
 
@@ -37,27 +37,28 @@ struct SpectralMeterSetup {
   std::vector<MeterFrame> frames;
   std::size_t reference = 0;  // index into `frames`
   Eigen::Vector2d origin_px{0, 0};
-  Eigen::Vector2d size_px{0, 0};  // of the frames
+  Eigen::Vector2d size_px{0, 0};  // size of the frames
   model::Psf psf = model::Psf::kGaussian;
   int modes_per_ring = 200;
   int threads = 0;
-  std::function<cv::Mat(std::size_t frame)> read_grey;  // by the sweep's index
-  std::function<void()> tick;                           // once a frame
+  std::function<cv::Mat(std::size_t frame)> read_grey;  // argument: index into the sweep
+  std::function<void()> tick;                           // called once per frame
 };
 
-// The largest window that every one of the frames sees, and the frames that keep enough modes in
-// it: sqrt(V - Vmin) below 1/35 of its smaller side, up to 1/16 where too few would be left. `part`
-// and `place` cut a smaller one out: its size in parts of the whole, its middle from -1/2 to 1/2 of
-// the whole. Nothing where fewer than five frames would be left.
+// Plans the largest window that all of its frames see, and selects the frames that keep enough
+// modes in it: sqrt(V - Vmin) is below 1/35 of its smaller side, or up to 1/16 where too few frames
+// would remain. `part` and `place` select a smaller window: its size relative to the whole, and its
+// centre from -1/2 to 1/2 of the whole. Returns std::nullopt where fewer than five frames would
+// remain.
 std::optional<MeterRegion> PlanRegion(const SpectralMeterSetup& setup, double part,
                                       const Eigen::Vector2d& place);
 
-// Reads every frame once and measures its spectrum in every region; frames that a region does not
-// see are dropped from it.
+// Reads every frame once and measures its spectrum in every region. Frames that a region does not
+// see are removed from it.
 void MeasureRegions(const SpectralMeterSetup& setup, std::vector<MeterRegion>* regions);
 
-// A measured region with those of its frames and modes alone for which the predicates hold; `frame`
-// gets an index into SpectralMeterSetup::frames. The reference must be kept.
+// Part of a measured region: only those frames and modes for which the predicates are true. The
+// argument of `frame` is an index into SpectralMeterSetup::frames. The reference must be kept.
 MeterRegion PartOf(const MeterRegion& region, const std::function<bool(std::size_t frame)>& frame,
                    const std::function<bool(const Mode& mode)>& mode);
 

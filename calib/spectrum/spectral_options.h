@@ -6,14 +6,14 @@
 
 namespace thicklens::calib {
 
-// The shape that is not stated.
+// The other shape than the stated one.
 model::Psf OtherPsf(model::Psf psf);
 
-// 2 pi^2 dV nu^2 up to which modes are fitted: below a disc's first zero, and where a Gaussian has
-// not sunk into the noise.
+// Limit of 2 pi^2 dV nu^2 for the fitted modes. It is below the first zero of a disc, and low
+// enough that a Gaussian is still above the noise.
 double UsualBand(model::Psf psf);
 
-// The options that the camera's PSF asks for, at `part` of the usual band.
+// The options for the camera's PSF, with `part` of the usual band.
 RelativeBlurOptions SpectralOptions(model::Psf psf, double floor_variance_px2, double part);
 
 }  // namespace thicklens::calib

@@ -8,8 +8,8 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 
-// [D78] A disc's transfer function of v = (R/2)^2, its variance per axis, and d ln/dv. Analytic
-// through v = 0, so that noise may push v below.
+// [D78] A disc's transfer function of v = (R/2)^2, its variance per axis, and d ln/dv. It is
+// analytic through v = 0, so that noise may make v negative.
 //   D = 2 J1(x)/x, x = 4 pi nu sqrt(v); dD/dv = -(J2(x)/x) 4 pi nu/sqrt(v).
 TransferAndSlope Disc(double v, double nu) {
   const double x2 = 16 * kPi * kPi * nu * nu * v;

@@ -5,15 +5,16 @@
 
 namespace thicklens::calib {
 
-// The blur's transfer function H at one frequency, and d ln H/dV.
+// The transfer function H of the blur at one frequency, and d ln H/dV.
 struct TransferAndSlope {
-  double value = 1, log_slope = 0;  // 1, 1/px^2
+  double value = 1, log_slope = 0;  // units: 1 and 1/px^2
 };
 
-// H of a frame of that scale at |nu|, cycles per target px, for a blur of V px^2 on the target.
-//   Gaussian: exp(-2 pi^2 V nu^2);  disc: the lens floor's Gaussian times the disc's of what V has
-//   beyond it; `floor_variance_px2` is the lens floor's sigma^2 on the sensor, a Gaussian needs
-//   none. Noise may push V, or a disc's part of it, below 0: H goes on smoothly.
+// H of a frame of that scale at |nu|, cycles per target px, for a blur of V px^2 on the target:
+//   Gaussian: exp(-2 pi^2 V nu^2);  disc: the lens floor's Gaussian times the disc's, for the part
+//   of V beyond the floor.
+// `floor_variance_px2` is the sigma^2 of the lens floor on the sensor; a Gaussian does not use it.
+// Noise may make V, or the disc's part of it, negative: H is continued smoothly.
 TransferAndSlope SpectralTransfer(model::Psf psf, double floor_variance_px2, double variance_px2,
                                   double scale, double nu);
 

@@ -1,4 +1,4 @@
-// The choice of the modes that a fit of relative blur is worth making on.
+// The selection of the modes that are worth using in a fit of relative blur.
 #include <algorithm>
 #include <cmath>
 

@@ -25,7 +25,7 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
   if (!(largest_sigma_px > 0)) return;
   step_px_ = largest_sigma_px / (kLeakageNodes - 1);
   const int pad = static_cast<int>(std::ceil(4 * largest_sigma_px));
-  // Only what the window sees, and what the blur brings into it.
+  // Only the part that the window sees is used, and the surroundings that the blur moves into it.
   const cv::Rect part =
       cv::Rect(
           cv::Point(
@@ -40,7 +40,7 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
   const cv::Size size(cv::getOptimalDFTSize(part.width + 2 * pad),
                       cv::getOptimalDFTSize(part.height + 2 * pad));
   cv::Mat padded, transform;
-  // What lies beyond the part is not asked for: borders end in mirrors, not in other pixels.
+  // Pixels beyond the part are not read: the borders are mirrored instead.
   cv::copyMakeBorder(reference(part), padded, pad, size.height - part.height - pad, pad,
                      size.width - part.width - pad, cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
   cv::dft(padded, transform, cv::DFT_COMPLEX_OUTPUT);
@@ -81,7 +81,8 @@ WindowLeakage::WindowLeakage(const cv::Mat& reference, const Eigen::Vector2d& or
   });
 }
 
-// Cubic interpolation between the nodes; even in sigma, so the nodes go on mirrored below 0.
+// Cubic interpolation between the nodes. The function is even in sigma, so that the nodes are
+// mirrored below 0.
 Eigen::ArrayXcd WindowLeakage::At(double variance_px2, std::size_t count) const {
   const auto n = static_cast<Eigen::Index>(count);
   Eigen::ArrayXcd result = Eigen::ArrayXcd::Zero(n);
