@@ -19,7 +19,7 @@ struct FrameScale {
 };
 
 struct FeatureCandidate {
-  EdgeFeature feature;  // in px of the frame
+  EdgeFeature feature;  // px of the frame
   double strength = 0;  // contrast times the root of the length
 };
 

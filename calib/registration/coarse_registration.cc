@@ -18,7 +18,7 @@ constexpr int kAgreementSizePx = 100;
 constexpr int kSmallestFieldPx = 24;  // px of shrunk images
 constexpr int kPadding = 2;
 constexpr int kIterations = 40;
-constexpr double kPrecision = 1e-4;      // of the correlation
+constexpr double kPrecision = 1e-4;      // precision of the correlation
 constexpr double kMinCorrelation = 0.3;  // blur alone may cost that much; later checks are stricter
 // Width of the preference for small shifts, relative to the field.
 constexpr double kLikelyShift = 0.1;

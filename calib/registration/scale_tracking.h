@@ -16,12 +16,14 @@ namespace thicklens::calib {
 // cause an error of one period. Where that fails (a wrong reading), a ladder of scales is tried.
 // `known_offset_mm`, the bench zero if it is given, defines the first prediction. `read_grey`
 // returns the linear grey light of a frame (CV_32F) and is called from several threads; `tick` is
-// called once per frame. The radial distortion that the frames show together is removed from the
-// scales, and its uncertainty is added to their errors.
+// called once for each frame except the reference, from several threads, too. The radial distortion
+// that the frames show together is removed from the scales, and its uncertainty is added to their
+// errors.
 //
 // On a target that looks the same at every scale (ShowsShiftAlone; the edge meter handles a knife
 // edge) the scales are taken from the readings and only shifts are measured. If no offset is known
-// either, only the reference is returned. Such samples have `scale_is_from_reading` set.
+// either, only the reference is returned. All samples of such a target have
+// `scale_is_from_reading` set.
 std::vector<ScaleSample> TrackScale(const FocusSweep& sweep,
                                     const std::function<cv::Mat(std::size_t)>& read_grey,
                                     const std::vector<std::size_t>& frames, std::size_t reference,

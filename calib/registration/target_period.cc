@@ -109,8 +109,9 @@ struct RefinedLattice {
   Eigen::MatrixXd covariance;
 };
 
-// [D67] For every line that stands out, the phase under each window is c + 2 pi (m df1 + n df2) .
-// r. It is linear in the errors of the frequencies, which are solved by least squares with weights
+// [D67] For every line that stands out, the phase under each window is
+//   c + 2 pi (m df1 + n df2) . r.
+// It is linear in the errors of the frequencies, which are solved by least squares with weights
 // |amplitude|^2. The residuals give the covariance.
 std::optional<RefinedLattice> Refine(const cv::Mat& grey, const LineSpectrum& spectrum,
                                      Lattice lattice) {
@@ -184,8 +185,8 @@ enum class Pattern { kGrid, kCheckerboard, kUnclear };
 
 // A checkerboard becomes its negative when it is shifted by the sum of half of its two shortest
 // periods. It therefore has no line at m + n even. A grid has (2, 0), (0, 2), and a dot grid also
-// has (1, 1). Of the odd lines off the axes, (2, 1), a grid has almost nothing, but a checkerboard
-// has them.
+// has (1, 1). A grid has almost no power in the odd lines off the axes, (2, 1), which a
+// checkerboard has.
 Pattern PatternOf(const LineSpectrum& spectrum, const Lattice& lattice) {
   const auto power = [&](std::initializer_list<std::pair<int, int>> lines) {
     double sum = 0;
