@@ -6,17 +6,22 @@
 
 namespace thicklens::estimator {
 
-// The light field of one picture by the functional of EstimateByBlocks on the same two-plane grid
-// and with the same H, D (in the warp form) and L0, but for the whole picture: the minimiser of
+// Estimates the light field of one photograph with the functional of EstimateByBlocks, on the same
+// two-plane grid and with the same H, D (in the warp form) and L0, but for the whole image at once.
+// The solution minimises
 //   |H L - I|^2 + gamma |D L|^2 + mu |L - L0|^2
-// over all rays that land on the picture, by conjugate gradients on
+// over all rays that land on the photograph. Conjugate gradients solve
 //   (H^T H + gamma D^T D + mu Id) L = H^T I + mu L0  [D113]
-// from L0 on, without a matrix. As one block of the picture's size would do, it loses no link but
-// those that leave the picture, and keeps L0 where rays land outside of it. The eigenvalues lie
-// between mu and about 8 gamma + 1 + mu, so that small ridges take many iterations:
-// EstimateFunctional solves what is nearly the same in far fewer.
-// summary->relative_residual is that of this system. Throws Error for options and inputs that do
-// not fit and a memory limit that is too low. The result does not depend on the number of threads.
+// from L0 on, without a matrix. Like a single block of the photograph's size, the solver loses only
+// the links that leave the photograph, and keeps L0 where rays land outside of it.
+//
+// The eigenvalues lie between mu and about 8 gamma + 1 + mu, so small ridges take many iterations;
+// EstimateFunctional solves nearly the same problem in far fewer. summary->relative_residual is
+// that of the system above.
+//
+// Throws Error for options and inputs that do not fit, for a memory limit that is too low, and for
+// iterations that end with a relative residual of 10 or more. The result does not depend on the
+// number of threads.
 model::LightField EstimateOnGrid(const EstimateInput& input, const FunctionalOptions& options,
                                  FunctionalSummary* summary);
 
