@@ -5,15 +5,17 @@
 
 namespace thicklens::estimator {
 
-// Which BLAS this process got, in one line: name, version and settings where it tells them, and the
-// file; "none" if there is no BLAS in it. It is chosen when the program starts: the first library
-// with a dgemm_, and of Debian's libblas.so.3 the one that update-alternatives names.
+// Describes in one line which BLAS this process uses: its name, its version and settings where the
+// library reports them, and its file; "none" if the process has no BLAS. The choice is made when
+// the program starts: it is the first library with a dgemm_, and for Debian's libblas.so.3 the one
+// that update-alternatives names.
 std::string BlasDescription();
 
-// While it lives, OpenBLAS uses one thread for each call: blocks are solved on all cores already,
-// and sums must not be split in another way on another number of cores. The setting is the
-// process's, not the thread's: make one before threads start. The former number comes back at the
-// end. Reference BLAS and Debian's ATLAS need nothing: they have no threads.
+// While an object of this class exists, OpenBLAS uses one thread for each call: the blocks already
+// occupy all cores, and the order of a sum must not depend on the number of cores. The setting
+// belongs to the process, not to the thread, so create the object before threads start. The
+// destructor restores the former number. Reference BLAS and Debian's ATLAS have no threads and need
+// nothing.
 class OneBlasThread {
  public:
   OneBlasThread();
@@ -22,15 +24,18 @@ class OneBlasThread {
   OneBlasThread& operator=(const OneBlasThread&) = delete;
 
  private:
-  int threads_before_ = 0;  // 0: there is nothing to bring back
+  int threads_before_ = 0;  // 0: there is nothing to restore
 };
 
-// From now on OpenBLAS uses one thread for each call, as with OneBlasThread, and the threads that
-// it started when it was loaded, one a core, are ended. Each of them waits for work busily before
-// it sleeps (2^26 to 2^28 ticks of the clock, .03 to .1 s): as long as many an estimate takes, and
-// on the cores that its threads need. To be called before other threads start. The threads are left
-// where memory is so short that they may not have begun: they try forever, and could not be waited
-// for. A program that sets another number later gets new ones. Another BLAS needs nothing.
+// Makes OpenBLAS use one thread for each call from now on, as OneBlasThread does, and ends the
+// threads that OpenBLAS started when it was loaded, one for each core. Each of these threads
+// busy-waits for work before it sleeps (2^26 to 2^28 ticks of the clock, 0.03 to 0.1 s), which is
+// as long as many an estimate takes, and it does so on the cores that the estimate needs.
+//
+// Call this function before other threads start. It leaves the threads alone where memory is so
+// short that they may not have started: such a thread retries forever, and waiting for it would
+// never end. If the program sets another number later, OpenBLAS starts new threads. Another BLAS
+// needs nothing.
 void KeepBlasToOneThread();
 
 }  // namespace thicklens::estimator

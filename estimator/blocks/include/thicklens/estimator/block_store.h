@@ -11,12 +11,12 @@
 
 namespace thicklens::estimator {
 
-// All that the blocks of an estimate depend on, but the program itself. Two runs that agree in it
-// have the same blocks, to the bit.
+// Everything that the blocks of an estimate depend on, except the program itself. Two runs with
+// equal contents have the same blocks, to the bit.
 struct BlockRun {
-  // In the order in which a difference is worth telling, as (name, value).
+  // Settings as (name, value), in the order in which a difference should be reported.
   std::vector<std::pair<std::string, std::string>> settings;
-  // The numbers that are too many for words, as they lie in memory; seen until Begin returns.
+  // Bulk numbers as they lie in memory. The views are valid until Begin returns.
   struct Data {
     std::string name;
     std::vector<std::string_view> bytes;
@@ -25,22 +25,22 @@ struct BlockRun {
   int blocks = 0;
 };
 
-// Radiance of a block's rays, as EstimateByBlocks finds it.
+// Radiance of the rays of one block, as EstimateByBlocks finds it.
 struct SolvedBlock {
   BlockReport report;
-  // One vector a channel, of report.unknowns numbers. The light field holds them as floats: whoever
-  // keeps them need not keep more.
+  // One vector for each channel, of report.unknowns numbers. The light field holds these numbers as
+  // floats, so a store may keep them as floats.
   std::vector<std::vector<double>> channels;
 };
 
-// Keeps the blocks of a long run, so that another run goes on where it was interrupted. What it
-// throws ends the estimate.
+// Keeps the blocks of a long run, so that another run can continue where the first one was
+// interrupted. An exception of a member function ends the estimate.
 class BlockStore {
  public:
   virtual ~BlockStore() = default;
-  // Once, before all blocks.
+  // Called once, before all blocks.
   virtual void Begin(const BlockRun& run) = 0;
-  // From any thread, several at a time. Blocks are numbered row by row.
+  // Find and Keep are called from any thread, several at a time. Blocks are numbered row by row.
   virtual std::optional<SolvedBlock> Find(int block) = 0;
   virtual void Keep(int block, const SolvedBlock& solved) = 0;
 };
