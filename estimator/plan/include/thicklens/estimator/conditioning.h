@@ -8,31 +8,33 @@
 
 namespace thicklens::estimator {
 
-// How well a linear system can be solved, looked at densely: for small pictures, to show and to
+// Conditioning of a linear system, computed from its dense matrix: for small images, to show and to
 // test, not to estimate with.
 struct Conditioning {
   int unknowns = 0;
-  // Of the eigenvalues; of the singular values where the matrix is not symmetric. The smallest is 0
-  // or below where rounding decides it.
+  // Extreme eigenvalues; extreme singular values if the matrix is not symmetric. `smallest` is 0 or
+  // below where rounding decides it.
   double smallest = 0, largest = 0;
-  // |x - x0|/|x0| of a dense Cholesky (LU where not symmetric) of the matrix, rounded to that
-  // precision, with the right side A x0 of a random x0. Absent: the factorisation broke down.
+  // |x - x0|/|x0| for the dense Cholesky factorisation (LU if the matrix is not symmetric) of the
+  // matrix rounded to that precision, with the right-hand side A x0 of a random x0. Absent if the
+  // factorisation broke down.
   std::optional<double> float_error, double_error;
 
-  // largest/smallest; infinite where the smallest is not above 0.
+  // largest/smallest; infinite if `smallest` is not above 0.
   double condition() const;
 };
 
-// Of the system of EstimateByBlocks, the whole picture being one block; gamma, ridge, stencil,
-// splat and fall-off are taken from the options. Throws Error for more than 4000 unknowns (pixels
-// times views), and for inputs that do not fit.
+// Conditioning of the system of EstimateByBlocks with the whole image as one block. The options
+// give gamma, ridge, stencil, splat and fall-off. Throws Error for more than 4000 unknowns (pixels
+// times views), and for options and inputs that do not fit.
 Conditioning ConditioningOfBlock(const EstimateInput& input, const BlockOptions& options);
 
-// [D117] Of Id + H A^-1 H^T, the system of EstimateFunctional in scene-ray form, one unknown a
-// pixel. Its smallest eigenvalue is at least 1, and the largest at most 1 + |H|^2/mu, because A is
-// at least mu. For gamma toward infinity A^-1 tends to the mean over a point's rays over mu, and
-// with mu' = U V mu the largest tends to 1 + |H1|^2/mu', H1 the photograph of points whose rays are
-// equal.
+// Conditioning of Id + H A^-1 H^T, the system of EstimateFunctional in scene-ray form, with one
+// unknown for each pixel [D117]. Its smallest eigenvalue is at least 1, and its largest is at most
+// 1 + |H|^2/mu because A is at least mu. As gamma goes to infinity, A^-1 tends to the mean over the
+// rays of a point, divided by mu. With mu' = U V mu the largest eigenvalue then tends to 1 +
+// |H1|^2/mu', where H1 forms the photograph of points whose rays are equal. Throws Error for more
+// than 4000 pixels, and for options and inputs that do not fit.
 Conditioning ConditioningOfSceneRays(const EstimateInput& input, const FunctionalOptions& options);
 
 }  // namespace thicklens::estimator
