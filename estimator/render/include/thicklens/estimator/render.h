@@ -9,34 +9,43 @@
 
 namespace thicklens::estimator {
 
-// The photograph that the whole aperture would take of the light field, in linear light: the mean
-// of the views with `weights` (V x U, >= 0; the sum need not be 1), each ray where it lands.
-// Views that are not present have no share. Rays carry the irradiance of [S12] in `falloff`,
-// relative to that of a uniform radiance at the principal point; null: none. With UV off the
-// aperture the rays of a view cross it in different places: those that land at a pixel have the
-// weights of `vignetting`, with sum 1 over the views that are present, `weights` being those of the
-// principal point (with ST in the plane of focus); null: `weights` everywhere. Throws Error, too,
-// if a pixel's rays are all outside of the aperture. Without `kernels` it is computed on the
-// processor, vectorised on `threads` of them; the numbers are those of the kernels but for
-// rounding.
+// Forms the photograph that the whole aperture would take of the light field, in linear light: the
+// mean of the views with `weights` (V x U, >= 0; the sum need not be 1), each ray at the pixel
+// where it lands. Absent views do not contribute.
+//
+// With `falloff` (may be null) the rays carry the irradiance of [S12], relative to that of a
+// uniform radiance at the principal point. With UV off the aperture the rays of a view cross the
+// aperture in different places. The rays that land at a pixel then have the weights of
+// `vignetting`, with sum 1 over the present views, and `weights` are those of the principal point
+// (with ST in the plane of focus). If `vignetting` is null, `weights` apply everywhere.
+//
+// If `kernels` is null, the photograph is computed on the processor with `threads` threads and
+// vector instructions; the numbers equal those of the kernels except for rounding. Throws Error for
+// an invalid light field, for weights that do not fit, and if all rays of a pixel are outside of
+// the aperture.
 model::LinearPicture Photograph(const model::LightField& light_field,
                                 const Eigen::ArrayXXd& weights, const model::Camera* falloff,
                                 const Vignetting* vignetting, kernels::Kernels<float>* kernels,
                                 int threads);
 
-// The photograph refocused [D98]: views shifted so that points of that disparity (px per view step)
-// coincide, then averaged with `weights`; bicubic between samples. Where shifts leave a view, the
-// others are averaged; black where they leave all.
+// Refocuses the photograph [D98]: shifts the views so that points of the given disparity (px per
+// view step) coincide, and averages them with `weights`. Interpolation is bicubic between samples.
+// Where the shift moves some views out of the image, the mean is over the others; where it moves
+// all of them out, the result is black. Throws Error for an invalid light field, for weights that
+// do not fit, and for a disparity that is not finite.
 model::LinearPicture Refocus(const model::LightField& light_field, double disparity_u_px,
                              double disparity_v_px, const Eigen::ArrayXXd& weights, int threads);
-// -m of the light field's grid at that depth, per axis; throws Error without a camera.
+// Returns the disparity -m of the light field's grid at a depth from the aperture plane, for each
+// axis, in px per view step. Throws Error without a camera and at the depth of the UV plane.
 Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double depth_mm);
 
-// All views side by side, (0, 0) at the top left, `gap_px` black between them.
+// Returns all views side by side, (0, 0) at the top left, with `gap_px` (>= 0) black pixels between
+// them. Throws Error for an invalid light field.
 model::LinearPicture Mosaic(const model::LightField& light_field, int gap_px);
 
-// Epipolar pictures: row t of all views of the row l of views, one above the other, each
-// `repeat_px` high; or column s of all views of the column k, side by side.
+// Return epipolar-plane images: row t of all views of the view row l, one above the other, each
+// repeated to a height of `repeat_px` (>= 1); or column s of all views of the view column k, side
+// by side. They throw Error for an invalid light field or index.
 model::LinearPicture EpipolarRow(const model::LightField& light_field, int t, int l, int repeat_px);
 model::LinearPicture EpipolarColumn(const model::LightField& light_field, int s, int k,
                                     int repeat_px);
