@@ -7,8 +7,8 @@
 
 namespace thicklens::estimator {
 
-// Views and iterations, counted together, from any thread. Of iterations there may be fewer than
-// expected, or more.
+// Progress over views and iterations, counted together from any thread. There may be fewer or more
+// iterations than expected.
 class IterationProgress {
  public:
   // `report` may be empty, may throw, and must outlive this.
@@ -17,7 +17,7 @@ class IterationProgress {
 
   void Tell() { Advance(0); }
   void Count() { Advance(1); }
-  void CountUpTo(int limit) { Advance(done_ < limit ? 1 : 0); }  // while one thread counts
+  void CountUpTo(int limit) { Advance(done_ < limit ? 1 : 0); }  // for a single counting thread
   void SkipTo(int done) { Advance(std::max(0, done - done_)); }
 
  private:

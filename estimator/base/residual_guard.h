@@ -6,15 +6,15 @@
 
 namespace thicklens::estimator {
 
-// Throws Error if the relative residual [D118] |N x - b|/|b| that iterations ended with is 10 or
-// more, or no number: x = 0 would have been far better, and the light field may be anything. On
-// their way conjugate gradients may well be above 1 with an answer that is better than their start.
-// Below 10 an answer that did not converge is an answer, and its summary says so. `advice`: what
-// helps.
+// Throws Error if the final relative residual [D118] |N x - b|/|b| of the iterations is 10 or more,
+// or NaN: x = 0 would then have been far better, and the light field may be anything. During their
+// iterations conjugate gradients may be above 1 with an iterate that is better than their start.
+// Below 10 an unconverged solution is usable, and its summary reports it. `advice` says how to make
+// the iterations converge.
 void RequireProgress(const std::string& solver, double relative_residual, int iterations,
                      const std::string& advice);
 
-// The larger one; no number is larger than all.
+// Returns the larger residual; NaN counts as larger than every number.
 inline double LargerResidual(double a, double b) { return a >= b || std::isnan(a) ? a : b; }
 
 }  // namespace thicklens::estimator

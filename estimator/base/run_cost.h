@@ -6,15 +6,15 @@
 
 namespace thicklens::estimator {
 
-// What a run has cost so far, for its summary and its limit.
+// Time and memory that a run has used so far, for its summary and its limit.
 constexpr double kBytesPerMib = 1024.0 * 1024.0;
 using Clock = std::chrono::steady_clock;
 double SecondsSince(Clock::time_point start);
-double ResidentBytes();  // of the whole process, now
-// What was freed, but kept for later use, goes back to the system where that is possible and the
-// process holds so much of what it may that it could be missed: to get it back takes time.
+double ResidentBytes();  // resident memory of the whole process, now
+// Returns freed memory that is kept for later use to the system, where the system supports it and
+// the process holds more than StayingBytes. Getting it back takes time.
 void ReturnFreedMemory(const std::optional<double>& limit_mib);
-// So much stays with the process in any case; infinite without a limit.
+// Memory that stays with the process in any case; infinite without a limit.
 double StayingBytes(const std::optional<double>& limit_mib);
 
 }  // namespace thicklens::estimator
