@@ -13,8 +13,8 @@
 namespace thicklens::estimator {
 namespace {
 
-// A function in `scope`, or null. Functions are looked up by name because which BLAS this process
-// has is known at run time alone.
+// Returns a function in `scope`, or null. Functions are looked up by name because the BLAS of this
+// process is known only at run time.
 template <typename Function>
 Function* Find(const char* name, void* scope = RTLD_DEFAULT) {
   return reinterpret_cast<Function*>(::dlsym(scope, name));
@@ -26,7 +26,7 @@ std::string TrueName(const char* file) {
   return failure ? file : path.string();
 }
 
-// The BLAS of a library and what it depends on. Another one may be in the process, too.
+// Names the BLAS of a library and what it depends on. Another BLAS may be in the process as well.
 std::string NameOf(void* library, const std::string& file) {
   if (const auto config = Find<char*()>("openblas_get_config", library)) {
     std::string name = config();  // begins with "OpenBLAS" and the version
@@ -51,7 +51,7 @@ std::string BlasDescription() {
   if (dgemm == nullptr || ::dladdr(dgemm, &known) == 0 || known.dli_fname == nullptr) return "none";
   const std::string file = TrueName(known.dli_fname);
   void* const library = ::dlopen(known.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
-  // Without a library of its own it is in the program.
+  // A BLAS without a library of its own is part of the program.
   const std::string name = NameOf(library == nullptr ? RTLD_DEFAULT : library, file);
   if (library != nullptr) ::dlclose(library);
   return fmt::format("{} ({})", name, file);
@@ -64,7 +64,8 @@ void KeepBlasToOneThread() {
   if (threads == nullptr || set_threads == nullptr) return;
   const int before = threads();
   set_threads(1);
-  // A thread begins by taking so much memory. Where there is as much for all of them each gets it.
+  // A thread starts by allocating this much memory. If there is enough for all threads, each gets
+  // it.
   constexpr std::size_t kBytesOfThread = std::size_t{128} << 20;
   const std::size_t bytes = static_cast<std::size_t>(std::max(1, before)) * kBytesOfThread;
   void* const free = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
@@ -78,7 +79,7 @@ OneBlasThread::OneBlasThread() {
   const auto threads = Find<int()>("openblas_get_num_threads");
   const auto set_threads = Find<void(int)>("openblas_set_num_threads");
   if (threads == nullptr || set_threads == nullptr) return;
-  // To set the number starts the threads of a BLAS that has none, whatever the number is.
+  // Setting the number starts the threads of a BLAS that has none, whatever the number is.
   if (threads() == 1) return;
   threads_before_ = threads();
   set_threads(1);

@@ -27,10 +27,11 @@ namespace {
 
 using kernels::BlockGeometry;
 using kernels::Kernels;
-constexpr int kDefaultBlockPx = 16;  // the source's
+constexpr int kDefaultBlockPx = 16;  // the paper's size
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// The blocks of a picture, row by row; those at the right and lower border may be smaller.
+// Divides an image into blocks, row by row; the blocks at the right and lower border may be
+// smaller.
 std::vector<model::PixelRect> CutInBlocks(int width_px, int height_px, int block_px) {
   std::vector<model::PixelRect> blocks;
   for (int y = 0; y < height_px; y += block_px) {
@@ -41,27 +42,27 @@ std::vector<model::PixelRect> CutInBlocks(int width_px, int height_px, int block
   return blocks;
 }
 
-// Bytes of a block's system beside its factor: patterns of its parts and of their sum, values, the
-// matrix, the solver's 64-bit copy of it; H, D, their transposes and the vectors.
+// Bytes of a block's system besides its factor: the patterns of its parts and of their sum, the
+// values, the matrix, the solver's 64-bit copy of it, H, D, their transposes and the vectors.
 double SystemBytes(const kernels::CsrMatrix<double>& matrix) {
   constexpr double kPerEntry = 3 * 4 + 8 + 12 + 16;
   constexpr double kPerRay = 3 * 12 * 4 + 10 * 8;
   return kPerEntry * static_cast<double>(matrix.entries()) + kPerRay * matrix.rows;
 }
-// What malloc cannot use again between blocks, whose sizes differ, comes on top; measured. UMFPACK
-// tells a bound for the worst pivots, which blocks stay well below.
+// Factor for memory that malloc cannot reuse between blocks of different sizes; measured. UMFPACK
+// reports a bound for the worst pivots, and blocks stay well below it.
 double LeftBetweenBlocks(BlockSolver solver) {
   return solver == BlockSolver::kUmfpack ? 1.1 : 1.35;
 }
-// A thread's stack and heap, and what the BLAS keeps for it.
+// Bytes of a thread's stack and heap, and of what the BLAS keeps for it.
 constexpr double kBytesPerThread = 12 * kBytesPerMib;
 
-// Pixels of the disparity map that a block looks at, in px per view step of the larger step.
+// Disparities of a block in the disparity map, px per view step of the larger step.
 struct BlockSlopes {
   double largest_px = 0;  // |m|
   double range_px = 0;
-  // Taps of the links between neighbouring views that stay in the block: one where m is whole, else
-  // two, none beside an edge of depth. Links make fill.
+  // Taps of the links between neighbouring views that stay in the block: one where m is whole, two
+  // otherwise, none at a depth edge. Links cause fill.
   double taps = 0;
 };
 
@@ -90,20 +91,20 @@ BlockSlopes SlopesIn(const DisparityMap& map, const model::PixelRect& rect) {
   return {std::max(std::abs(least_px), std::abs(most_px)), most_px - least_px, taps};
 }
 
-// What the process will hold at most while blocks of a size are solved on all threads: what it
-// holds now, the whole light field twice (on the device and as the result), and for each block at
-// work its system and the peak of its factorisation.
+// Predicts the maximum memory of the process while blocks of one size are solved on all threads:
+// what it holds now, the whole light field twice (on the device and as the result), and for each
+// block at work its system and the peak of its factorisation.
 class MemoryForecast {
  public:
   MemoryForecast(const RayField& rays, const BlockOptions& options, double ridge, int threads,
                  Kernels<double>* kernels)
       : rays_(rays), options_(options), ridge_(ridge), threads_(threads), kernels_(kernels) {
-    BlockBytes({0, 0, 1, 1});  // a device's programs are held from their first use on
+    BlockBytes({0, 0, 1, 1});  // a device's programs are held after their first use
     held_bytes_ =
         ResidentBytes() + 2.0 * sizeof(float) * static_cast<double>(rays_.prior().values.size());
   }
 
-  // By the structure of the system of the most demanding of a few blocks.
+  // Predicts from the structure of the system of the most demanding of a few blocks.
   double Bytes(int block_px) {
     double largest = 0;
     for (const model::PixelRect& rect : DemandingBlocks(block_px)) {
@@ -113,9 +114,10 @@ class MemoryForecast {
     return held_bytes_ + AtOnce(block_px) * (kBytesPerThread + largest);
   }
 
-  // No more than Bytes, without making a system: what H^T H alone holds, where each ray meets those
-  // of all views that land on its pixel, as matrix and as the solver's copy; and what smaller
-  // blocks were found to need for each pixel, since fill grows faster than their number.
+  // Lower bound of Bytes, without making a system. It combines the bytes of H^T H alone, where each
+  // ray meets the rays of all views that land on its pixel, as a matrix and as the solver's copy,
+  // with the bytes for each pixel that smaller blocks were found to need, since fill grows faster
+  // than the number of pixels.
   double LeastBytes(int block_px) const {
     constexpr double kPerEntry = 12 + 16;
     const double views = static_cast<double>((rays_.input().weights > 0).count());
@@ -135,8 +137,9 @@ class MemoryForecast {
     return std::min<double>(threads_, static_cast<double>(blocks));
   }
 
-  // Of the blocks of full size: the middle, and those of the largest disparity, the largest range
-  // of it and the most links. Fill is not known before the analysis, but goes with these.
+  // Blocks of full size: the middle one, and the ones with the largest disparity, the largest range
+  // of disparities and the most links. Fill is not known before the analysis, but it grows with
+  // these.
   std::vector<model::PixelRect> DemandingBlocks(int block_px) const {
     const EstimateInput& input = rays_.input();
     const int width_px = std::min(block_px, input.picture.width_px);
@@ -183,14 +186,14 @@ class MemoryForecast {
   const int threads_;
   Kernels<double>* kernels_;
   double held_bytes_ = 0;
-  double bytes_per_pixel_ = 0;  // the most of the blocks looked at so far
+  double bytes_per_pixel_ = 0;  // maximum over the blocks analysed so far
 };
 
-// Sizes to choose from: multiples of 2, each about a quarter larger than the one before.
+// Block sizes to choose from: multiples of 2, each about a quarter larger than the one before.
 int NextBlockPx(int block_px) { return std::max(block_px + 2, (block_px * 5 / 4) / 2 * 2); }
 
-// The bytes of blocks of this size, or a number above the limit that they need at least. Systems
-// that could not be held are not made: smaller ones tell how much larger ones need.
+// Returns the bytes of blocks of this size, or a lower bound of them that is above the limit.
+// Systems that would not fit are not made: smaller ones show how much larger ones need.
 double BytesUpTo(double limit, int block_px, int first_px, MemoryForecast* forecast) {
   for (int px = first_px;; px = std::min(2 * px, block_px)) {
     const double least = forecast->LeastBytes(block_px);
@@ -233,13 +236,13 @@ int ChooseBlockPx(const BlockOptions& options, const model::LinearPicture& pictu
   return block_px;
 }
 
-// A thread's own copies of what is used by one thread at a time.
+// A thread's own copies of objects that one thread at a time uses.
 struct Worker {
   std::unique_ptr<Kernels<double>> kernels;
   std::unique_ptr<LinearSolver> solver;
 };
 
-// Hands workers out and takes them back, so that there are as many as threads.
+// Lends workers and takes them back, so that there are as many as threads.
 class Workers {
  public:
   explicit Workers(std::function<Worker()> make) : make_(std::move(make)) {}
@@ -266,12 +269,12 @@ std::string NameOf(const model::PixelRect& rect) {
   return fmt::format("block of {}x{} px at ({}, {})", rect.width, rect.height, rect.x, rect.y);
 }
 
-// Written so that NaN is refused, too.
+// This form also rejects NaN.
 bool IsSolvable(double rcond, const BlockOptions& options) {
   return rcond >= options.rcond_min && rcond > 0 && std::isfinite(rcond);
 }
 
-// Solves one block for all channels and judges the answer.
+// Solves one block for all channels and checks the solution.
 SolvedBlock SolveBlock(const BlockSystem& system, const BlockOptions& options,
                        const model::PixelRect& rect, Worker* worker) {
   worker->solver->Factorize(system.matrix);
@@ -307,7 +310,7 @@ SolvedBlock SolveBlock(const BlockSystem& system, const BlockOptions& options,
   return solved;
 }
 
-// What is told of a run, so that its blocks are not taken for those of another.
+// Description of a run, so that its blocks are not used for another run.
 BlockRun RunOf(const RayField& rays, const BlockOptions& options, const EstimateSummary& summary,
                const std::string& driver, int blocks) {
   const model::LinearPicture& picture = rays.input().picture;
@@ -335,7 +338,7 @@ BlockRun RunOf(const RayField& rays, const BlockOptions& options, const Estimate
   return run;
 }
 
-// Whether a block from a store is what it is taken for. Whoever keeps blocks may have damaged them.
+// Returns whether a block from a store matches its place; the store may have damaged it.
 bool Fits(const SolvedBlock& solved, const BlockGeometry& block, std::size_t channels,
           const BlockOptions& options) {
   const BlockReport& report = solved.report;
@@ -354,7 +357,7 @@ bool Fits(const SolvedBlock& solved, const BlockGeometry& block, std::size_t cha
          });
 }
 
-// A block as the store has it, or nothing.
+// Returns a block from the store, or nothing.
 std::optional<SolvedBlock> FromStore(const BlockOptions& options, int number,
                                      const BlockGeometry& block, int channels) {
   if (options.store == nullptr) return std::nullopt;
@@ -363,7 +366,7 @@ std::optional<SolvedBlock> FromStore(const BlockOptions& options, int number,
   return found;
 }
 
-// Rays that land outside of the picture are in no block: nothing but the prior is known of them.
+// Rays that land outside of the image belong to no block: only their prior is known.
 void KeepPriorBesideThePicture(const BlockGeometry& whole, const model::LightField& prior,
                                std::vector<float>* values) {
   const int width = prior.s_count;
@@ -401,7 +404,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   CheckOptions(given);
   CheckInput(input);
   const bool symmetric = given.stencil == Stencil::kWarp;
-  // Refuses what this build or the stencil does not have.
+  // Throws Error for a solver that this build or the stencil does not have.
   const std::string device_of_solver = NewLinearSolver(given.solver, symmetric)->device();
 
   const auto start = Clock::now();
@@ -409,13 +412,14 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   BlockOptions options = given;
   options.ridge = given.ridge.value_or(1e-2 / static_cast<double>(input.weights.size()));
 
-  // Systems are made in double: a device without it leaves that to the twin.
+  // Systems are made in double; a device without double leaves that to the reference
+  // implementation.
   const bool on_device = backend->has_double();
   std::unique_ptr<Kernels<double>> merging =
       on_device ? backend->NewDouble() : kernels::NewReference<double>();
   RayField rays(input, options.falloff, threads);
-  // Many small factorisations side by side: a BLAS with threads of its own would only be in the
-  // way, and make sums depend on their number.
+  // Many small factorisations run in parallel: a BLAS with threads of its own would compete with
+  // them and make sums depend on the number of threads.
   const OneBlasThread one_blas_thread;
 
   *summary = EstimateSummary();

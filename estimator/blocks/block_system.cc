@@ -21,7 +21,7 @@ using kernels::CsrPattern;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Calls visit(ray, k, l, s, t) for every ray of the block that exists.
+// Calls visit(ray, k, l, s, t) for every existing ray of the block.
 template <typename Visit>
 void ForEachRay(const BlockGeometry& block, const Visit& visit) {
   for (int l = 0; l < block.v_count; ++l) {
@@ -38,7 +38,7 @@ void ForEachRay(const BlockGeometry& block, const Visit& visit) {
   }
 }
 
-// Entry (row, column) of the values of a pattern.
+// Returns the index of the entry (row, column) in the values of a pattern.
 std::size_t EntryOf(const CsrPattern& pattern, int row, int column) {
   const auto begin = pattern.column.begin() + pattern.row_start[Index(row)];
   const auto end = pattern.column.begin() + pattern.row_start[Index(row) + 1];
@@ -55,7 +55,7 @@ void AddMatrix(const CsrMatrix<double>& a, double scale, const CsrPattern& patte
   }
 }
 
-// Pixels of one channel, row by row.
+// Returns the pixels of one channel, row by row.
 std::vector<double> PixelsOf(const model::LinearPicture& picture, const BlockGeometry& block,
                              int channel) {
   std::vector<double> pixels;
@@ -135,7 +135,7 @@ std::vector<BlockRun::Data> RayField::Data() const {
   for (const auto& view : disparity_) depth.bytes.push_back(BytesOf(view));
   BlockRun::Data falloff{"fall-off", {}};
   for (const auto& view : irradiance_) falloff.bytes.push_back(BytesOf(view));
-  // Where rays land goes by the step from view to view, which the prior has.
+  // The landing positions depend on the step from view to view, which the prior knows.
   return {{"picture", {BytesOf(input_.picture.values)}},
           {"aperture",
            {BytesOf(weights.data(), static_cast<std::size_t>(weights.size())),
@@ -153,7 +153,7 @@ BlockSystem MakeBlockSystem(const RayField& rays, const BlockGeometry& block,
 
   const bool warp = options.stencil == Stencil::kWarp;
   const RayField::Slopes slopes = rays.SlopesOf(block, warp);
-  // D with -G = D^T D, or G itself.
+  // This is D with -G = D^T D, or G itself.
   const CsrMatrix<double> smoothness =
       kernels::Compress(warp ? kernels->WarpDifferences(block, slopes.u, slopes.v)
                              : kernels->SixTermMasks(block, slopes.u, slopes.v));

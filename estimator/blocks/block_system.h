@@ -12,24 +12,25 @@
 
 namespace thicklens::estimator {
 
-// What the blocks of one picture share: where the rays of each view land, what they see, and the
-// prior. Read by many threads.
+// Data that the blocks of one photograph share: where the rays of each view land, what they see,
+// and the prior. Many threads read it.
 class RayField {
  public:
-  // `falloff` counts only with a camera.
+  // `falloff` has no effect without a camera.
   RayField(const EstimateInput& input, bool falloff, int threads);
 
   const EstimateInput& input() const { return input_; }
   int u_count() const { return static_cast<int>(input_.weights.cols()); }
   int v_count() const { return static_cast<int>(input_.weights.rows()); }
-  // The picture warped to every view; of radiance, so with the fall-off divided out.
+  // The photograph warped to every view. It is radiance: the fall-off is divided out.
   const model::LightField& prior() const { return prior_; }
   model::LightField TakePrior() && { return std::move(prior_); }
 
   kernels::BlockGeometry Block(int x, int y, int width_px, int height_px) const;
 
-  // m of each ray of the block, samples per view step, in u and in v. With `cut_hidden`, NaN where
-  // the next view does not show the ray's scene point: there is no link between rays of two points.
+  // Slope m of each ray of the block, samples per view step, in u and in v. With `cut_hidden` the
+  // slope is NaN where the next view does not show the scene point of the ray: rays of two points
+  // are not linked.
   struct Slopes {
     std::vector<double> u, v;
   };
@@ -38,14 +39,14 @@ class RayField {
   // Relative irradiance of each ray of the block; empty without fall-off.
   std::vector<double> IrradianceOf(const kernels::BlockGeometry& block) const;
 
-  // All of the above and the input, for who tells runs apart; valid as long as this is.
+  // All of the data above and the input, to distinguish runs; valid as long as this object.
   std::vector<BlockRun::Data> Data() const;
 
  private:
   const EstimateInput& input_;
-  // Of each view's samples; before prior_, which is made together with it.
+  // Disparity of each view's samples. It is declared before prior_, which is made together with it.
   std::vector<std::vector<float>> disparity_;
-  std::vector<std::vector<float>> irradiance_;  // of each view's samples; empty without fall-off
+  std::vector<std::vector<float>> irradiance_;  // for each view's samples; empty without fall-off
   model::LightField prior_;
 };
 
@@ -53,10 +54,10 @@ class RayField {
 struct BlockSystem {
   kernels::BlockGeometry block;
   kernels::CsrMatrix<double> matrix;             // H^T H - gamma G + mu Id
-  std::vector<std::vector<double>> right_sides;  // H^T I + mu L0, one a channel
-  std::vector<std::vector<double>> starts;       // L0, the same
+  std::vector<std::vector<double>> right_sides;  // H^T I + mu L0, one for each channel
+  std::vector<std::vector<double>> starts;       // L0, one for each channel
 };
-// Unknowns that are no rays of the light field get the equation x = 0.
+// Makes the system of a block. Unknowns that are no rays of the light field get the equation x = 0.
 BlockSystem MakeBlockSystem(const RayField& rays, const kernels::BlockGeometry& block,
                             const BlockOptions& options, double ridge,
                             kernels::Kernels<double>* kernels);

@@ -12,7 +12,7 @@ namespace thicklens::estimator {
 namespace {
 
 using kernels::CsrMatrix;
-// By rows, as the products of the iterations run through them.
+// Rows first, because the products of the iterations run through the rows.
 using RowMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor, std::int64_t>;
 
 template <typename Iterations>
@@ -37,7 +37,8 @@ class EigenMethod : public IterativeMethod {
     solver_.setMaxIterations(max_iterations);
     const Eigen::VectorXd x =
         solver_.solve(Eigen::Map<const Eigen::VectorXd>(b.data(), matrix_.rows()));
-    // A pass counts, so that a method that does nothing does not do it for ever.
+    // Each pass counts at least one iteration, so that a method that does nothing cannot run
+    // forever.
     *iterations += std::max(1, static_cast<int>(solver_.iterations()));
     return {x.data(), x.data() + x.size()};
   }

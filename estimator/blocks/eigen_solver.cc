@@ -16,7 +16,7 @@ namespace {
 using kernels::CsrMatrix;
 using EigenMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, std::int64_t>;
 
-// Rows become columns: the transpose.
+// Returns the transpose: rows become columns.
 EigenMatrix TransposedEigen(const CsrMatrix<double>& matrix) {
   std::vector<std::int64_t> index(matrix.column.begin(), matrix.column.end());
   return Eigen::Map<const EigenMatrix>(matrix.rows, matrix.columns, matrix.entries(),
@@ -65,8 +65,9 @@ class EigenCholeskySolver : public LinearSolver {
 class EigenLuSolver : public LinearSolver {
  public:
   double PredictBytes(const CsrMatrix<double>& matrix) override {
-    // SparseLU tells no fill before it is made. Its ordering is for A^T A, whose Cholesky factor
-    // bounds those of A; that of A^T + A, twice for L and U, is what it comes to here.
+    // SparseLU reports no fill before it factorises. Its ordering is for A^T A, whose Cholesky
+    // factor bounds the factors of A; here the factor of A^T + A, counted twice for L and U,
+    // predicts the fill.
     EigenMatrix pattern = TransposedEigen(matrix);
     EigenMatrix symmetric = EigenMatrix(pattern.transpose()) + pattern;
     for (double& value : Eigen::Map<Eigen::ArrayXd>(symmetric.valuePtr(), symmetric.nonZeros())) {

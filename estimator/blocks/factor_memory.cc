@@ -23,7 +23,7 @@ void* TakeZerosHere(std::size_t count, std::size_t bytes) {
   if (of_this_thread == nullptr) return std::calloc(count, bytes);
   std::size_t all = 0;
   if (__builtin_mul_overflow(count, bytes, &all)) return nullptr;
-  // Of the system's, which knows what is zero already, where it is small.
+  // Small pieces come from the system, which knows which memory is already zero.
   if (all < FactorMemory::kSmallest) return std::calloc(count, bytes);
   void* const piece = of_this_thread->Take(all);
   return piece == nullptr ? nullptr : std::memset(piece, 0, all);
@@ -42,7 +42,7 @@ void GiveHere(void* piece) {
   }
 }
 
-// Once, unless somebody has functions of their own in place.
+// Installs the functions once, unless functions of another owner are in place.
 void Install() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -106,7 +106,8 @@ std::optional<void*> FactorMemory::TakeKept(std::size_t bytes) {
     kept_.erase(best);
     return start;
   }
-  // What is too small now will be so again: kept with what comes in its place, it would add up.
+  // A piece that is too small now will be too small again: kept beside its successors, it would add
+  // up.
   FreeFrom(std::partition(kept_.begin(), kept_.end(),
                           [&](const Piece& piece) { return piece.bytes >= bytes; }));
   return std::nullopt;
@@ -130,7 +131,7 @@ void* FactorMemory::Take(std::size_t bytes) {
 void* FactorMemory::Resize(void* piece, std::size_t bytes) {
   if (piece == nullptr) return Take(bytes);
   const std::size_t now = ::malloc_usable_size(piece);
-  // The end of the piece is not given back: it is wanted again.
+  // The end of the piece is not returned, because it will be needed again.
   if (now >= kSmallest && bytes <= now) return piece;
   if (bytes >= kSmallest) {
     if (const auto kept = TakeKept(bytes)) {
@@ -139,7 +140,7 @@ void* FactorMemory::Resize(void* piece, std::size_t bytes) {
       return *kept;
     }
   }
-  // The system moves pages, where two pieces and a copy would be twice as much.
+  // The system moves pages; two pieces and a copy would take twice the memory.
   return OfTheSystem([&] { return std::realloc(piece, bytes); });
 }
 

@@ -7,11 +7,11 @@
 
 namespace thicklens::estimator {
 
-// What SuiteSparse gives back after one factorization, kept for the next one of the same solver.
-// UMFPACK takes its fronts from the system for each matrix anew, and the pages that come with them:
-// where page faults are dear, as in virtual machines, they are more than half of its time.
+// Keeps the memory that SuiteSparse frees after one factorisation for the next one of the same
+// solver. For each matrix UMFPACK allocates its fronts from the system again, with new pages; where
+// page faults are expensive, as in virtual machines, they take more than half of its time.
 //
-// For one thread at a time.
+// Use an object in one thread at a time.
 class FactorMemory {
  public:
   FactorMemory() = default;
@@ -19,10 +19,11 @@ class FactorMemory {
   FactorMemory(const FactorMemory&) = delete;
   FactorMemory& operator=(const FactorMemory&) = delete;
 
-  // While it lives, what SuiteSparse takes and gives back in this thread goes through the memory:
-  // pieces below kSmallest bytes to and from the system, as all do elsewhere. They are the system's
-  // own, so that what was taken inside may be given back outside, and the other way round. Does
-  // nothing where SuiteSparse has been given functions of somebody else's.
+  // While an object of this class exists, the allocations of SuiteSparse in this thread go through
+  // the memory. Pieces below kSmallest bytes come from and go to the system, as all pieces do
+  // elsewhere. All pieces are the system's own, so a piece taken inside may be freed outside, and
+  // the other way round. The class does nothing if SuiteSparse already has allocation functions of
+  // another owner.
   class Use {
    public:
     explicit Use(FactorMemory* memory);
@@ -35,12 +36,12 @@ class FactorMemory {
   };
 
   static constexpr std::size_t kSmallest = 64 * 1024;
-  // A piece serves what needs at least a quarter of it.
+  // A kept piece may serve a request for at least a quarter of its size.
   static constexpr std::size_t kMostSpare = 4;
 
   std::size_t kept_bytes() const;
 
-  // As malloc, realloc and free.
+  // These functions act as malloc, realloc and free.
   void* Take(std::size_t bytes);
   void* Resize(void* piece, std::size_t bytes);
   void Give(void* piece);
@@ -51,9 +52,10 @@ class FactorMemory {
     std::size_t bytes;
   };
 
-  // The smallest piece that fits; absent: none does, and those that are too small are gone.
+  // Returns the smallest kept piece that fits. Absent if none fits; the pieces that are too small
+  // are then freed.
   std::optional<void*> TakeKept(std::size_t bytes);
-  // Once more without what is kept, where there is no memory.
+  // Asks the system; if it has no memory, frees the kept pieces and asks once more.
   template <typename Ask>
   void* OfTheSystem(const Ask& ask);
   void FreeFrom(std::vector<Piece>::iterator first);

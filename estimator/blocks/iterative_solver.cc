@@ -9,7 +9,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// b - A x.
+// Returns b - A x.
 std::vector<double> ResidualOf(const kernels::CsrMatrix<double>& a, const std::vector<double>& x,
                                const std::vector<double>& b) {
   std::vector<double> residual = b;
@@ -36,7 +36,8 @@ IterativeSolver::IterativeSolver(std::unique_ptr<IterativeMethod> method,
 
 double IterativeSolver::PredictBytes(const kernels::CsrMatrix<double>& matrix) {
   constexpr double kPerEntry = sizeof(double) + sizeof(std::int32_t);  // the copy kept here
-  constexpr double kVectors = 12;  // of a method, and the residual, the solution and its update
+  // vectors of a method, and the residual, the solution and its update
+  constexpr double kVectors = 12;
   return method_->BytesOf(matrix) + kPerEntry * static_cast<double>(matrix.entries()) +
          kVectors * sizeof(double) * matrix.rows;
 }
@@ -57,8 +58,8 @@ std::vector<double> IterativeSolver::SolveFrom(std::vector<double> start,
   std::vector<double> residual = ResidualOf(matrix_, x, b);
   double left = Norm(residual);
   const double goal = limits_.tolerance * Norm(b);
-  // What a method calls done may be more than it is: the next pass is asked for half, and after one
-  // that changed too little for a tenth.
+  // The true residual may be larger than the one that a method reports: the next pass aims at half
+  // of the goal, and a pass after too little progress at a tenth of that.
   double share = 1;
   constexpr double kProgress = 0.9;
   constexpr int kMostIdlePasses = 3;
@@ -70,7 +71,7 @@ std::vector<double> IterativeSolver::SolveFrom(std::vector<double> start,
     for (std::size_t i = 0; i < x.size(); ++i) next[i] += update[i];
     std::vector<double> next_residual = ResidualOf(matrix_, next, b);
     const double next_left = Norm(next_residual);
-    // Written so that what is not finite counts as no progress.
+    // This form treats values that are not finite as no progress.
     if (next_left < kProgress * left) {
       idle_passes = 0;
       share = std::min(share, 0.5);

@@ -10,24 +10,24 @@
 
 namespace thicklens::estimator {
 
-// A library's iterations toward A x = b, with the library's own idea of when they are done.
+// The iterations of a library toward A x = b, with the library's own stopping rule.
 class IterativeMethod {
  public:
   virtual ~IterativeMethod() = default;
-  // Bytes it keeps of a matrix, beside a few vectors.
+  // Bytes that the method keeps for a matrix, besides a few vectors.
   virtual double BytesOf(const kernels::CsrMatrix<double>& matrix) const = 0;
   virtual void SetMatrix(const kernels::CsrMatrix<double>& matrix) = 0;
-  virtual std::string device() const { return {}; }  // as LinearSolver's
-  // From x = 0 until the residual is `tolerance` of |b|, or `max_iterations` are done; adds those
-  // that were to `iterations`.
+  virtual std::string device() const { return {}; }  // as LinearSolver::device
+  // Iterates from x = 0 until the residual is `tolerance` times |b| or `max_iterations` are done.
+  // Adds the number of iterations to `iterations`.
   virtual std::vector<double> Run(const std::vector<double>& b, double tolerance,
                                   int max_iterations, int* iterations) = 0;
 };
 
-// Does not believe a method when it says that it is done: recomputes the residual, and has it
-// iterate on what is left, until the residual is as small as asked for, the limit of iterations is
-// reached, or nothing gets better any more: what it leaves is never worse than its start. (Eigen's
-// BiCGSTAB reports success always, and ViennaCL's BiCGStab leaves before the update that made the
+// Recomputes the residual instead of relying on the stopping rule of the method, and lets the
+// method iterate on the remaining residual, until the residual is as small as requested, the limit
+// of iterations is reached, or nothing improves. The result is never worse than the start. (Eigen's
+// BiCGSTAB always reports success, and ViennaCL's BiCGStab returns before the update that made the
 // residual small.)
 class IterativeSolver : public LinearSolver {
  public:

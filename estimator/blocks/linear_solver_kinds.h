@@ -7,17 +7,17 @@
 
 namespace thicklens::estimator {
 
-// What NewLinearSolver chooses from. Those of SuiteSparse and ViennaCL are there only in builds
-// that have these.
+// Solvers that NewLinearSolver chooses from. The solvers of SuiteSparse and ViennaCL exist only in
+// builds that include these libraries.
 std::unique_ptr<LinearSolver> NewUmfpackSolver();
 std::unique_ptr<LinearSolver> NewCholmodSolver();
-// Simplicial Cholesky; LU of a matrix that is not symmetric.
+// Simplicial Cholesky, or LU for a matrix that is not symmetric.
 std::unique_ptr<LinearSolver> NewEigenSolver(bool symmetric);
-// Conjugate gradients (of a symmetric matrix) and BiCGSTAB of Eigen, preconditioned by the
-// diagonal.
+// Conjugate gradients (for a symmetric matrix) and BiCGSTAB of Eigen, with a diagonal
+// preconditioner.
 std::unique_ptr<LinearSolver> NewEigenCgSolver(const IterationLimits& limits);
 std::unique_ptr<LinearSolver> NewEigenBicgstabSolver(const IterationLimits& limits);
-// BiCGStab of ViennaCL on the OpenCL device it chooses, without a preconditioner.
+// BiCGStab of ViennaCL, without a preconditioner, on the OpenCL device that ViennaCL chooses.
 std::unique_ptr<LinearSolver> NewViennaClSolver(const IterationLimits& limits);
 
 }  // namespace thicklens::estimator

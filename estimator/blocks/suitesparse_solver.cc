@@ -1,4 +1,4 @@
-// UMFPACK and CHOLMOD, which are (in part) under the GPL: left out of builds without it.
+// UMFPACK and CHOLMOD are (in part) under the GPL; builds without GPL leave this file out.
 #include <cholmod.h>
 #include <fmt/format.h>
 #include <umfpack.h>
@@ -20,8 +20,8 @@ using kernels::CsrMatrix;
 using Long = SuiteSparse_long;
 static_assert(sizeof(Long) == sizeof(std::int64_t), "the 64-bit interfaces are meant");
 
-// UMFPACK reads compressed columns: our rows are the columns of the transpose, which it solves
-// with as UMFPACK_At.
+// UMFPACK reads compressed columns: our rows are the columns of the transpose, and UMFPACK_At
+// solves with the transpose.
 class UmfpackSolver : public LinearSolver {
  public:
   UmfpackSolver() {
@@ -106,7 +106,7 @@ class CholmodSolver : public LinearSolver {
     common_.print = 0;
     common_.nmethods = 1;
     common_.method[0].ordering = CHOLMOD_AMD;
-    // L L^T also where there are no supernodes: L D L^T would take negative pivots without a word.
+    // L L^T is used also without supernodes: L D L^T would accept negative pivots silently.
     common_.final_ll = 1;
     common_.quick_return_if_not_posdef = 1;
   }
@@ -119,11 +119,11 @@ class CholmodSolver : public LinearSolver {
 
   double PredictBytes(const CsrMatrix<double>& matrix) override {
     Analyse(matrix);
-    // Supernodes store zeros too, and one frontal matrix at a time is assembled beside them.
+    // Supernodes also store zeros, and one frontal matrix at a time is assembled beside them.
     const double stored = factor_->is_super != 0 ? static_cast<double>(factor_->xsize) +
                                                        static_cast<double>(factor_->maxcsize)
                                                  : 2 * common_.lnz;
-    // A permuted copy of a triangle of the matrix is made on the way.
+    // A permuted copy of a triangle of the matrix is made as well.
     constexpr double kPerEntry = sizeof(double) + sizeof(Long);
     return stored * sizeof(double) + kPerEntry * static_cast<double>(matrix.entries());
   }
@@ -169,7 +169,7 @@ class CholmodSolver : public LinearSolver {
     Check("analysis");
   }
 
-  // Rows of a symmetric matrix are its columns.
+  // The rows of a symmetric matrix are its columns.
   cholmod_sparse View() {
     cholmod_sparse view{};
     view.nrow = view.ncol = rows_;

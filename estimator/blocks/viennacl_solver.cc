@@ -1,5 +1,5 @@
-// BiCGStab of ViennaCL, what the source's third solver was: a comparator, in builds with
-// THICKLENS_WITH_VIENNACL alone.
+// BiCGStab of ViennaCL, the paper's third solver: a solver for comparison, only in builds with
+// THICKLENS_WITH_VIENNACL.
 #define VIENNACL_WITH_OPENCL
 
 #include <algorithm>
@@ -29,7 +29,7 @@ std::mutex& OneAtATime() {
   return mutex;
 }
 
-// Objects of ViennaCL are handed to the device and back by this.
+// Runs an action that moves objects of ViennaCL to the device and back.
 template <typename Action>
 auto OnDevice(const char* step, const Action& action) {
   const std::lock_guard<std::mutex> lock(OneAtATime());
@@ -54,7 +54,7 @@ class ViennaClMethod : public IterativeMethod {
                     [] { return "viennacl on opencl: " + viennacl::ocl::current_device().name(); });
   }
 
-  // What the device's runtime and programs hold is there from the first use on, which this is.
+  // The first use allocates the device's runtime and programs; this solve is the first use.
   double BytesOf(const CsrMatrix<double>& matrix) const override {
     static std::once_flag once;
     std::call_once(once, [] { ViennaClMethod().SolveOnce(); });
@@ -107,8 +107,8 @@ class ViennaClMethod : public IterativeMethod {
   std::unique_ptr<viennacl::compressed_matrix<double>> matrix_;
 };
 
-// ViennaCL opens a device whether its driver works or not. Before it does, devices are tried in
-// child processes; later that would be too late for all of this process: a child of one that uses
+// ViennaCL opens a device whether its driver works or not. Devices are therefore tried in child
+// processes first. Later it would be too late for the whole process: a child of a process that uses
 // OpenCL waits for threads that it does not have.
 void RequireDevice() {
   static std::once_flag once;
