@@ -14,24 +14,25 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kPacket = AperturePrior<float>::kPacket;
-// Points of one call of ParallelFor.
+// Number of points for one call of ParallelFor's work.
 constexpr std::size_t kChunk = 256 * kPacket;
-constexpr int kMostSamples = 64;  // of an axis
+constexpr int kMostSamples = 64;  // along an axis
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// DCT-II of one axis, orthonormal. Even functions need the sums of the samples at the same distance
-// from the middle only, odd ones the differences: `values` are count x (count + 1)/2.
+// Orthonormal DCT-II of one axis. Even functions need only the sums of the samples at the same
+// distance from the middle, odd ones only the differences: `values` has count x (count + 1)/2
+// numbers.
 template <typename Real>
 struct Transform {
   int count;
   const Real* values;
 };
 
-// The loops. kCount: the count of samples where it is known to the compiler, which then keeps them
-// in registers; else 0.
+// The loops. kCount is the count of samples where the compiler knows it and keeps the samples in
+// registers; otherwise it is 0.
 
-// x in place, kLanes points, `stride` from sample to sample.
+// Transforms x in place, kLanes points, `stride` from sample to sample.
 template <int kCount, typename Real>
 inline __attribute__((always_inline)) void Forward(const Transform<Real>& transform,
                                                    std::ptrdiff_t stride, Real* x) {

@@ -6,23 +6,23 @@
 
 namespace thicklens::estimator {
 
-// A = gamma D^T D + mu over the U x V aperture samples of one scene point, D the differences of
-// neighbouring samples across and down, ends free. Its eigenvectors are those of the discrete
-// cosine transform (DCT-II), to
+// A = gamma D^T D + mu over the U x V aperture samples of one scene point. D takes the differences
+// of neighbouring samples across and down, with free ends. The eigenvectors of A are those of the
+// discrete cosine transform (DCT-II), with the eigenvalues
 //   gamma (4 sin^2(pi i/(2 U)) + 4 sin^2(pi j/(2 V))) + mu;
 // derived here [D116]: a difference with free ends is one of a sequence that is mirrored at its
 // ends.
 template <typename Real>
 class AperturePrior {
  public:
-  // gamma >= 0, mu > 0. Throws Error for more than 64 samples of an axis.
+  // gamma >= 0, mu > 0. Throws Error for more than 64 samples along an axis.
   AperturePrior(int u_count, int v_count, double gamma, double mu);
 
-  // Points that are done together: counts and strides of planes are multiples of this.
+  // Number of points processed together: counts and strides of planes are multiples of it.
   static constexpr std::size_t kPacket = 16;
 
-  // x = A^-1 x for every point of planes (row by row of the aperture) that are `stride` numbers
-  // apart. The same bits for any number of threads.
+  // Sets x = A^-1 x for every point of planes (row by row of the aperture) that are `stride`
+  // numbers apart. The bits of the result do not depend on the number of threads.
   void ApplyInverse(std::size_t points, std::size_t stride, int threads, Real* planes);
 
  private:

@@ -6,8 +6,8 @@
 
 namespace thicklens::estimator {
 
-// How far beside a shape, px, a sample still belongs to it: more than the rounding of disparities
-// in float, so that samples on the outer border are not lost.
+// Distance from a shape, px, within which a sample still belongs to it. It is larger than the
+// rounding of float disparities, so that samples on the outer border are not lost.
 constexpr float kEdgeTolerancePx = 1e-5F;
 
 // A corner of a cell as seen from a sample.
@@ -16,10 +16,10 @@ struct Corner {
   float disparity;
 };
 
-// Numbers in, numbers out: unlike std::min, loops of these become vector instructions.
+// These functions take and return values: unlike std::min, their loops become vector instructions.
 inline __attribute__((always_inline)) float Least(float a, float b) { return a < b ? a : b; }
 inline __attribute__((always_inline)) float Most(float a, float b) { return a > b ? a : b; }
-// A number from 0 to `last`, whatever x is.
+// Clamps to a number from 0 to `last`, whatever x is.
 inline __attribute__((always_inline)) std::int32_t Cut(float x, std::int32_t last) {
   return static_cast<std::int32_t>(Most(Least(x, static_cast<float>(last)), 0));
 }
@@ -29,22 +29,22 @@ inline __attribute__((always_inline)) float Edge(const Corner& p, const Corner& 
   return p.x * q.y - q.x * p.y;
 }
 
-// The disparity at the sample, interpolated linearly in one of the two triangles on both sides of
-// the diagonal from the top left (00) to the bottom right corner; -infinity if it is outside of
-// them. Neither triangle may be turned over or seen edge-on.
+// Returns the disparity at the sample, interpolated linearly in one of the two triangles on both
+// sides of the diagonal from the top left (00) to the bottom right corner, or -infinity if the
+// sample is outside of them. Neither triangle may be flipped or degenerate.
 inline __attribute__((always_inline)) float CellDisparity(const Corner& p00, const Corner& p10,
                                                           const Corner& p01, const Corner& p11) {
   const float beside_diagonal = Edge(p00, p11);
   const bool above = beside_diagonal <= 0;
   const Corner p{above ? p10.x : p01.x, above ? p10.y : p01.y,
                  above ? p10.disparity : p01.disparity};
-  // Each share is twice the area of the triangle that the sample spans with the opposite edge.
+  // Each weight is twice the area of the triangle that the sample spans with the opposite edge.
   const float edge_00 = Edge(p, p11);
   const float edge_11 = Edge(p00, p);
   const float share_00 = above ? edge_00 : -edge_00;
   const float share_11 = above ? edge_11 : -edge_11;
   const float share_p = above ? -beside_diagonal : beside_diagonal;
-  // Never extrapolated.
+  // The clamped weights keep the disparity from being extrapolated.
   const float inside_00 = Most(share_00, 0);
   const float inside_11 = Most(share_11, 0);
   const float disparity = p00.disparity + (share_p * (p.disparity - p00.disparity) +
@@ -54,15 +54,16 @@ inline __attribute__((always_inline)) float CellDisparity(const Corner& p00, con
                                                         : -std::numeric_limits<float>::infinity();
 }
 
-// A row of pixels: where they stand, px from the pixel in the centre view, and their disparity.
+// A row of pixels: their positions in the view, px from the pixel in the centre view, and their
+// disparities.
 struct Corners {
   const float* offset_x;
   const float* offset_y;
   const float* disparity;
 };
 
-// Of the cell between the pixels x and x + 1 of two rows at the sample (dx, dy) from its top left
-// pixel.
+// Disparity of the cell between the pixels x and x + 1 of two rows, at the sample (dx, dy) from its
+// top left pixel.
 inline __attribute__((always_inline)) float CellDisparity(const Corners& upper,
                                                           const Corners& lower, std::int32_t x,
                                                           float dx, float dy) {
@@ -75,8 +76,9 @@ inline __attribute__((always_inline)) float CellDisparity(const Corners& upper,
       {lower.offset_x[x + 1] - dx_right, lower.offset_y[x + 1] - dy_lower, lower.disparity[x + 1]});
 }
 
-// Of a row of pixels, whole numbers: the first sample that is not left of (above) the pixel's place
-// in the view, the last that is not right of (below) it, with the tolerance, from the pixel.
+// Bounds of a row of pixels, as whole numbers relative to the pixel: the first sample that is not
+// left of (above) the pixel's position in the view, and the last one that is not right of (below)
+// it, within the tolerance.
 struct Bounds {
   const float* first_x;
   const float* last_x;
@@ -84,18 +86,19 @@ struct Bounds {
   const float* last_y;
 };
 
-// A row of a view.
 struct ViewRow {
   int y;
   int width_px, height_px;  // of the view
 };
 
-// Samples from the top left pixel of a cell, inclusive; none if left > right or above > below.
+// Range of samples relative to the top left pixel of a cell, inclusive; empty if left > right or
+// above > below.
 struct Rectangle {
   float left, right, above, below;
 };
 
-// Around the cell between the pixels x and x + 1 of the row and the next, cut to the view.
+// Returns the range around the cell between the pixels x and x + 1 of the row and the next row,
+// clipped to the view.
 inline __attribute__((always_inline)) Rectangle RectangleOf(const Bounds& upper,
                                                             const Bounds& lower, const ViewRow& row,
                                                             std::int32_t x) {

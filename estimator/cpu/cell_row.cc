@@ -3,7 +3,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of a triangle whose surface is parallel to the picture, twice the area is 1.
+// Limit of twice the area of a triangle; it is 1 if the surface is parallel to the image.
 constexpr float kSmallPx2 = 0.05F;
 
 inline __attribute__((always_inline)) float Floor(float x) {
@@ -11,8 +11,8 @@ inline __attribute__((always_inline)) float Floor(float x) {
   return toward_zero - (toward_zero > x ? 1.0F : 0.0F);
 }
 
-// The loops: the processor's own vector instructions come in with the caller that they are inlined
-// into. Sums and products are rounded alike on all.
+// The loops get the processor's own vector instructions from the caller that they are inlined into.
+// Sums and products are rounded alike on all processors.
 
 inline __attribute__((always_inline)) void PlaceAxis(const float* disparity, std::size_t count,
                                                      float shift, float limit_px,
@@ -35,7 +35,7 @@ inline __attribute__((always_inline)) void Place(const float* disparity, float s
             row->last_y.data());
 }
 
-// Twice the area of the triangle at the top right of a cell, and of the one at the bottom left.
+// Twice the area of the triangle at the top right or bottom left of a cell, whichever is smaller.
 inline __attribute__((always_inline)) float SmallerArea(const Corners& upper, const Corners& lower,
                                                         std::int32_t x) {
   const float top_x = 1 + (upper.offset_x[x + 1] - upper.offset_x[x]);
@@ -74,7 +74,7 @@ inline __attribute__((always_inline)) void Sample(const PixelRow& upper, const P
     const auto if_any =
         SmallerArea(upper_corners, lower_corners, x) < kSmallPx2 ? CellSamples::kOdd : if_regular;
     samples[x] = shorter < 0 ? CellSamples::kNone : if_any;
-    // Cut for cells without samples, whose indices are not used but must be numbers.
+    // The rows are clamped for cells without samples, whose indices are unused but must be numbers.
     const float first_row = Least(around.above, bottom);
     const float last_row = Most(around.below, top);
     first[x] = static_cast<std::int32_t>(first_row) * row.width_px +

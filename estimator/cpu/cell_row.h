@@ -9,10 +9,11 @@
 
 namespace thicklens::estimator {
 
-// A row of pixels of the centre view where they stand in another view. One number a pixel.
+// The positions of a row of pixels of the centre view in another view, one number for each pixel.
 //
-// Places are told from the pixel, so that float holds them, and two cells that share an edge get
-// the same numbers for it: a sample on the wrong side of it for the one is on the right side for
+// Positions are relative to the pixel, so that float holds them, and two cells that share an edge
+// get the same numbers for it: a sample on the wrong side of the edge for one cell is on the right
+// side for the other.
 // the other.
 struct PixelRow {
   explicit PixelRow(std::size_t width_px);
@@ -25,27 +26,27 @@ struct PixelRow {
   std::vector<float> first_x, last_x, first_y, last_y;  // see Bounds
 };
 
-// offset = -disparity * shift, cut to +-limit_px, which must be more than the view is wide and
-// high.
+// Sets offset = -disparity * shift, clamped to +-limit_px, which must exceed the width and the
+// height of the view.
 void PlacePixels(const float* disparity, float shift_x, float shift_y, float limit_px,
                  PixelRow* row);
 
-// How many samples of the view are in the rectangle around a cell.
+// Number of samples of the view in the rectangle around a cell.
 enum class CellSamples : std::int32_t {
   kNone,
   kOne,
   kTwo,
   kSeveral,
-  kOdd,  // any number but 0, and a part of the cell is turned over or seen edge-on
+  kOdd,  // at least one sample, and a part of the cell is flipped or degenerate
 };
 
-// The cells between two rows of pixels, one a pixel but for the last.
+// The cells between two rows of pixels: one for each pixel but the last.
 struct CellRow {
   explicit CellRow(std::size_t width_px);
 
   std::vector<CellSamples> samples;
-  // The first and the last of the samples: its index less that of the cell's top left pixel, and
-  // the disparity of the cell there. Without meaning where there are none and in odd cells.
+  // The first and the last sample: its index relative to that of the cell's top left pixel, and the
+  // disparity of the cell there. Undefined for cells without samples and for odd cells.
   std::vector<std::int32_t> first, last;
   std::vector<float> first_disparity, last_disparity;
 };

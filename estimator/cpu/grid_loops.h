@@ -7,9 +7,9 @@ namespace thicklens::estimator {
 
 // The innermost loop of D on the grid.
 
-// Neighbouring rays of a view, each linked to the rays of the next view at both sides of the place
-// that shows its point: (D L)_i = (1 - w_i) near[i] + w_i far[i] - here[i],
-// w_i = slope * disparity[i] - whole.
+// Neighbouring rays of a view, each linked to the two rays of the next view on both sides of the
+// position that shows its point: (D L)_i = (1 - w_i) near[i] + w_i far[i] - here[i], with w_i =
+// slope * disparity[i] - whole.
 template <typename Real>
 struct LinkRun {
   std::size_t count = 0;  // <= kLongestRun
@@ -18,7 +18,7 @@ struct LinkRun {
   const Real* here = nullptr;
   const Real* near = nullptr;
   const Real* far = nullptr;  // null: w is 0
-  // Of D^T D L, at the same rays. What is near and far may overlap, and nothing else.
+  // Sums of D^T D L at the same rays. Only the near and the far ones may overlap.
   Real* sum_here = nullptr;
   Real* sum_near = nullptr;
   Real* sum_far = nullptr;

@@ -5,8 +5,8 @@
 
 namespace thicklens::estimator {
 
-// Numbers that hot loops take together. What is computed with them becomes the vector instructions
-// of the function that it is inlined into.
+// Numbers that hot loops process together. Computations with them become the vector instructions of
+// the function that they are inlined into.
 constexpr std::size_t kLanes = 8;
 template <typename Real>
 struct LanesOf {

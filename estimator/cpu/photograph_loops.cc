@@ -3,8 +3,8 @@
 namespace thicklens::estimator {
 namespace {
 
-// A register of AVX2. Sums of so many of them stay in registers over all taps: each ray is read
-// once, and of the photograph there is one update for a whole row of views.
+// Size of a register of AVX2. kVectors sums stay in registers over all taps: each ray is read once,
+// and the photograph is updated once for a whole row of views.
 constexpr std::size_t kVectorBytes = 32, kVectors = 8;
 template <typename Real>
 constexpr std::size_t kOfVector = kVectorBytes / sizeof(Real);
@@ -23,7 +23,7 @@ inline __attribute__((always_inline)) void Store(const T& from, void* to) {
   __builtin_memcpy(to, &from, sizeof(T));
 }
 
-// One number, or as many as a vector has.
+// Loads one number, or as many as a vector has.
 template <typename Real>
 inline __attribute__((always_inline)) void LoadFloats(const float* from, Real* to) {
   *to = static_cast<Real>(*from);
@@ -44,7 +44,8 @@ struct Taps {
   const std::array<PixelRow<Real>, 2>& rows;
 };
 
-// Of the pixels from x on: `count` numbers of the type Value, which is Real or a vector of it.
+// Sums the taps of the pixels from x on: `count` values of the type Value, which is Real or a
+// vector of it.
 template <bool kHasIrradiance, std::size_t count, typename Value, typename Real>
 inline __attribute__((always_inline)) void SumTaps(const Taps<Real>& of, std::size_t x,
                                                    Value (&sums)[count]) {
@@ -82,7 +83,8 @@ inline __attribute__((always_inline)) void AddStrip(const Taps<Real>& of, std::s
   }
 }
 
-// The last `rest` pixels before `end`, less than a strip, by the sums of the strip that ends there.
+// Adds the last `rest` pixels before `end`, less than a strip, using the sums of the strip that
+// ends there.
 template <bool kHasIrradiance, typename Value, std::size_t count, typename Real>
 inline __attribute__((always_inline)) void AddRest(const Taps<Real>& of, std::size_t end,
                                                    std::size_t rest) {
@@ -126,7 +128,7 @@ inline __attribute__((always_inline)) void AllTaps(const Taps<Real>& taps, std::
   }
 }
 
-// To the rays from i on, as many as a Value has.
+// Adds to the rays from i on, as many as a Value has.
 template <bool kHasIrradiance, typename Value, std::size_t kPixels, typename Real>
 inline __attribute__((always_inline)) void AddPixelsTo(const RayPixel<Real> (&pixels)[kPixels],
                                                        const float* irradiance, std::size_t i,
@@ -149,7 +151,7 @@ template <bool kHasIrradiance, std::size_t kPixels, typename Real>
 inline __attribute__((always_inline)) void AddPixelsOf(const std::vector<RayPixel<Real>>& given,
                                                        const float* irradiance, std::size_t count,
                                                        Real* rays) {
-  RayPixel<Real> pixels[kPixels];  // which no store to a ray changes
+  RayPixel<Real> pixels[kPixels];  // a copy that no store to a ray changes
   for (std::size_t i = 0; i < kPixels; ++i) pixels[i] = given[i];
   std::size_t i = 0;
   for (; i + kOfVector<Real> <= count; i += kOfVector<Real>) {

@@ -8,9 +8,9 @@
 namespace thicklens::estimator {
 namespace {
 
-// The loop: the processor's own vector instructions come in with the caller that it is inlined
-// into. Without branches, so that they can. NaN fails every comparison, and what is cut for an
-// index is checked before it is cut.
+// The loop gets the processor's own vector instructions from the caller that it is inlined into; it
+// has no branches, so that it can be vectorised. NaN fails every comparison, and a number is
+// checked before it is clamped for an index.
 inline __attribute__((always_inline)) void Check(const ProductRow& given,
                                                  std::int32_t* is_product) {
   const ProductRow row = given;
@@ -39,7 +39,7 @@ inline __attribute__((always_inline)) void Check(const ProductRow& given,
     const float too_much =
         Most(Most(Most(miss_x, miss_y) - row.tolerance_px, off_surface - row.same_surface),
              Most(past_x, past_y));
-    // What Most makes of NaN depends on the order.
+    // The result of Most for NaN depends on the order of its arguments.
     const float number = (source_y + row.down[x]) + (upper + lower);
     is_product[x] &= Most(too_much, number - number) <= 0 ? 1 : 0;
   }

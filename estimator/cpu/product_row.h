@@ -5,28 +5,29 @@
 
 namespace thicklens::estimator {
 
-// The rays of one view through one row of a photograph's pixels, and what the axes of a fan that is
-// a product have in their place. No index of a pixel may exceed 2^31.
+// The rays of one view through one row of a photograph's pixels, and where the axes of a separable
+// fan put these rays. No index of a pixel may exceed 2^31.
 struct ProductRow {
   int y = 0, width_px = 0, height_px = 0;
-  int first_x = 0, last_x = 0;  // what is looked at: up to before last_x
-  // Of the row's rays: NaN fails; the way to the source is shift * disparity, px.
+  int first_x = 0, last_x = 0;  // the pixels to check, last_x excluded
+  // Disparities of the row's rays; NaN fails the check. The ray of a pixel comes from the point at
+  // shift * disparity, px, from the pixel.
   const float* disparity = nullptr;
   float shift_x = 0, shift_y = 0;
-  // Px to the source at the view's position on the axes, NaN where the axis cannot be used: of the
-  // row's pixels, and of all of the picture's.
+  // Distance, px, to that point for the view's position on the axes: `down` for the row's pixels,
+  // `across` for all pixels of the photograph. NaN where the axis cannot be used.
   const float* down = nullptr;
   const float* across = nullptr;
   float tolerance_px = 0;
-  // The disparities of the 2 x 2 pixels from each of the picture's to the right and down, and by
-  // how much they may differ from the ray's.
+  // Minimum and maximum disparity of the 2 x 2 pixels to the right of and below each pixel of the
+  // photograph, and the allowed difference from the ray's disparity.
   const float* lowest = nullptr;
   const float* highest = nullptr;
   float same_surface = 0;
 };
 
-// Sets is_product[x] to 0 where the product misplaces the ray or reads past the picture or off the
-// ray's surface. The same on every processor.
+// Sets is_product[x] to 0 where the separable fan misplaces the ray or reads beyond the photograph
+// or off the ray's surface. The result is the same on every processor.
 void CheckProducts(const ProductRow& row, std::int32_t* is_product);
 
 }  // namespace thicklens::estimator

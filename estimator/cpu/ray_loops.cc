@@ -35,8 +35,8 @@ inline __attribute__((always_inline)) void Warp(const RayRow<Real>& rays, const 
   }
 }
 
-// What the rays of one vector add to the pixels at the right of their cells goes one lane further,
-// into the next vector from the last lane.
+// Carry between vectors: the pixels at the right of the cells are one lane further, so the last
+// lane adds to the next vector.
 template <typename Real>
 struct Carry {
   Lanes<Real> upper{}, lower{};

@@ -8,16 +8,16 @@
 
 namespace thicklens::estimator {
 
-// The innermost loops over the rays of a view. They take kLanes rays together, of which the last
-// may lie beyond the end of a run, a row or a picture.
+// The innermost loops over the rays of a view. They process kLanes rays together, and the last of
+// these may lie beyond the end of a run, a row or an image.
 
-// Neighbouring rays whose sources lie in neighbouring cells of four pixels.
+// Neighbouring rays that come from neighbouring cells of four pixels.
 struct RayRun {
   std::int32_t x = 0, count = 0;        // of the row
   std::int32_t step_x = 0, step_y = 0;  // from a ray's pixel to the first pixel of its cell
 };
 
-// The way to the source of the ray x is disparity[x] * (shift_x, shift_y), px.
+// The ray x comes from the point at disparity[x] * (shift_x, shift_y), px, from its pixel.
 template <typename Real>
 struct RayRow {
   const Real* disparity = nullptr;
@@ -27,13 +27,13 @@ struct RayRow {
   std::ptrdiff_t width_px = 0;
 };
 
-// warped[x] = what the picture has at the source of ray x, linear between its pixels, for the rays
-// in runs. `row`: the same row of that picture. May write kLanes - 1 numbers after each run, and
-// read as many after the picture's last.
+// Sets warped[x] to the value of the image at the point that ray x comes from, linear between the
+// pixels, for the rays in runs. `row` is the same row of that image. May write kLanes - 1 numbers
+// after each run and read as many after the image's last number.
 template <typename Real>
 void WarpRow(const RayRow<Real>& rays, const Real* row, Real* warped);
-// The transpose: adds to the picture. May read kLanes - 1 numbers after the last value, and touch
-// (not change) as many of the picture after its last.
+// Applies the transpose of WarpRow: adds to the image. May read kLanes - 1 numbers after the last
+// value, and touch (not change) as many after the image's last number.
 template <typename Real>
 void SpreadRow(const RayRow<Real>& rays, const Real* values, Real* row);
 
