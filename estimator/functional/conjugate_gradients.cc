@@ -39,8 +39,8 @@ IterationOutcome ConjugateGradients<Real>::Solve(const LinearSystem<Real>& syste
   const double target = limits.tolerance * limits.tolerance * system.right_squared;
   double left = Dot(residual_, residual_);
   IterationOutcome outcome;
-  // The residual of conjugate gradients drifts from that of their answer; where the numbers allow
-  // it, they go on from the latter.
+  // The residual of the iterations drifts from the residual of their solution; where the precision
+  // allows it, the iterations continue from the latter.
   while (left > target && outcome.iterations < limits.max_iterations) {
     const double before = left;
     Iterate(system, target, left, limits.max_iterations, on_iteration, &outcome.iterations, x);

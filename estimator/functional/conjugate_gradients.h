@@ -7,17 +7,17 @@
 
 namespace thicklens::estimator {
 
-// A x = b with A symmetric and positive definite.
+// The system A x = b with A symmetric and positive definite.
 template <typename Real>
 struct LinearSystem {
   std::function<void(const std::vector<Real>& x, std::vector<Real>* product)> multiply;  // A x
-  // b - A x.
+  // Sets the residual b - A x.
   std::function<void(const std::vector<Real>& x, std::vector<Real>* residual)> set_residual;
   double right_squared = 0;  // |b|^2
 };
 
 struct IterationLimits {
-  double tolerance = 0;  // of |b - A x|/|b|
+  double tolerance = 0;  // limit of |b - A x|/|b|
   int max_iterations = 0;
 };
 
@@ -26,20 +26,20 @@ struct IterationOutcome {
   double relative_residual = 0;  // |b - A x|/|b|, recomputed from x
 };
 
-// Conjugate gradients without a preconditioner. Bits do not depend on the number of threads, if
-// those of the system do not.
+// Conjugate gradients without a preconditioner. The bits of the result do not depend on the number
+// of threads if those of the system do not.
 template <typename Real>
 class ConjugateGradients {
  public:
   ConjugateGradients(std::size_t size, int threads);
 
-  // b - A x of the x that Solve starts from; to be set before.
+  // Residual b - A x of the start x of Solve; the caller sets it before.
   std::vector<Real>* residual() { return &residual_; }
-  // Makes x better.
+  // Improves x.
   IterationOutcome Solve(const LinearSystem<Real>& system, const IterationLimits& limits,
                          const std::function<void()>& on_iteration, std::vector<Real>* x);
 
-  static constexpr int kVectors = 3;  // that it holds
+  static constexpr int kVectors = 3;  // number of vectors that the object holds
 
  private:
   double Dot(const std::vector<Real>& a, const std::vector<Real>& b) const;

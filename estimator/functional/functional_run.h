@@ -7,17 +7,18 @@
 
 namespace thicklens::estimator {
 
-// What the solvers of the functional for a whole picture have in common.
+// Steps that the solvers of the functional for a whole image have in common.
 
-// Throws Error for options (naming the solver) and inputs that do not fit; sets what the summary
-// knows from the start.
+// Throws Error for options (naming the solver) and inputs that do not fit. Sets the fields of the
+// summary that are known at the start.
 void StartRun(const std::string& solver, const EstimateInput& input,
               const FunctionalOptions& options, FunctionalSummary* summary);
-// Throws Error if the options allow less.
+// Throws Error if the options allow fewer bytes.
 void RequireMemory(const FunctionalOptions& options, double bytes);
 void FillOrigin(const std::string& method, const FunctionalSummary& summary, bool falloff,
                 model::LightFieldOrigin* origin);
-// Says how it went; iterations and residual are known. Throws Error if they led nowhere.
+// Writes the message of the summary; its iterations and residual are known. Throws Error if the
+// iterations diverged.
 void EndRun(const std::string& solver, const FunctionalOptions& options,
             FunctionalSummary* summary);
 

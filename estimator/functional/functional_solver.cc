@@ -23,14 +23,15 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of conjugate gradients: an eigenvalue ratio of kappa takes about sqrt(kappa)/2 ln(2/tolerance).
+// Expected iterations of conjugate gradients: an eigenvalue ratio of kappa takes about
+// sqrt(kappa)/2 ln(2/tolerance).
 int ExpectedIterations(const FunctionalOptions& options, double ridge, double views) {
   const double ratio = 1 + 1 / (views * ridge);
   return static_cast<int>(std::clamp(0.5 * std::sqrt(ratio) * std::log(2 / options.tolerance), 1.0,
                                      static_cast<double>(options.max_iterations)));
 }
 
-// The system of one channel after the other.
+// The system, solved for one channel after the other.
 template <typename Real>
 class FunctionalSystem {
  public:
@@ -48,7 +49,7 @@ class FunctionalSystem {
   Real* photograph() { return photograph_.data(); }
   const Real* plane(std::size_t k) const { return planes_.data() + k * rays_.plane_stride(); }
 
-  // To R in all planes.
+  // Solves for R in all planes.
   IterationOutcome Solve(const IterationLimits& limits, const std::function<void()>& on_iteration) {
     SetRightSide();
     std::fill(answer_.begin(), answer_.end(), Real{0});
@@ -71,10 +72,10 @@ class FunctionalSystem {
     return outcome;
   }
 
-  static constexpr int kPictures = 3 + ConjugateGradients<Real>::kVectors;  // beside the planes
+  static constexpr int kPictures = 3 + ConjugateGradients<Real>::kVectors;  // besides the planes
 
  private:
-  // A^-1 H^T of a picture, in all planes.
+  // Sets all planes to A^-1 H^T x, where x is `picture`.
   void SpreadOverAperture(const std::vector<Real>& picture) {
     rays_.ApplyTransposed(picture.data(), planes_.data());
     constexpr std::size_t kPacket = AperturePrior<Real>::kPacket;
@@ -82,14 +83,14 @@ class FunctionalSystem {
     prior_.ApplyInverse(points * kPacket, rays_.plane_stride(), threads_, planes_.data());
   }
 
-  // (Id + H A^-1 H^T) picture.
+  // Sets the product to (Id + H A^-1 H^T) x, where x is `picture`.
   void Multiply(const std::vector<Real>& picture, std::vector<Real>* product) {
     SpreadOverAperture(picture);
     rays_.Apply(planes_.data(), rays_.plane_stride(), product->data());
     for (std::size_t i = 0; i < size_; ++i) (*product)[i] += picture[i];
   }
 
-  // I - H R0.
+  // Sets the right-hand side I - H R0.
   void SetRightSide() {
     rays_.Apply(photograph_.data(), 0, right_.data());
     for (std::size_t i = 0; i < size_; ++i) right_[i] = photograph_[i] - right_[i];
@@ -99,20 +100,20 @@ class FunctionalSystem {
   AperturePrior<Real>& prior_;
   const int threads_;
   const std::size_t size_;
-  std::vector<Real> planes_;      // of all aperture samples
+  std::vector<Real> planes_;      // one for each aperture sample
   std::vector<Real> photograph_;  // with a margin
   std::vector<Real> right_, answer_;
   ConjugateGradients<Real> solver_;
 };
 
-// The samples of the grid are the rays that meet on the photograph's pixels only with ST in the
-// plane of focus; and of views without a weight the photograph has no rays.
+// The grid samples are the rays that meet on the photograph's pixels only with ST in the plane of
+// focus, and the photograph has no rays of views without a weight.
 bool ShowsSameRays(const EstimateInput& input, const Eigen::Vector2d& landing_step_px) {
   return landing_step_px.isZero(0) && (input.weights > 0).all();
 }
 
-// Without the rays: the light field, all planes of one channel, pictures, what the rays are made
-// from on each thread.
+// Bytes without the rays: the light field, all planes of one channel, images, and the working
+// memory of each thread that makes the rays.
 template <typename Real>
 double FixedBytes(const EstimateInput& input, int threads) {
   constexpr double kPerViewMade = 40;
@@ -128,7 +129,7 @@ double LeastRayBytes(const EstimateInput& input, int kinds) {
          static_cast<double>(input.weights.size());
 }
 
-// The options and the input are right.
+// The options and the input are checked already.
 template <typename Real>
 model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOptions& options,
                                   FunctionalSummary* summary) {

@@ -40,7 +40,7 @@ bool GridLinks::FindLink(Axis axis, int view, int s, int t, Run* run) const {
   const int k = view % picture_.u_count, l = view / picture_.u_count;
   const bool across = axis == Axis::kU;
   if (across ? k + 1 == picture_.u_count : l + 1 == picture_.v_count) return false;
-  // The way to the samples of a view from the pixels that they land on.
+  // The shifts of a view lead from its samples to the pixels that they land on.
   const LandingRect here = LandingIn(picture_, k, l);
   const LandingRect there = LandingIn(picture_, across ? k + 1 : k, across ? l : l + 1);
   const int x = s + picture_.s_shift[Index(k)], y = t + picture_.t_shift[Index(l)];
@@ -105,7 +105,7 @@ void GridLinks::AddBand(Axis axis, int view, int t, std::size_t band, Real gamma
   for (std::size_t n = links.start[first]; n < links.start[first + 1]; ++n) {
     const Run& run = links.runs[n];
     const std::size_t at = row + Index(run.sample);
-    // Backwards it wraps around, and comes out right.
+    // A negative `whole` wraps around, and the sum is still correct.
     const std::size_t near =
         at + to_next + static_cast<std::size_t>(run.whole) * (across ? 1 : width);
     LinkRun<Real> loop;
@@ -127,7 +127,8 @@ template <typename Real>
 void GridLinks::Apply(double gamma, double mu, const Real* x, Real* y) const {
   const std::size_t width = Index(picture_.s_count), view_size = width * Index(picture_.t_count);
   const auto gamma_here = static_cast<Real>(gamma), mu_here = static_cast<Real>(mu);
-  // Differences across tie a row of a view to the same row of the next, those down a column.
+  // Differences across link a row of a view to the same row of the next view; differences down link
+  // a column.
   ParallelFor(picture_.v_count * picture_.t_count, threads_, [&](int i) {
     const int l = i / picture_.t_count, t = i % picture_.t_count;
     for (int k = 0; k < picture_.u_count; ++k) {

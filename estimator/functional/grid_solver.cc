@@ -26,14 +26,14 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of conjugate gradients, measured: the eigenvalues are many and evenly spread.
+// Expected iterations of conjugate gradients, measured: the eigenvalues are many and evenly spread.
 int ExpectedIterations(const FunctionalOptions& options, double ridge) {
   const double ratio = 1 + 8 * options.gamma / ridge;
   return static_cast<int>(std::clamp(0.25 * std::sqrt(ratio) * std::log(2 / options.tolerance), 1.0,
                                      static_cast<double>(options.max_iterations)));
 }
 
-// The system of one channel after the other.
+// The system, solved for one channel after the other.
 template <typename Real>
 class GridSystem {
  public:
@@ -51,7 +51,7 @@ class GridSystem {
         pixels_(photograph->pixels()),
         solver_(answer_.size(), threads) {}
 
-  // From L0 to the answer, in place.
+  // Solves in place, from L0 to the solution.
   IterationOutcome Solve(const std::vector<Real>& photograph, const IterationLimits& limits,
                          const std::function<void()>& on_iteration, float* light_field) {
     LinearSystem<Real> system;
@@ -74,7 +74,8 @@ class GridSystem {
     return outcome;
   }
 
-  static constexpr int kVectors = 1 + ConjugateGradients<Real>::kVectors;  // of all rays
+  // of the size of all rays
+  static constexpr int kVectors = 1 + ConjugateGradients<Real>::kVectors;
 
  private:
   template <typename Work>
@@ -92,8 +93,8 @@ class GridSystem {
     photograph_.AddTransposed(pixels_.data(), product->data());
   }
 
-  // H^T (I - H x) - gamma D^T D x + mu (L0 - x): of rays beside the picture 0 where x is L0, to the
-  // last bit.
+  // Residual H^T (I - H x) - gamma D^T D x + mu (L0 - x). For rays outside the image it is exactly
+  // 0 where x is L0.
   void SetResidual(const std::vector<Real>& photograph, const float* prior,
                    const std::vector<Real>& x, std::vector<Real>* residual) {
     links_.Apply(gamma_, 0, x.data(), residual->data());
@@ -108,7 +109,7 @@ class GridSystem {
     photograph_.AddTransposed(pixels_.data(), residual->data());
   }
 
-  // 0 for the rays that land outside of the picture.
+  // Sets the rays that land outside of the image to 0.
   void ClearBeside(std::vector<Real>* rays) const {
     std::size_t ray = 0;
     for (int l = 0; l < picture_.v_count; ++l) {
@@ -139,7 +140,8 @@ class GridSystem {
   ConjugateGradients<Real> solver_;
 };
 
-// Without H and D: the light field, vectors, and what each thread makes a view from.
+// Bytes without H and D: the light field, vectors, and the working memory of each thread that makes
+// a view.
 template <typename Real>
 double FixedBytes(const EstimateInput& input, int threads) {
   constexpr double kPictures = 3;
@@ -150,7 +152,7 @@ double FixedBytes(const EstimateInput& input, int threads) {
          (sizeof(float) * (views + 2) * input.picture.channels +
           sizeof(Real) * (views * GridSystem<Real>::kVectors + kPictures) + kPerViewMade * threads);
 }
-// Of H and D the disparities, and the irradiance if there is one.
+// Bytes of H and D that are known beforehand: the disparities, and the irradiance if there is one.
 double LeastGridBytes(const EstimateInput& input, bool falloff) {
   return (falloff ? 2 : 1) * static_cast<double>(sizeof(float)) *
          static_cast<double>(input.disparity.disparity.size()) *
@@ -167,7 +169,7 @@ std::vector<std::vector<float>> IrradianceOfViews(const EstimateInput& input, in
   return irradiance;
 }
 
-// The options and the input are right.
+// The options and the input are checked already.
 template <typename Real>
 model::LightField SolveOnGrid(const EstimateInput& input, const FunctionalOptions& options,
                               FunctionalSummary* summary) {
