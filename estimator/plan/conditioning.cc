@@ -35,7 +35,7 @@ void RequireFew(double unknowns) {
       unknowns, kMost));
 }
 
-// A system solved in that precision: how far it is from what it was made of.
+// Solves a system in that precision and returns the relative error of the solution.
 template <typename Real>
 std::optional<double> ErrorOf(const Eigen::MatrixXd& matrix, bool symmetric) {
   using Matrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
