@@ -13,12 +13,12 @@
 namespace thicklens::estimator {
 namespace {
 
-// Positions that differ by less, relatively, are the same but for rounding.
+// Positions whose relative difference is smaller are equal except for rounding.
 constexpr double kRounding = 1e-9;
-// Weights of files.
+// Tolerance of weights from files.
 constexpr double kSameWeight = 1e-6;
 
-// Where a view crosses the aperture: mm with a camera, else view steps, from the centre.
+// Position of a view on the aperture from the centre: mm with a camera, otherwise view steps.
 Eigen::Vector2d AperturePosition(const model::LightField& light_field, int k, int l) {
   const double a = light_field.u_offset(k);
   const double b = light_field.v_offset(l);
@@ -27,13 +27,13 @@ Eigen::Vector2d AperturePosition(const model::LightField& light_field, int k, in
       .cwiseProduct(Eigen::Vector2d(a, b));
 }
 
-// The share that an aperture of that radius leaves of a view's weight, which belongs to the
-// aperture of the capture: T_R/T_r, T the transmission at the view's place. So the captured
-// aperture gives the light field's own weights back, whatever steps they stand on, also where the
-// outermost views of a disc reach a little beyond it.
+// Returns the share that an aperture of that radius leaves of a view's weight, which belongs to the
+// captured aperture: T_R/T_r, where T is the transmission at the view's position. The captured
+// aperture therefore gives the light field's own weights back, whatever its view steps are, also
+// where the outermost views of a disc extend a little beyond it.
 double ShareLeft(const model::LightField& light_field, double radius,
                  const Eigen::Vector2d& position) {
-  // A view on the rim of a disc is inside.
+  // A view on the rim of a disc counts as inside.
   const Eigen::Vector2d inward = position * (1 - kRounding);
   if (!light_field.camera) return inward.norm() <= radius ? 1 : 0;
   const model::Camera& camera = *light_field.camera;
@@ -47,7 +47,7 @@ double ShareLeft(const model::LightField& light_field, double radius,
   return radius > 0 ? std::exp(-deviations * deviations / 2 * (1 - ratio * ratio)) : 0.0;
 }
 
-// The same weight for the present views that are nearest to the centre, none for the others.
+// Returns equal weights for the present views nearest to the centre, and 0 for the others.
 Eigen::ArrayXXd NearestViews(const model::LightField& light_field) {
   Eigen::ArrayXXd distance = Eigen::ArrayXXd::Constant(light_field.v_count, light_field.u_count,
                                                        std::numeric_limits<double>::infinity());
@@ -82,7 +82,7 @@ Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double ra
                       ShareLeft(light_field, radius, AperturePosition(light_field, k, l));
     }
   }
-  // So narrow a Gaussian that its tail underflows leaves no view either.
+  // A Gaussian so narrow that its tail underflows leaves no view either.
   if (!(weights.sum() > std::numeric_limits<double>::min())) weights = NearestViews(light_field);
   return weights / weights.sum();
 }
@@ -113,7 +113,8 @@ std::optional<model::ApertureShape> ShapeOfWeights(const model::LightField& ligh
   return std::nullopt;
 }
 
-// Of the rays with u = v = 0: with ST in the plane of focus, the middle of what lands at a pixel.
+// Uses the rays with u = v = 0: with ST in the plane of focus, they are the middle of the rays that
+// land at a pixel.
 double LargestWander(const model::LightField& light_field) {
   const model::LightFieldGrid& grid = *light_field.grid;
   const Eigen::Vector2d reach_mm =

@@ -16,8 +16,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Steps between views that differ by more than this share are other viewpoints, not an error of
-// calibration.
+// View steps that differ by more than this share mean other viewpoints, not a calibration error.
 constexpr double kStepTolerance = 0.05;
 
 void RequireEqual(const std::string& what, const std::string& reference, const std::string& other,
@@ -81,7 +80,7 @@ void RequireFitting(const model::LightField& reference, const DibrInput& dibr) {
   }
 }
 
-// A photograph that is ready to be warped to any view.
+// A photograph that is prepared for warping to any view.
 struct DibrViews {
   explicit DibrViews(const DibrInput& input)
       : renderer(input.disparity), warper(input.photograph, input.disparity) {}
@@ -110,9 +109,9 @@ using Scores = std::vector<PictureScores>;
 
 bool HasFinitePsnr(const PictureScores& scores) { return !std::isinf(scores.psnr_db); }
 
-// Which of the views a mean of PSNRs is over: those that differ from the reference, so that one
-// perfect view does not hide the others, and of two means that stand beside each other those that
-// differ in both, unless there are none. `beside` may be empty.
+// Selects the views that a mean of PSNRs is over: the views that differ from the reference, so that
+// one perfect view does not hide the others. For two means that are shown together, these are the
+// views that differ in both, unless there are none. `beside` may be empty.
 std::vector<bool> ViewsOfPsnrMean(const Scores& scores, const Scores& beside) {
   std::vector<bool> own, both;
   for (std::size_t i = 0; i < scores.size(); ++i) {
@@ -149,14 +148,14 @@ PictureScores MeanOf(const Scores& scores, const Scores& beside) {
   return mean;
 }
 
-// Square of the distance from the middle of the views, in view steps; exact.
+// Squared distance from the middle of the views, in view steps; exact.
 double DistanceSquared(const model::LightField& light_field, const ViewScores& view) {
   const double a = light_field.u_offset(view.u);
   const double b = light_field.v_offset(view.v);
   return a * a + b * b;
 }
 
-// Of all views, of those nearest to the middle, and of those farthest from it.
+// Scores of all views, of the views nearest to the middle, and of the views farthest from it.
 struct Groups {
   Scores all, centre, corner;
 };

@@ -20,12 +20,12 @@
 namespace thicklens::estimator {
 namespace {
 
-// Points of one surface: as RenderDisparity has it.
+// Tolerance for points of one surface, as in RenderDisparity.
 constexpr double kSameSurfacePx = 0.2;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// One view's holes and how far its points lie.
+// Holes of one view and the disparities of its points.
 struct ViewHoles {
   int view = 0;         // l * U + k
   double a = 0, b = 0;  // steps from the middle
@@ -43,7 +43,7 @@ ViewHoles HolesOf(const DisparityMap& map, const DisparityRenderer& renderer, in
     for (int x = 0; x < map.width_px; ++x) {
       const std::size_t i = Index(y) * Index(map.width_px) + Index(x);
       if (rendered.seen[i] != Seen::kHidden) continue;
-      // Where the centre view would show the background that is seen here.
+      // Position in the centre view of the background that is seen here.
       const double centre_x = x + a * map.step.x() * rendered.disparity[i];
       const double centre_y = y + b * map.step.y() * rendered.disparity[i];
       if (!(centre_x >= 0) || !(centre_x <= map.width_px - 1) || !(centre_y >= 0) ||
@@ -58,8 +58,8 @@ ViewHoles HolesOf(const DisparityMap& map, const DisparityRenderer& renderer, in
   return holes;
 }
 
-// In each row, holes get the nearest value that is none: at the border of the picture cv::inpaint
-// looks at pixels that it has not filled yet.
+// In each row, holes get the nearest value that is not a hole: at the border of the image
+// cv::inpaint reads pixels that it has not filled yet.
 void PutNeighbours(const std::vector<char>& is_hole, cv::Mat* values) {
   for (int y = 0; y < values->rows; ++y) {
     ThrowIfCancelled();
@@ -81,14 +81,15 @@ void PutNeighbours(const std::vector<char>& is_hole, cv::Mat* values) {
   }
 }
 
-// And a pixel on each side is repeated, so that what it makes of the outermost ones is cut off.
+// One pixel on each side is repeated, so that what cv::inpaint makes of the outermost pixels is cut
+// off.
 cv::Mat Padded(const cv::Mat& inner) {
   cv::Mat padded;
   cv::copyMakeBorder(inner, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
   return padded;
 }
 
-// All holes of the view, channel by channel.
+// Fills all holes of the view, channel by channel.
 void FillView(const ViewHoles& holes, const InpaintOptions& options,
               model::LightField* light_field) {
   const int width = light_field->s_count, height = light_field->t_count;
@@ -99,8 +100,8 @@ void FillView(const ViewHoles& holes, const InpaintOptions& options,
   ParallelFor(light_field->channels, options.threads, [&](int channel) {
     float* values = light_field->values.data() + light_field->ViewStart(channel, 0, 0) +
                     Index(holes.view) * light_field->view_size();
-    // To the mean of its neighbours cv::inpaint adds up to 2 units of the values, meant as grey
-    // levels; where 1 is full scale they would be most of the picture.
+    // cv::inpaint adds up to 2 units of the values, meant as grey levels, to the mean of the
+    // neighbours; if 1 were full scale, these units would exceed the image values.
     constexpr double kFullScale = 65535;
     cv::Mat scaled, filled;
     cv::Mat(height, width, CV_32FC1, values).convertTo(scaled, CV_32FC1, kFullScale);
@@ -117,7 +118,8 @@ void FillView(const ViewHoles& holes, const InpaintOptions& options,
   });
 }
 
-// What was filled in one view, to the holes of another that show the same points. Says how many.
+// Carries what was filled in one view to the holes of another view that show the same points.
+// Returns how many were filled.
 std::size_t Carry(const DisparityMap& map, const ViewHoles& from, ViewHoles* to,
                   model::LightField* light_field) {
   const double px_per_unit = map.step.cwiseAbs().maxCoeff();

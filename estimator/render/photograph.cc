@@ -28,8 +28,8 @@ void ForEachView(const model::LightField& light_field, int threads, const Work& 
   });
 }
 
-// Irradiance of every ray, by view, relative to that of `weights` at the principal point; empty
-// where `seen` is 0.
+// Irradiance of every ray, for each view, relative to that of `weights` at the principal point;
+// empty where `seen` is 0.
 std::vector<std::vector<float>> FalloffOfViews(const model::LightField& light_field,
                                                const model::Camera& camera,
                                                const Eigen::ArrayXXd& weights,
@@ -42,7 +42,7 @@ std::vector<std::vector<float>> FalloffOfViews(const model::LightField& light_fi
   return falloff;
 }
 
-// What the aperture passes of every ray, by view; empty where `seen` is 0.
+// Share of every ray that the aperture passes, for each view; empty where `seen` is 0.
 std::vector<std::vector<float>> PassedByViews(const model::LightField& light_field,
                                               const Vignetting& vignetting,
                                               const Eigen::ArrayXXd& seen, int threads) {
@@ -53,17 +53,17 @@ std::vector<std::vector<float>> PassedByViews(const model::LightField& light_fie
   return passed;
 }
 
-// The picture of one channel's views, as they lie in the light field.
+// Forms the image of one channel from its views as they lie in the light field.
 using PictureFormer = std::function<std::vector<float>(const float* rays)>;
 
-// By `kernels`, or on the processor, vectorised, where it is null; both give the numbers of
-// Kernels::FormPicture. `shares`, where there are any, multiply the rays.
+// Uses `kernels` or, if it is null, vector instructions of the processor; both give the numbers of
+// Kernels::FormPicture. If there are `shares`, they multiply the rays.
 PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat splat,
                         std::vector<std::vector<float>> shares, kernels::Kernels<float>* kernels,
                         int threads) {
   if (kernels == nullptr) {
     kernels::BlockGeometry geometry = whole;
-    if (splat == kernels::Splat::kNearest) {  // all of a ray: as if it landed on its pixel
+    if (splat == kernels::Splat::kNearest) {  // each ray counts fully, as if it landed on its pixel
       std::fill(geometry.s_fraction.begin(), geometry.s_fraction.end(), 0.0);
       std::fill(geometry.t_fraction.begin(), geometry.t_fraction.end(), 0.0);
     }
@@ -90,8 +90,8 @@ PictureFormer NewFormer(const kernels::BlockGeometry& whole, kernels::Splat spla
       };
 }
 
-// The mean of what is passed over the rays of each pixel. Throws Error where there are rays and
-// none is passed.
+// Mean share that the aperture passes, over the rays of each pixel. Throws Error where there are
+// rays and the aperture passes none.
 std::vector<float> BundleOf(const model::LightField& light_field,
                             const std::vector<std::vector<float>>& passed,
                             const PictureFormer& form) {
@@ -122,7 +122,7 @@ std::vector<float> BundleOf(const model::LightField& light_field,
   return bundle;
 }
 
-// Share by share; `product` may be empty, as if it were 1.
+// Multiplies the shares; an empty `product` counts as 1.
 void MultiplyInto(const std::vector<std::vector<float>>& shares,
                   std::vector<std::vector<float>>* product) {
   if (product->empty()) {
@@ -143,7 +143,7 @@ model::LinearPicture Photograph(const model::LightField& light_field,
   CheckLightField(light_field);
   const Eigen::ArrayXXd present = PresentWeights(light_field, weights);
   const bool is_vignetted = vignetting != nullptr && IsOffAperture(light_field);
-  // A view that the principal point sees nothing of may pass rays of other pixels.
+  // A view with no rays at the principal point may pass rays of other pixels.
   const Eigen::ArrayXXd seen =
       is_vignetted
           ? PresentWeights(light_field, Eigen::ArrayXXd::Ones(weights.rows(), weights.cols()))
@@ -152,12 +152,12 @@ model::LinearPicture Photograph(const model::LightField& light_field,
   if (falloff != nullptr && light_field.grid) {
     share_of_rays = FalloffOfViews(light_field, *falloff, present, seen, threads);
   }
-  // As the rays were taken apart, so they are put together.
+  // Forming the photograph uses the splat that the rays were estimated with.
   const kernels::Splat splat =
       light_field.origin.splat == "nearest" ? kernels::Splat::kNearest : kernels::Splat::kBilinear;
   const kernels::BlockGeometry whole =
       BlockOf(light_field, {0, 0, light_field.s_count, light_field.t_count}, seen);
-  std::vector<float> bundle;  // of each pixel, where its rays have weights of their own
+  std::vector<float> bundle;  // for each pixel, where its rays have weights of their own
   if (is_vignetted) {
     const std::vector<std::vector<float>> passed =
         PassedByViews(light_field, *vignetting, seen, threads);

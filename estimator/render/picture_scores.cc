@@ -26,7 +26,7 @@ constexpr double kSsimC2 = 0.03 * 0.03;
 constexpr double kEdgeShare = 0.5;
 constexpr double kStrongest = 0.01;
 // ... and at least this gradient, per px: white noise of one step of 8 bits, whose Sobel gradients
-// have .61 steps per px (root mean square), exceeds it at 2 of 100 000 pixels.
+// are 0.61 steps per px (root mean square), exceeds it at 2 of 100 000 pixels.
 constexpr double kLeastEdge = 2 / 255.0;
 
 std::string SizeText(const StoredValues& picture) {
@@ -47,7 +47,7 @@ void RequireComplete(const std::string& name, const StoredValues& picture) {
   }
 }
 
-// What is left of the picture without a border; empty if nothing is.
+// Returns the image without its border; empty if nothing is left.
 cv::Rect Inside(int width_px, int height_px, int border_px) {
   const int across = width_px - 2 * border_px;
   const int down = height_px - 2 * border_px;
@@ -72,7 +72,7 @@ Eigen::Vector3d ColourAt(const StoredValues& picture, int x, int y) {
   return {value[0], value[1], value[2]};
 }
 
-// In double: the variances of SSIM are small differences of large sums.
+// Double is needed because the variances of SSIM are small differences of large sums.
 cv::Mat1d GreyOf(const StoredValues& picture) {
   cv::Mat1d grey(picture.height_px, picture.width_px);
   for (int y = 0; y < picture.height_px; ++y) {
@@ -87,7 +87,7 @@ cv::Mat1d GreyOf(const StoredValues& picture) {
   return grey;
 }
 
-// -10 log10 of the mean squared difference, dB; full scale is 1.
+// PSNR, dB: -10 log10 of the mean squared difference; full scale is 1.
 double PsnrDb(const StoredValues& reference, const StoredValues& other, const cv::Rect& inside) {
   double sum = 0;
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
@@ -109,8 +109,8 @@ cv::Mat1d WindowMean(const cv::Mat& values) {
   return mean;
 }
 
-// [L17], equation 13 of Wang et al. 2004: (2 mu_a mu_b + C1)(2 s_ab + C2)/((mu_a^2 + mu_b^2 +
-// C1)(s_a^2 + s_b^2 + C2)) of each window, averaged; NaN if no window lies within the picture.
+// SSIM [L17], equation 13 of Wang et al. 2004: (2 mu_a mu_b + C1)(2 s_ab + C2)/((mu_a^2 + mu_b^2 +
+// C1)(s_a^2 + s_b^2 + C2)) of each window, averaged; NaN if no window lies within the image.
 double MeanSsim(const cv::Mat1d& a, const cv::Mat1d& b, int border_px) {
   const cv::Rect inside = Inside(a.cols, a.rows, std::max(border_px, kSsimWindowPx / 2));
   if (inside.empty()) return kNone;
@@ -170,10 +170,10 @@ double EdgeThreshold(const Gradient& reference, const cv::Rect& inside) {
   return std::max(kLeastEdge, kEdgeShare * *strong);
 }
 
-// |cos| of the angle between the gradients, averaged over edge pixels of the reference.
+// Mean |cos| of the angle between the gradients, over the edge pixels of the reference.
 std::optional<double> MacadeStandin(const cv::Mat1d& reference, const cv::Mat1d& other,
                                     int border_px) {
-  // The gradient of an outermost pixel would be that of a continued picture.
+  // The gradient of an outermost pixel would be that of an extrapolated image.
   const cv::Rect inside = Inside(reference.cols, reference.rows, std::max(border_px, 1));
   if (inside.empty()) return std::nullopt;
   const Gradient a(reference);
@@ -254,8 +254,8 @@ PictureScores ComparePictures(const StoredValues& reference, const StoredValues&
   return scores;
 }
 
-// [L18] CIE 116-1995: sqrt(dL^2 + (dC/(1 + .045 C1))^2 + (dH/(1 + .015 C1))^2), dH^2 = da^2 + db^2
-// - dC^2, C1 the chroma of the reference.
+// CIE 116-1995 [L18]: sqrt(dL^2 + (dC/(1 + 0.045 C1))^2 + (dH/(1 + 0.015 C1))^2), dH^2 = da^2 +
+// db^2 - dC^2, where C1 is the chroma of the reference.
 double DeltaE94(const Eigen::Vector3d& reference_lab, const Eigen::Vector3d& lab) {
   const double reference_chroma = std::hypot(reference_lab.y(), reference_lab.z());
   const Eigen::Vector3d change = lab - reference_lab;
@@ -268,8 +268,8 @@ double DeltaE94(const Eigen::Vector3d& reference_lab, const Eigen::Vector3d& lab
                    hue_change_squared / (hue_weight * hue_weight));
 }
 
-// IEC 61966-2-1 to XYZ, then CIE 15. The white is the matrix's own, (1, 1, 1): D65 to the digits of
-// the matrix, and greys have a* = b* = 0.
+// IEC 61966-2-1 to XYZ, then CIE 15. The white is that of the matrix, (1, 1, 1): D65 to the digits
+// of the matrix. Greys have a* = b* = 0.
 Eigen::Vector3d LabOf(const Eigen::Vector3d& srgb) {
   static const Eigen::Matrix3d to_xyz =
       (Eigen::Matrix3d() << 0.4124564, 0.3575761, 0.1804375, 0.2126729, 0.7151522, 0.0721750,

@@ -19,7 +19,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Positions that differ by less, relatively or in px, are the same but for rounding.
+// Positions whose difference, relative or in px, is smaller are equal except for rounding.
 constexpr double kRounding = 1e-9;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
@@ -36,7 +36,7 @@ struct ShiftedAxis {
   std::array<float, 4> tap_weight;  // of the taps at -1, 0, 1, 2
 
   ShiftedAxis(double shift_px, int count) : tap_weight{} {
-    const double source_px = -shift_px;  // of x = 0
+    const double source_px = -shift_px;  // for x = 0
     const double nearest_px = std::round(source_px);
     const double snapped_px = std::abs(source_px - nearest_px) < kRounding ? nearest_px : source_px;
     if (!(std::abs(snapped_px) < count)) return;  // all of it is outside
@@ -50,7 +50,7 @@ struct ShiftedAxis {
   bool Holds(int x) const { return x >= first && x <= last; }
 };
 
-// One view of a refocused picture.
+// One view of a refocused image.
 struct ShiftedView {
   int k = 0, l = 0;
   double weight = 0;
@@ -77,7 +77,7 @@ void AddRow(const float* view, int s_count, int t_count, const ShiftedView& shif
   }
 }
 
-// Row y of the mean of the shifted views, all channels.
+// Computes row y of the mean of the shifted views, for all channels.
 void RefocusRow(const model::LightField& light_field, const std::vector<ShiftedView>& views, int y,
                 model::LinearPicture* picture) {
   const int width = light_field.s_count;
@@ -102,7 +102,7 @@ void RefocusRow(const model::LightField& light_field, const std::vector<ShiftedV
   }
 }
 
-// Copies channel values of one sample of a view to a pixel.
+// Copies the channel values of one sample of a view to a pixel.
 void CopySample(const model::LightField& light_field, int k, int l, int s, int t, int x, int y,
                 model::LinearPicture* picture) {
   for (int channel = 0; channel < light_field.channels; ++channel) {
@@ -144,7 +144,7 @@ model::LinearPicture Refocus(const model::LightField& light_field, double dispar
   return picture;
 }
 
-// d = -m; SlopeOnGrid says m in u, and in v of a grid whose axes are exchanged.
+// d = -m. SlopeOnGrid returns m in u; for a grid with exchanged axes it returns m in v.
 Eigen::Vector2d DisparityAtDepthPx(const model::LightField& light_field, double depth_mm) {
   if (!light_field.grid) {
     throw Error(fmt::format(

@@ -9,7 +9,7 @@ namespace thicklens::estimator {
 
 void CheckLightField(const model::LightField& light_field);  // throws Error
 
-// The weights of the views that there are. Throws Error if they do not fit or nothing is left.
+// Returns the weights with 0 for absent views. Throws Error if they do not fit or none is above 0.
 Eigen::ArrayXXd PresentWeights(const model::LightField& light_field,
                                const Eigen::ArrayXXd& weights);
 

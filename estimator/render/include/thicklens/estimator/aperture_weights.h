@@ -15,8 +15,8 @@ namespace thicklens::estimator {
 // Gaussian, and 1 within 2 kappa R for a disc, where a is the position of the view on the aperture;
 // derived here [D23]. R = r gives the captured aperture.
 //
-// With a camera, R is in mm and must be at most r; without a camera the aperture is a disc of R
-// view steps. For R = 0, and for an aperture that meets no view, the weight goes to the view (or
+// R is in mm with a camera, and must then be at most r; without a camera the aperture is a disc of
+// R view steps. For R = 0, and for an aperture that meets no view, the weight goes to the view (or
 // views) nearest to the centre. Absent views have the weight 0. Throws Error for an invalid light
 // field and for a radius that is negative, not finite or, with a camera, larger than r.
 Eigen::ArrayXXd WeightsForRadius(const model::LightField& light_field, double radius);
