@@ -10,19 +10,19 @@
 
 namespace thicklens::tools {
 
-// One HTML page, all of it in one file: the table, and what each effect changes as a picture.
+// Makes one self-contained HTML page: the table, and an image of what each effect changes.
 std::string AttributionPage(const Attribution& attribution, const std::string& name,
                             const std::string& version, const std::string& date);
 
-// A run that shows its progress and ends when the person asks for it.
+// Makes a run that shows its progress and ends when the user interrupts it.
 AttributionRun AttributionRunWith(const CommonOptions& common, ProgressLine* progress);
 
-// AttributeSweep of a simulation that was read from a file, which messages name.
+// Runs AttributeSweep for a simulation that was read from the file `path`; messages name the file.
 SweepAttribution AttributeSweepOf(const std::string& path,
                                   const model::SweepSimulationOptions& sweep, bool unknown_offset,
                                   const AttributionRun& run);
 
-// The page and the table for programs in a folder; `name` is what was simulated.
+// Writes the page and the machine-readable table into a folder; `name` says what was simulated.
 inline constexpr char kAttributionPage[] = "attribution.html";
 inline constexpr char kAttributionTable[] = "attribution.csv";
 void WriteAttribution(const Attribution& attribution, const std::string& name,

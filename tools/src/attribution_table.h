@@ -10,19 +10,20 @@
 
 namespace thicklens::tools {
 
-// One of them, or both.
+// At least one of the two attributions.
 struct Attribution {
   std::optional<SceneAttribution> scene;
   std::optional<SweepAttribution> sweep;
 };
 
-// One effect in all that was simulated, in the order of the enumeration. Null: not part of it.
+// One effect in all that was simulated, in the order of the enumeration. A null pointer means that
+// the effect was not part of that simulation.
 struct AttributionRow {
   model::Effect effect = model::Effect::kDefocus;
   const SceneEffect* scene = nullptr;
   const SweepEffect* sweep = nullptr;
 
-  // Of the scene; of the sweep's frames where the scene has none.
+  // The attribution for the scene, or for the sweep's frames if there is no scene.
   const AttributedEffect& picture() const {
     if (scene != nullptr) return *scene;
     return *sweep;
@@ -33,21 +34,21 @@ struct AttributionRow {
 };
 std::vector<AttributionRow> RowsOf(const Attribution& attribution);
 
-// The table's columns beyond the effect's name, with and without what a scene or a sweep adds.
-// Texts as they are shown, "-" for what there is not.
+// The columns of the table beyond the effect's name; a scene and a sweep each add columns. Cells
+// are texts as shown, "-" where there is no value.
 struct AttributionTable {
   struct Column {
     std::string group, name;  // "picture", "rms gl"
   };
-  std::vector<Column> columns;  // those of one group stand together
+  std::vector<Column> columns;  // columns of one group are adjacent
   struct Line {
     std::string name;
     std::vector<std::string> cells;
   };
-  std::vector<Line> lines;  // first "with all"
+  std::vector<Line> lines;  // the first line is "with all"
 };
 AttributionTable TableOf(const Attribution& attribution);
-// What must be known to read it, a sentence each.
+// Notes that are needed to read the table, one sentence each.
 std::vector<std::string> AttributionNotes(const Attribution& attribution);
 
 std::string AttributionText(const Attribution& attribution);

@@ -7,9 +7,9 @@
 
 namespace thicklens::tools {
 
-// `thicklens bench accuracy`: what each way to a light field costs and gives, on scenes whose true
-// views are known; or, with --save-profile, what `estimate --quality`, --within and --psnr-loss
-// choose from.
+// Adds `thicklens bench accuracy`. It measures the cost and the accuracy of each way to a light
+// field, on scenes whose true views are known. With --save-profile it measures the profile that
+// `estimate --quality`, --within and --psnr-loss choose from.
 void AddBenchAccuracyCommand(CLI::App* bench, CommandAction* action);
 
 }  // namespace thicklens::tools

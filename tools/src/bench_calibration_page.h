@@ -9,11 +9,11 @@
 
 namespace thicklens::tools {
 
-// Median error of d1 against seconds on logarithmic axes: each method a colour, the front joined.
-// Rows that cannot be compared are left out.
+// Plots the median error of d1 against seconds on logarithmic axes: one colour for each method,
+// with the Pareto front joined. Rows that cannot be compared are left out.
 Plot CalibrationPriceFigure(const std::vector<CalibrationRow>& rows);
 
-// A page with the figure and all rows. `about`: what was calibrated on what machine.
+// Makes a page with the figure and all rows. `about` says what was calibrated on which machine.
 std::string CalibrationPricePage(const std::vector<CalibrationRow>& rows, const std::string& about);
 
 }  // namespace thicklens::tools

@@ -11,7 +11,7 @@
 
 namespace thicklens::tools {
 
-// What one calibration makes of one quantity. The source's recipe states no sigma.
+// Error of one calibration in one quantity. The paper's recipe states no sigma.
 struct CalibrationError {
   double error = 0;  // value minus truth
   std::optional<double> sigma;
@@ -20,23 +20,23 @@ struct CalibrationError {
 // One calibration of one sweep.
 struct CalibrationTrial {
   calib::Outcome outcome = calib::Outcome::kRefused;
-  std::string reason;  // of anything but kOk
+  std::string reason;  // for any outcome but kOk
   double seconds = 0;
   std::optional<CalibrationError> focus_depth_mm, image_distance_um, blur_ratio_percent;
 };
 
-// How many of the stated intervals hold the truth.
+// Number of stated intervals that contain the truth.
 struct IntervalCoverage {
-  int trials = 0;     // that stated an interval; 0: nothing is known
+  int trials = 0;     // trials that stated an interval; 0: nothing is known
   int inside_68 = 0;  // |error| <= sigma
   int inside_95 = 0;  // |error| <= 1.96 sigma
   double fraction_68() const { return static_cast<double>(inside_68) / trials; }
   double fraction_95() const { return static_cast<double>(inside_95) / trials; }
 };
-// How far a fraction of so many trials scatters about its expectation (one standard deviation).
+// Returns the standard deviation of a fraction of `trials` trials about its expectation.
 double BinomialStandardError(double expected_fraction, int trials);
 
-// The errors of one quantity over the sweeps that gave it.
+// Errors of one quantity over the sweeps that gave it.
 struct CalibrationErrors {
   int count = 0;  // 0: the rest is not known
   double median_absolute = 0;
@@ -50,29 +50,30 @@ struct CalibrationRow {
   std::string method;
   int frames = 0, field_px = 0;
   int sweeps = 0, ok = 0, partial = 0, refused = 0;  // the last three add up to the first
-  // Of what was not ok; numbers stand as #, so that the same reason is the same text.
+  // Reasons of outcomes that were not ok, with # for numbers so that equal reasons have equal
+  // texts.
   std::map<std::string, int> reasons;
-  std::vector<double> seconds;  // of each sweep, refused ones among them
+  std::vector<double> seconds;  // one for each sweep, including refused ones
   CalibrationErrors focus_depth_mm, image_distance_um, blur_ratio_percent;
   bool on_front = false;
 
-  // Whether all sweeps gave what the row gives at all: errors of rows that some sweeps did not give
-  // are of other, easier sweeps.
+  // Returns whether all sweeps gave what the row gives at all. The errors of a row that some sweeps
+  // did not give belong to other, easier sweeps.
   bool IsOfAllSweeps() const;
-  // Whether its d1 can be compared with others'.
+  // Returns whether the d1 of this row can be compared with that of other rows.
   bool IsComparable() const { return IsOfAllSweeps() && image_distance_um.count == sweeps; }
 };
 CalibrationRow MakeCalibrationRow(const std::string& method, int frames, int field_px,
                                   const std::vector<CalibrationTrial>& trials);
 
-// Marks the rows that no other betters: none has both a smaller or equal median error of d1 and a
-// smaller or equal median of seconds, one of them smaller. Rows that are not comparable stay
-// unmarked and better nothing.
+// Marks the rows of the Pareto front: no other row has both a smaller or equal median error of d1
+// and a smaller or equal median of seconds, one of them smaller. Rows that are not comparable stay
+// unmarked and dominate no row.
 void MarkFront(std::vector<CalibrationRow>* rows);
 
 nlohmann::json CalibrationRowJson(const CalibrationRow& row);
 std::string CalibrationRowsCsv(const std::vector<CalibrationRow>& rows);
-// A table for the terminal, with what was refused and why below it.
+// Returns a table for the terminal, followed by what was refused and why.
 std::string CalibrationRowsText(const std::vector<CalibrationRow>& rows);
 
 }  // namespace thicklens::tools

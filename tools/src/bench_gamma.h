@@ -7,8 +7,8 @@
 
 namespace thicklens::tools {
 
-// `thicklens bench gamma`: the source's section 4 as a study, gamma from 1e-4 to 1e4 and toward 0,
-// with this program's ridge and without, as the source has it.
+// Adds `thicklens bench gamma`, which reproduces section 4 of the paper: gamma from 1e-4 to 1e4 and
+// toward 0, with this program's ridge and, as in the paper, without.
 void AddBenchGammaCommand(CLI::App* bench, CommandAction* action);
 
 }  // namespace thicklens::tools

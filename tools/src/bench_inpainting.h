@@ -7,8 +7,8 @@
 
 namespace thicklens::tools {
 
-// `thicklens bench inpainting`: the source's filling of what near things hide, against the
-// solvers' own, in time and in PSNR around occlusions.
+// Adds `thicklens bench inpainting`. It compares the paper's inpainting of occluded background with
+// the solvers' own result, in time and in PSNR around occlusions.
 void AddBenchInpaintingCommand(CLI::App* bench, CommandAction* action);
 
 }  // namespace thicklens::tools

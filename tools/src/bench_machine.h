@@ -7,18 +7,18 @@
 
 namespace thicklens::tools {
 
-// The summary of a bench that went well: its fields, and what times are to be read with, `machine`:
-// processor, cores, build, BLAS, date.
+// Returns the summary of a successful bench: its fields, and in `machine` the conditions of its
+// times: processor, cores, build, BLAS, date.
 nlohmann::json BenchSummary(nlohmann::json fields);
 constexpr char kUnknownProcessor[] = "unknown";
-std::string ProcessorName();  // or kUnknownProcessor
+std::string ProcessorName();  // kUnknownProcessor if the name is not known
 
-// Bytes a second that memory gives `threads` of them, as the STREAM benchmark does and counts it:
-// of a = b + 3 c, two arrays read and one written, far larger than any cache. The best of a few
-// runs.
+// Returns the memory bandwidth of `threads` threads in bytes per second, measured and counted as by
+// the STREAM benchmark: a = b + 3 c reads two arrays and writes one, each far larger than any
+// cache. The result is the best of a few runs.
 double TriadBytesPerSecond(int threads);
 
-double Median(std::vector<double> values);  // not empty
+double Median(std::vector<double> values);  // `values` must not be empty
 
 }  // namespace thicklens::tools
 

@@ -6,12 +6,12 @@
 
 namespace thicklens::tools {
 
-// What several benches take.
+// Options that several benches share.
 void AddRepeatOption(CLI::App* command, int* repeat);
 void AddSeedOption(CLI::App* command, std::uint64_t* seed);
-// Of a square simulated picture of at least `least` px.
+// Adds the size of a square simulated image of at least `least` px.
 void AddSizeOption(CLI::App* command, int least, int* size_px);
-// One number of views for across and down.
+// Adds one number of views for across and down.
 void AddSquareViewsOption(CLI::App* command, int* views);
 
 }  // namespace thicklens::tools

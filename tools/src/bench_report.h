@@ -13,20 +13,20 @@ namespace thicklens::tools {
 
 void AddBenchReportOption(CLI::App* command, std::string* folder);
 
-// The folder of a price list: a page, a table for other programs, and the page's figures as files.
+// The folder of a price list: a page, a machine-readable table, and the page's figures as files.
 class BenchReport {
  public:
-  explicit BenchReport(const std::string& folder);  // claims it; empty: none. Throws Error
+  explicit BenchReport(const std::string& folder);  // claims the folder; empty: none. Throws Error
 
-  // Each figure gets the name of its id.
+  // Each figure's file is named by the figure's id.
   void Commit(const std::string& page, const std::string& csv, const std::vector<Plot>& figures);
 
  private:
   std::optional<OutputFolder> folder_;
 };
 
-// The line from point to point of a front, sorted by cost: between two of them one gets what the
-// cheaper one gives.
+// Returns the line through the points of a Pareto front, sorted by cost. Between two points the
+// error is that of the cheaper one.
 PlotSeries FrontLine(const std::vector<double>& costs, const std::vector<double>& errors);
 
 }  // namespace thicklens::tools

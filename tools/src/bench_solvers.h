@@ -12,20 +12,20 @@
 
 namespace thicklens::tools {
 
-// By blocks of the source's size, with its gamma of 1.
+// Returns the plan by blocks of the paper's size, with its gamma of 1.
 EstimatePlan SourcePlan(estimator::BlockSolver solver);
-// Of the whole picture: scene with each prior, functional, grid.
+// Returns the plans for the whole image: scene with each prior, functional, grid.
 std::vector<EstimatePlan> WholePicturePlans();
 
-// One way from picture and depth to the views, all of it, stopped by an interrupt.
+// One complete way from photograph and depth to the views. An interrupt stops it.
 struct LightFieldSolver {
-  std::string solver, block_solver, prior;  // empty: it has none
+  std::string solver, block_solver, prior;  // empty: not applicable
   std::function<model::LightField(const estimator::EstimateInput&)> estimate;
 };
-// Keeps `backend`.
+// The result keeps `backend`.
 LightFieldSolver SolverByBlocks(estimator::BlockSolver solver, int threads,
                                 kernels::Backend* backend);
-// Those of WholePicturePlans(), and at last the baseline dibr.
+// Returns the solvers of WholePicturePlans(), followed by the baseline DIBR.
 std::vector<LightFieldSolver> WholePictureSolvers(int threads);
 
 }  // namespace thicklens::tools

@@ -7,8 +7,8 @@
 
 namespace thicklens::tools {
 
-// `thicklens bench source`: the source's tables 1 to 4, measured on this machine beside what was
-// published.
+// Adds `thicklens bench source`, which measures tables 1 to 4 of the paper on this machine and
+// shows the published values beside them.
 void AddBenchSourceCommand(CLI::App* bench, CommandAction* action);
 
 }  // namespace thicklens::tools

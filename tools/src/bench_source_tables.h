@@ -12,38 +12,38 @@
 
 namespace thicklens::tools {
 
-// A picture of one number of views.
+// An image with one number of views.
 struct SourcePicture : SampledPicture {
   std::string name;
-  char size = ' ';  // 'K' or 'L' of the source
+  char size = ' ';  // the paper's size 'K' or 'L'
   int views = 0;
 };
 
-// As CutParts, fewer of many views, and the name of the size.
+// Cuts as CutParts does, with fewer parts for many views, and names the size.
 void Cut(bool full, SourcePicture* picture);
 
-// A row to be measured: runs once and says how many seconds that took, or would take for the
-// whole picture. The first run fills in what the row tells beside.
+// A row to be measured. `run` runs it once and returns the seconds that this took, or would take
+// for the whole image. The first run also fills in the other fields of the row.
 struct SourceContender {
   SourceRow row;
   std::function<double(SourceRow* row)> run;
 };
 
-// Everything that the tables share.
+// Data that the tables share.
 struct SourceBench {
   int threads = 1;
   double triad_bytes_per_second = 0;
   std::shared_ptr<kernels::Backend> processor, device;  // device: null where there is none
 };
 
-// Appends the rows of one of the source's tables. They keep `bench` and `picture`.
+// Appends the rows of one of the paper's tables. The rows keep references to `bench` and `picture`.
 void AddTable1(const SourceBench& bench, const SourcePicture& picture,
                std::vector<SourceContender>* contenders);
 void AddTable2(const SourceBench& bench, const SourcePicture& picture,
                std::vector<SourceContender>* contenders);
 void AddTable3(const SourceBench& bench, const SourcePicture& picture,
                std::vector<SourceContender>* contenders);
-// The picture's lens against its thin twin.
+// Compares the image's lens with its thin counterpart.
 void AddTable4(const SourceBench& bench, const SourcePicture& picture,
                std::vector<SourceContender>* contenders);
 

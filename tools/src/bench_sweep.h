@@ -9,30 +9,30 @@
 
 namespace thicklens::tools {
 
-// A simulated focus sweep in memory, as a calibration gets it, with its truth beside.
+// A simulated focus sweep in memory, as a calibration gets it, with its truth.
 struct BenchSweep {
-  calib::FocusSweep sweep;  // of all frames; without calibration, the bench zero given
+  calib::FocusSweep sweep;  // all frames; without calibration, with the bench zero
   model::SweepTruth truth;
-  double frames_phase = 0;  // 0 to 1: which frames are taken where not all are
+  double frames_phase = 0;  // 0 to 1: selects the frames if not all are used
 };
 
-// The sweep that is measured where none is given: 50 mm at f/2.8 focused at 300 mm, 31 frames 1 mm
-// apart before dead leaves, 20 px of blur radius at its ends, with noise and reading errors.
+// The default sweep of the bench: 50 mm at f/2.8 focused at 300 mm, 31 frames 1 mm apart in front
+// of dead leaves, 20 px of blur radius at its ends, with noise and reading errors.
 model::SweepSimulationOptions BenchSweepOptions();
 
-// One of the sweeps that a description stands for, on the middle field_px x field_px px of its
-// sensor. Beside texture and noise the seed draws
-//  - where the plane of focus lies between two frames: else a method that names a frame would be
-//    always right or always wrong,
-//  - the error of what is stated of the lens floor (not for a knife edge, which shows it), because
-//  a
-//    floor that is stated with an error and given without one makes the results' errors look too
-//    large.
+// Makes one of the sweeps that a description represents, on the middle field_px x field_px px of
+// its sensor. Besides texture and noise the seed draws
+// - the position of the plane of focus between two frames: otherwise a method that names a frame
+//   would be always right or always wrong,
+// - the error of the stated lens floor (not for a knife edge, which shows the floor), because a
+//   floor that has an error but is stated without one makes the errors of the results look too
+//   large.
 BenchSweep MakeBenchSweep(const model::SweepSimulationOptions& description,
                           const model::LinearPicture& target_picture, int field_px,
                           std::uint64_t seed);
 
-// The same photographs, of which so many are used, evenly spread, and that much of their middle.
+// Returns `frames` of the same photographs, evenly spread, and field_px x field_px px of their
+// middle.
 calib::FocusSweep PartOfSweep(const BenchSweep& bench, int frames, int field_px);
 
 }  // namespace thicklens::tools

@@ -14,28 +14,28 @@
 
 namespace thicklens::tools {
 
-// The blocks of `estimate --checkpoint FILE`: a journal whose first record says as JSON which
-// estimate they are of, and whose others are a block each.
+// The blocks of `estimate --checkpoint FILE`: a journal whose first record describes the estimate
+// as JSON and whose other records hold one block each.
 class BlockCheckpoint final : public estimator::BlockStore {
  public:
-  // Throws Error for a file that is none, or is at work.
+  // Throws Error if the file is not a checkpoint or is in use.
   explicit BlockCheckpoint(const std::string& path);
 
   const std::string& path() const { return journal_.path(); }
-  // What the run that left blocks there said of itself: the edge of its blocks, and the --device
-  // that computes as it did.
+  // Settings of the run that left blocks in the file: the edge of its blocks, and the --device that
+  // computes as it did.
   std::optional<int> block_px() const;
   std::optional<std::string> device() const;
-  // Blocks that the run which has begun could go on from. Waits for nobody: it is asked for when
-  // the process ends, while a disk may hold up the thread that keeps a block.
+  // Number of blocks that the current run could continue from. The function never blocks: it is
+  // called when the process ends, while a disk may delay the thread that keeps a block.
   int kept() const { return kept_; }
 
-  // Throws Error for a file that is of another estimate, and says what differs.
+  // Throws Error if the file belongs to another estimate, and says what differs.
   void Begin(const estimator::BlockRun& run) override;
   std::optional<estimator::SolvedBlock> Find(int block) override;
   void Keep(int block, const estimator::SolvedBlock& solved) override;
 
-  // The light field is there. Whether the file could be removed.
+  // Call this when the light field is complete. Returns whether the file could be removed.
   bool Remove();
 
  private:

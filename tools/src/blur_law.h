@@ -13,28 +13,30 @@ namespace thicklens::tools {
 bool IsDepth(double depth_mm);  // finite and in front of the camera
 bool HasBlur(const calib::FrameMeasurement& frame);
 
-// Blur by the fitted law, sigma = sqrt(S0 + (kappa r_defocus/p)^2), px per axis, without the pixel
-// box. Exact for all depths z > 0; at z = zf it is the floor. The sweep must outlive it.
+// Blur by the fitted law, sigma = sqrt(S0 + (kappa r_defocus/p)^2), px for each axis, without the
+// pixel box. The law is exact for all depths z > 0; at z = zf it is the floor. The sweep must
+// outlive the object.
 class BlurLaw {
  public:
-  // Nothing where the fit gave no image distance or no blur ratio that a lens can have.
+  // Returns nothing if the fit gave no image distance or no blur ratio that a lens can have.
   static std::optional<BlurLaw> Of(const calib::FocusSweep& sweep,
                                    const calib::Calibration& calibration);
-  // One side's depth of focus and blur ratio, with the floor of the fit.
+  // Makes the law from one side's depth of focus and blur ratio, with the floor of the fit.
   static std::optional<BlurLaw> OfSide(const calib::FocusSweep& sweep,
                                        const calib::Calibration& calibration,
                                        const calib::SideFit& side);
-  // The law that a simulated sweep was made with.
+  // Returns the law that a simulated sweep was made with.
   static BlurLaw OfTruth(const calib::FocusSweep& sweep, const model::SweepTruth& truth);
 
   double SigmaPx(double depth_mm) const;
-  // d sigma/d z, px per mm: how an error of the reading goes into the blur. 0 at z = zf.
+  // Derivative d sigma/d z, px per mm: the effect of an error of the reading on the blur. It is 0
+  // at z = zf.
   double SlopePxPerMm(double depth_mm) const;
-  // Standard deviation of SigmaPx at a given reading, px, from the fit's covariance; nothing where
-  // there is none.
+  // Standard deviation of SigmaPx at a given reading, px, from the fit's covariance; nothing
+  // without a covariance.
   std::optional<double> SigmaErrorPx(double depth_mm) const;
-  // Measured minus law over the standard deviation of both measured blur and reading, for a frame
-  // of the fit.
+  // Measured minus predicted blur, divided by the standard deviation of both measured blur and
+  // reading, for a frame of the fit.
   std::optional<double> ResidualSigmas(const calib::FrameMeasurement& frame) const;
 
   bool floor_from_frames() const { return floor_from_frames_; }
@@ -53,7 +55,8 @@ class BlurLaw {
   double kappa_ = 0;
   double floor_squared_px2_ = 0;
   bool floor_from_frames_ = false;
-  // Of d1, kappa, floor and bench offset; rows of what is not in the fit's covariance are 0.
+  // Covariance of d1, kappa, floor and bench offset; rows of parameters that the fit's covariance
+  // lacks are 0.
   std::optional<Eigen::Matrix4d> covariance_;
 };
 

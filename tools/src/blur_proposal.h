@@ -10,7 +10,7 @@
 
 namespace thicklens::tools {
 
-// What --check-blur found, in the numbers that a person can change: those of the camera's file, or
+// The finding of --check-blur, in numbers that the user can change: those of the camera's file, or
 // the scale and offset of a map of disparities.
 class BlurProposal {
  public:
@@ -18,8 +18,8 @@ class BlurProposal {
                const DepthOptions& depth);
 
   std::string Warning() const;  // one line; empty: nothing is proposed
-  std::string Summary() const;  // a line of the summary, without its name
-  // {message, blocks, unexplained_blocks, size, halvings, seconds, evaluations: [..],
+  std::string Summary() const;  // one line of the summary, without its name
+  // Returns {message, blocks, unexplained_blocks, size, halvings, seconds, evaluations: [..],
   // proposal: {..} or null}.
   nlohmann::json Json() const;
 
@@ -34,10 +34,11 @@ class BlurProposal {
   double narrower_ratio_ = 0, other_depth_mm_ = 0;  // that are proposed
 };
 
-// Depth of the plane of focus, mm, for which every disparity is `offset_px` larger than with the
-// camera's. With d(z) = da K (1/z - 1/zf)/p: 1/zf' = 1/zf - offset p/(da K); derived here [D21]. p:
-// pixel pitch, da: aperture step of a view, mm, both of the axis of the larger step. Infinity if
-// what is in focus then would lie behind it; K is taken to be the camera's.
+// Returns the depth of the plane of focus from the aperture, mm, for which every disparity is
+// `offset_px` larger than with the camera's. With d(z) = da K (1/z - 1/zf)/p: 1/zf' = 1/zf - offset
+// p/(da K); derived here [D21]. p is the pixel pitch and da the aperture step of a view, mm, both
+// of the axis of the larger step; K is taken from the camera. The result is infinite if the plane
+// in focus would lie beyond infinity.
 double FocusDepthForOffsetMm(const estimator::EstimateInput& input, double offset_px);
 
 }  // namespace thicklens::tools

@@ -7,7 +7,7 @@ namespace thicklens::tools {
 
 std::string Version();  // "0.1.0"
 
-// What `thicklens --version` prints: the version, and the compiler and libraries it was built with.
+// Returns the output of `thicklens --version`: the version, the compiler and the libraries.
 std::string BuildInfo();
 
 }  // namespace thicklens::tools

@@ -12,17 +12,17 @@
 
 namespace thicklens::tools {
 
-// One <svg> of class "plot". Its name is unique among those of a calibration.
+// One <svg> of class "plot". Its name is unique among the drawings of a calibration.
 struct Drawing {
   std::string name;
   std::string svg;
 };
 
-// Drawings under one caption. Without drawings there was nothing to show.
+// Drawings under one caption. Without drawings the figure is empty.
 struct ReportFigure {
   std::vector<Drawing> drawings;
   std::string caption;
-  bool beside = false;  // the drawings stand beside each other where there is room
+  bool beside = false;  // the drawings are shown side by side where there is room
 };
 
 ReportFigure FigureOf(const std::vector<Plot>& plots, const std::string& caption);
@@ -38,10 +38,10 @@ ReportFigure ReadingErrorFigure(const calib::FocusSweep& sweep,
                                 const calib::Calibration& calibration, const Abscissa& abscissa);
 ReportFigure ScaleFigure(const calib::FocusSweep& sweep, const calib::Calibration& calibration);
 ReportFigure ExampleFigure(const calib::Calibration& calibration);
-// The depth of focus of each tile, coloured.
+// The depth of focus of each tile as a colour.
 ReportFigure FieldFigure(const calib::FieldMap& field);
 
-// The names that drawings of a calibration can have.
+// Names that drawings of a calibration can have.
 const std::vector<std::string>& DrawingNames();
 
 }  // namespace thicklens::tools

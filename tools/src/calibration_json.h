@@ -9,16 +9,17 @@
 
 namespace thicklens::tools {
 
-// The machine-readable summary, with every number that stands in the report. `status`, `reason`,
-// `method` and the results are always there, and so are `sharpest_reading`, `diagnoses` (the causes
-// that were compared) and `frame_structure` (null where it was not looked for); a result that does
-// not exist, a number that was not measured, and every number that is not finite, is null.
+// Returns the machine-readable summary, with every number of the report. `status`, `reason`,
+// `method` and the results are always present, and so are `sharpest_reading`, `diagnoses` (the
+// causes that were compared) and `frame_structure` (null if it was not examined). A result that
+// does not exist, a number that was not measured, and a number that is not finite is null.
 // `scale_law`, `covariance`, `blur_fit`, `sides`, `field` and the entries of `other_methods` are
-// there with `done: false` or null numbers if they were not reached; `truth` is left out where none
+// present with `done: false` or null numbers if they were not reached. `truth` is left out if none
 // is known.
 //
-// With `use_source_recipe` the results are the source's, their sigma null, status and reason its
-// own; what the fit found is then in `other_methods.fit` alone, under the keys that it has else.
+// With `use_source_recipe` the results are those of the paper's recipe, with null sigma and with
+// the recipe's own status and reason. The results of the fit are then in `other_methods.fit` alone,
+// under their usual keys.
 nlohmann::json CalibrationJson(const calib::FocusSweep& sweep,
                                const calib::Calibration& calibration,
                                const model::SweepTruth* truth, bool use_source_recipe);

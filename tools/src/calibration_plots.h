@@ -11,7 +11,7 @@
 
 namespace thicklens::tools {
 
-// What the figures of a calibration share.
+// Elements that the figures of a calibration share.
 
 using CurvePoints = std::vector<std::pair<double, double>>;
 
@@ -21,8 +21,8 @@ void AddPoint(PlotSeries* series, double x, double y, std::string name);
 // A horizontal line without a label, solid at 0.
 PlotLine Level(double position);
 
-// Where a frame stands in the figures. Without a bench zero there are no depths; the readings then
-// still show the shape of a curve.
+// The abscissa of a frame in the figures. Without a bench zero there are no depths; the readings
+// then still show the shape of a curve.
 struct Abscissa {
   bool is_depth = false;
   std::string label;
@@ -31,7 +31,7 @@ struct Abscissa {
 };
 Abscissa AbscissaOf(const calib::Calibration& calibration);
 
-// What is told of a point when it is pointed at.
+// Returns the text that is shown when a point is pointed at.
 std::string PointName(const calib::FrameMeasurement& frame, const Abscissa& abscissa,
                       const std::string& quantity, double value);
 

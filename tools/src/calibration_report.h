@@ -11,9 +11,9 @@
 
 namespace thicklens::tools {
 
-// What the report says of how it came about and the measurement does not know.
+// The origin of the report, as far as the measurement does not know it.
 struct ReportOrigin {
-  std::string sweep_name;          // file or folder, as the person gave it
+  std::string sweep_name;          // file or folder, as the user gave it
   std::string version;             // of thicklens
   std::string date;                // ISO 8601
   std::vector<std::string> notes;  // one line each
@@ -26,11 +26,11 @@ struct ReportFile {
 };
 
 struct CalibrationReport {
-  // One page that needs nothing else: no network, no script; its figures are inline SVG, its
-  // pictures inline too. It is well-formed XML.
+  // One self-contained page without network access or scripts; its figures are inline SVG, and its
+  // images are inline too. It is well-formed XML.
   std::string html;
   std::vector<ReportFile> figures;  // the same figures as SVG files
-  std::string captions;             // plain text: which figure is which file, and what it shows
+  std::string captions;             // plain text: the file and the content of each figure
 };
 
 // `truth` may be null and `pictures` empty. Figures without data are left out.
@@ -39,7 +39,7 @@ CalibrationReport MakeCalibrationReport(const calib::FocusSweep& sweep,
                                         const model::SweepTruth* truth, const ReportOrigin& origin,
                                         const FramePictures& pictures = {});
 
-// The names that figures of a report can have.
+// Names that figures of a report can have.
 std::vector<std::string> ReportFigureNames();
 
 }  // namespace thicklens::tools

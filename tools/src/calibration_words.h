@@ -10,32 +10,34 @@
 
 namespace thicklens::tools {
 
-// What was found, in words that text and page share. One line without an end each, "+-" and "-" as
-// typed; empty where there is nothing to say.
+// The findings in words that text and page share. Each is one line without a newline, with "+-" and
+// "-" in plain characters, and empty if there is nothing to say.
 
-std::string ScaleKindName(calib::ScaleKind kind);  // as in JSON: "inverse-depth"
+std::string ScaleKindName(calib::ScaleKind kind);  // name in JSON: "inverse-depth"
 std::string ScaleKindWords(calib::ScaleKind kind);
 
 // Tilt, curvature, astigmatism and depths of the field, one line each.
 std::vector<std::string> FieldLines(const calib::FieldMap& field);
 // The axial colour: each channel's depth of focus.
 std::string ChannelLine(const std::vector<calib::ChannelFocus>& channels);
-// How far the far side's depth of focus lies from the near side's; nothing unless both are done.
+// Distance of the far side's depth of focus from the near side's; nothing unless both sides are
+// done.
 std::optional<model::Estimate> SidesApartMm(const calib::Calibration& calibration);
 std::string SidesLine(const calib::Calibration& calibration);
-// Which point spread function the frames like better, and whether the camera file agrees.
+// The point spread function that fits the frames better, and whether the camera file agrees.
 std::string ShapeLine(const calib::FocusSweep& sweep, const calib::BlurFit& blur);
 std::string MagnificationLine(const calib::Calibration& calibration);
 std::string DistortionLine(const calib::ScaleLaw& scale);
 std::string OutsideLine(const calib::BlurFit& blur);
-// The combination of parameters known worst; nothing where they are hardly correlated.
+// The combination of parameters with the largest error; empty if they are hardly correlated.
 std::string WorstKnownLine(const calib::BlurFit& blur);
-// That the frames lie off the law by more than their errors, where they do.
+// Reports that the frames deviate from the law by more than their errors, if they do.
 std::string WidenedLine(const calib::BlurFit& blur);
-// Which numbers of the camera that the results hang on are stated without a tolerance.
+// Lists the numbers of the camera that affect the results and are stated without a tolerance.
 std::string MissingTolerancesLine(const model::Camera& camera);
 
-// (lowest, highest) of one systematic part, with the digits of the larger: "-3.1 .. +3.9".
+// Formats the (lowest, highest) range of one systematic part, with the digits of the larger: "-3.1
+// .. +3.9".
 std::string PartRange(const Eigen::Vector2d& range);
 
 }  // namespace thicklens::tools

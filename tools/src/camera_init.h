@@ -9,7 +9,7 @@
 
 namespace thicklens::tools {
 
-// A camera as a person describes it; absent: not given.
+// A camera as the user describes it; absent: not given.
 struct CameraDescription {
   std::optional<double> front_focal_length_mm;
   std::optional<double> rear_focal_length_mm;
@@ -23,9 +23,9 @@ struct CameraDescription {
   std::string name;
 };
 
-// The camera file's content: what is given as it is; what comes from `photo` (of the size
-// `photo_size_px`) or by default is marked assumed. Throws Error that lists what is missing and how
-// to give it.
+// Makes the camera file's content. Given values are used as they are; values from `photo` (of the
+// size `photo_size_px`) or by default are marked as assumed. Throws Error that lists what is
+// missing and how to give it.
 model::Camera DescribedCamera(const CameraDescription& description,
                               const std::optional<PhotoExif>& photo,
                               const std::optional<Eigen::Vector2i>& photo_size_px);

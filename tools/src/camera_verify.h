@@ -10,11 +10,11 @@
 
 namespace thicklens::tools {
 
-// What `thicklens camera verify` prints, and what its --json has beside the names of the files.
+// The printed output of `thicklens camera verify`, and its --json without the names of the files.
 std::string VerificationText(const calib::Verification& verification);
 nlohmann::json VerificationJson(const calib::Verification& verification);
 
-// thicklens camera verify CAMERA SWEEP.
+// Adds `thicklens camera verify CAMERA SWEEP`.
 void AddCameraVerifyCommand(CLI::App* camera, CommandAction* action);
 
 }  // namespace thicklens::tools

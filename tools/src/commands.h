@@ -12,38 +12,39 @@
 
 namespace thicklens::tools {
 
-// What every command takes.
+// Options of every command.
 struct CommonOptions {
-  std::string json_path;  // empty: none; "-": standard output, where no text goes then
+  std::string json_path;  // empty: none; "-": standard output, which then gets no text
   bool quiet = false;
   bool verbose = false;
   int threads = 0;  // 0: one per core
 };
 void AddCommonOptions(CLI::App* command, CommonOptions* options);
 
-// What a command hands back. A refusal ends the program with exit code 1, after its summary has
-// been written.
+// The result of a command. A refusal ends the program with exit code 1, after its summary has been
+// written.
 struct CommandResult {
   nlohmann::json summary;
   std::string refusal;      // one line; empty: none
-  bool is_written = false;  // outputs are in place: an interrupt comes too late
+  bool is_written = false;  // outputs are in place, so an interrupt comes too late
 };
 
-// Runs a command with its --json file claimed before and written after it; an Error is written
-// there as `status: refused` with its reason, unless an input might be lost by that. Throws what
-// the command throws, and Error for a refusal.
+// Runs a command. Its --json file is claimed before and written after the command. An Error is
+// written there as `status: refused` with its reason, unless this could destroy an input. Throws
+// what the command throws, and Error for a refusal.
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command);
 
-// The moment, UTC, as in 2026-01-31T12:00:00Z.
+// Returns the current time, UTC, as in 2026-01-31T12:00:00Z.
 std::string NowIso8601();
 
-// Results go to stdout, unless --quiet or --json has it.
+// Prints a result to stdout, unless --quiet is given or --json uses stdout.
 void PrintResult(const CommonOptions& options, const std::string& text);
 
-// Names on stderr, in one line, which numbers of the camera are somebody's assumption.
+// Reports on stderr, in one line, which numbers of the camera are assumed.
 void TellAssumedFields(const model::Camera& camera);
 
-// Each adds its command to the program. When the command line asks for it, `action` is set.
+// Each function adds its command to the program. When the command line asks for the command,
+// `action` is set.
 using CommandAction = std::function<void()>;
 void AddSimulateCommand(CLI::App* program, CommandAction* action);
 void AddCalibrateCommand(CLI::App* program, CommandAction* action);

@@ -9,12 +9,12 @@
 
 namespace thicklens::tools {
 
-// Equal pictures have an infinite PSNR: "identical" in texts; null and `identical: true` in JSON,
-// which has no infinity. A score that is not defined is "-" and null.
+// Equal images have an infinite PSNR: texts say "identical"; JSON, which has no infinity, has null
+// and `identical: true`. A score that is not defined is "-" in texts and null in JSON.
 std::string PictureScoresText(const estimator::PictureScores& scores, int border_px);
 nlohmann::json PictureScoresJson(const estimator::PictureScores& scores);
 
-// Views whose PSNR is above DIBR's; 0 without DIBR.
+// Number of views whose PSNR is above that of DIBR; 0 without DIBR.
 int ViewsAboveDibr(const estimator::LightFieldScores& scores);
 
 // `reference` gives counts and sizes; `per_view` adds a line for each view.

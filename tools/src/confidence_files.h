@@ -8,11 +8,12 @@
 
 namespace thicklens::tools {
 
-// The confidence of all rays, view by view.
+// Writes the confidence of all rays, view by view.
 void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_count, int width_px,
                      int height_px, LightFieldWriter* writer);
 
-// The same of an estimate whose solver does not tell it: by the depth alone.
+// Writes the confidence of an estimate whose solver does not report it; it depends on the depth
+// alone.
 void WriteConfidence(const estimator::EstimateInput& input, int threads, LightFieldWriter* writer);
 
 }  // namespace thicklens::tools

@@ -7,13 +7,13 @@
 
 namespace thicklens::tools {
 
-// SHA-256 of what comes in pieces.
+// SHA-256 of data that arrives in pieces.
 class Sha256 {
  public:
   Sha256();
   ~Sha256();
   void Add(std::string_view bytes);
-  // Once, at the end: in lower-case hexadecimal, as sha256sum prints it.
+  // Call this once, at the end. Returns lower-case hexadecimal, as sha256sum prints it.
   std::string Hex();
 
  private:

@@ -7,13 +7,13 @@
 
 namespace thicklens::tools {
 
-// A depth map of one channel: PFM (grey, either byte order, rows bottom to top as the format has
-// them), 8- or 16-bit PNG, 16-bit or float TIFF, float EXR. The map's rows go top to bottom. Throws
-// Error that names the file, what was found and what would be right (three channels, no
-// picture, a broken header, missing values).
+// Reads a depth map of one channel: PFM (grey, either byte order, rows bottom to top as the format
+// has them), 8- or 16-bit PNG, 16-bit or float TIFF, float EXR. The rows of the result go top to
+// bottom. Throws Error that names the file, what was found and what is expected (for three
+// channels, a file that is no image, a broken header, missing values).
 model::RawDepthMap ReadDepthMap(const std::string& path);
 
-// A PFM file (little endian) of the map.
+// Encodes the map as a PFM file (little endian).
 std::string EncodePfm(const model::RawDepthMap& map);
 
 }  // namespace thicklens::tools

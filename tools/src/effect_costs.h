@@ -11,20 +11,20 @@
 
 namespace thicklens::tools {
 
-// What effects cost in a simulated picture of a camera, measured on this machine.
+// Cost of effects in a simulated image of a camera, measured on this machine.
 struct EffectCosts {
-  double seconds = 0;  // of the picture with the effects that are on, of one core
-  // Of each effect that a picture of a scene can have: how much longer the picture takes with it
-  // than without it, all others being as they are. 0: nothing of it is there, or less than can be
-  // measured.
+  double seconds = 0;  // time of the image with the enabled effects, on one core
+  // For each effect that an image of a scene can have: the additional time of the image with the
+  // effect, all others unchanged. 0: the effect does not occur, or its cost is too small to
+  // measure.
   std::vector<std::pair<model::Effect, double>> of_effect;
 };
 
-// Simulates a patch of the middle of the sensor, whose left half shows leaves in the nearest depth
-// and whose right half leaves in the farthest (at most 1 km), several times, and takes medians; the
-// picture is as many patches as it has pixels for. `sensor`: its noise and bits; its camera, layers
-// and effects do not count. `tell` is called before each of them, and may throw to stop.
-// Throws Error for a camera or depths that cannot be simulated.
+// Simulates a patch of the middle of the sensor several times and takes medians. Its left half
+// shows leaves at the nearest depth, its right half leaves at the farthest (at most 1 km). The time
+// of the image is that of the patch times the ratio of their pixels. From `sensor` only the noise
+// and the bits are used, not the camera, layers and effects. `tell` is called before each
+// simulation and may throw to stop. Throws Error for a camera or depths that cannot be simulated.
 EffectCosts MeasureEffectCosts(const model::Camera& camera, const DepthRange& range,
                                const model::SceneSimulationOptions& sensor,
                                const model::EffectDecision& decision,

@@ -12,25 +12,26 @@
 
 namespace thicklens::tools {
 
-// --effects, --without, --tolerance of commands with a forward model. What is absent was not given.
+// The options --effects, --without and --tolerance of commands with a forward model. An absent
+// value was not given.
 struct EffectOptions {
   std::optional<std::string> effects, without, tolerance;
-  std::string tolerance_option = "--tolerance";  // where it has another name; empty: there is none
+  std::string tolerance_option = "--tolerance";  // another name of the option; empty: there is none
 };
 void AddEffectOptions(CLI::App* command, EffectOptions* options);
-// Throws UsageError for effects that are named and that the forward model does not have.
+// Throws UsageError for named effects that the forward model does not have.
 void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model);
-// Puts what was given in the place of what `choice` says. Throws UsageError.
+// Overrides `choice` with the given options. Throws UsageError.
 void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice);
 
 // "250 mm, at (0, 479)".
 std::string EffectPlaceText(const model::EffectPlace& place);
-// One entry an effect: name, impact with its unit, bound in grey levels, on, where.
+// One entry for each effect: name, impact with its unit, bound in grey levels, on, where.
 nlohmann::json EffectsJson(const model::EffectDecision& decision);
-// One line on what was on and what was left out.
+// One line on the effects that were on and those that were left out.
 std::string EffectsText(const model::EffectDecision& decision);
-// A line an effect. `cost_seconds`: null, or of some effects what they cost, in a column of its
-// own.
+// One line for each effect. `cost_seconds` may be null; otherwise it holds the costs of some
+// effects, shown in a column of their own.
 std::string EffectsTable(
     const model::EffectDecision& decision,
     const std::vector<std::pair<model::Effect, double>>* cost_seconds = nullptr);

@@ -7,15 +7,15 @@
 
 namespace thicklens::tools {
 
-// The parts of the page that show what an estimate knows of itself, each without its heading and
-// empty where the input has no maps.
+// The sections of the page that show the estimate's own quality maps, each without its heading and
+// empty if the input has no maps.
 std::string ResidualFigure(const LightFieldPageInput& input);
 std::string ConfidenceFigure(const LightFieldPageInput& input);
 
-// All views in one picture.
+// All views in one image.
 std::string MosaicFigure(const LightFieldPageInput& input);
 
-// The style rules of these.
+// The style rules of these figures.
 std::string EstimateFigureStyle();
 
 }  // namespace thicklens::tools

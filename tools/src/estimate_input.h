@@ -16,19 +16,19 @@ namespace thicklens::tools {
 struct PreparedEstimate {
   estimator::EstimateInput input;
   model::EffectDecision effects;
-  PreparedDepth depth;  // without its disparity, which is the input's
-  // Of the disparity, px per view step: as it was, and what is left of it where it was smoothed.
+  PreparedDepth depth;  // without its disparity, which is in `input`
+  // Noise of the disparity, px per view step: as read, and after smoothing if it was smoothed.
   std::optional<double> depth_noise_px, depth_noise_left_px;
   EstimateAperture aperture;
   std::optional<estimator::ApertureBlur> aperture_blur;  // with a camera
-  // How the photograph's EXIF agrees with the camera file; null: there is none, or no camera.
+  // Agreement of the photograph's EXIF with the camera file; null if there is no EXIF or no camera.
   nlohmann::json exif;
 };
 
-// Least and largest disparity, px per view step along u, or along v where there is one view in u.
+// Minimum and maximum disparity, px per view step along u, or along v if there is one view in u.
 std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map);
 
-// Reads picture, depth and camera and tells what is taken for granted of them. Throws Error and
+// Reads photograph, depth and camera and reports what is assumed about them. Throws Error and
 // UsageError.
 PreparedEstimate PrepareEstimate(const EstimateOptions& options);
 

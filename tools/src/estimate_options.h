@@ -18,7 +18,7 @@
 
 namespace thicklens::tools {
 
-// The command line of `thicklens estimate`. What is empty or absent was not given.
+// The command line of `thicklens estimate`. An empty or absent value was not given.
 struct EstimateOptions {
   CommonOptions common;
   std::string picture_path, depth_path, camera_path, output_folder, report_folder;
@@ -26,11 +26,11 @@ struct EstimateOptions {
   ViewsOption views;
   CropOption crop;
   std::string aperture_shape;
-  std::string aperture_of;  // a light field whose views are those of the aperture
+  std::string aperture_of;  // a light field whose views give the positions on the aperture
   int grid = 0;
   bool sparse = false;
   std::string sensor_origin;
-  bool ignore_exif = false;  // of the photograph, where it contradicts the camera file
+  bool ignore_exif = false;  // for a photograph whose EXIF contradicts the camera file
   std::optional<double> st_depth_mm;
   std::string transfer;
   std::string solver = "scene";
@@ -40,7 +40,7 @@ struct EstimateOptions {
   EffectOptions effects{{}, {}, {}, "--effect-tolerance"};
   std::string device = "auto";
   std::string format = "png";
-  // Of some solvers, as the help says.
+  // Options of some solvers, as the help says.
   std::optional<std::string> prior, strength;
   bool check_blur = false;
   std::optional<double> tolerance;
@@ -50,24 +50,24 @@ struct EstimateOptions {
   std::optional<double> gamma, ridge;
   std::optional<int> block_px;
   std::string checkpoint_path;
-  // In place of these: what it is to be like, chosen from a profile (empty: the person's own, or
-  // the one that ships).
+  // A wish that replaces the options above; a profile chooses them (empty path: the user's own
+  // profile, or the default profile of the program).
   PlanWish wish;
   std::string profile_path;
 
   bool by_blocks() const { return solver == "blocks"; }
-  std::string report_path() const;  // of the page in its folder; empty: none
+  std::string report_path() const;  // path of the page in its folder; empty: none
 };
 
 void AddEstimateOptions(CLI::App* command, EstimateOptions* options);
 
-// Throws UsageError for what cannot be meant: nothing that is given is left out without a word.
+// Throws UsageError for contradictory options: no given option is ignored silently.
 void CheckEstimateUsage(const EstimateOptions& options);
-// The part of it that speaks of the solver's own options.
+// The part of CheckEstimateUsage for the solver's own options.
 void CheckSolverUsage(const EstimateOptions& options);
 
-// What is given, and the solver's defaults else; `on`: the effects of the photograph that the
-// solver is to take into account. Throws Error where that is not valid.
+// Return the given options and the solver's defaults for the others. `on` lists the effects of the
+// photograph that the solver must take into account. They throw Error for invalid options.
 using Progress = std::function<void(int done, int total)>;
 estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
                                        Progress progress);

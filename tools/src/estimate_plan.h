@@ -13,44 +13,44 @@
 
 namespace thicklens::tools {
 
-// One way to a light field: all that `estimate` lets a person choose about how, but not about what.
+// One way to a light field: the options of `estimate` that determine how it is computed, not what.
 struct EstimatePlan {
   std::string solver = "scene";
-  std::string prior;                // of scene; else empty
-  std::string block_solver;         // of blocks; else empty
-  std::optional<double> tolerance;  // absent: the solver's own
+  std::string prior;                // solver scene only; otherwise empty
+  std::string block_solver;         // solver blocks only; otherwise empty
+  std::optional<double> tolerance;  // absent: the solver's default
   bool double_precision = false;
   std::optional<int> block_px;
   bool on_opencl = false;
 };
 
-// Unique, as a person would type it: "scene tv", "scene tv, tolerance 0.01", "blocks umfpack 16
-// px".
+// Returns a unique name, as a user would type it: "scene tv", "scene tv, tolerance 0.01", "blocks
+// umfpack 16 px".
 std::string PlanName(const EstimatePlan& plan);
 nlohmann::json PlanJson(const EstimatePlan& plan);
 // Throws Error that begins with `where` and names the field.
 EstimatePlan PlanFromJson(const nlohmann::json& json, const std::string& where);
-// The options of a command line that asks for it: word by word, and as one text.
+// Return the options of a command line for the plan: word by word, and as one text.
 std::vector<std::string> PlanWords(const EstimatePlan& plan);
 std::string PlanArguments(const EstimatePlan& plan);
 void ApplyPlan(const EstimatePlan& plan, EstimateOptions* options);
 
-// What a solver says of a run of it, whatever solver it is.
+// The report of a run of any solver.
 struct PlanRun {
   model::LightField light_field;
   double setup_seconds = 0, solve_seconds = 0, views_seconds = 0;
   double seconds() const { return setup_seconds + solve_seconds + views_seconds; }
   std::optional<int> iterations;  // absent: a direct solver
   bool converged = true;
-  std::optional<double> relative_residual;  // recomputed from the answer
-  std::optional<double> rcond;              // of direct solvers
-  std::string device;                       // of blocks and scene
+  std::optional<double> relative_residual;  // recomputed from the solution
+  std::optional<double> rcond;              // direct solvers only
+  std::string device;                       // solvers blocks and scene only
 };
-// All that is given is taken as it is; fall-off where there is a camera. `backend`: where the plan
-// is to be computed. Stopped by an interrupt.
+// Uses the plan as given; fall-off is applied if there is a camera. `backend` computes the plan. An
+// interrupt stops it.
 PlanRun RunPlan(const EstimatePlan& plan, const estimator::EstimateInput& input, int threads,
                 kernels::Backend* backend);
-// Of the baseline: the picture warped by its depth.
+// Runs the baseline: the photograph warped by its depth.
 PlanRun RunWarping(const estimator::EstimateInput& input, int threads);
 
 }  // namespace thicklens::tools

@@ -7,7 +7,8 @@
 
 namespace thicklens::tools {
 
-// What `thicklens estimate --json` wrote. What the file leaves out or gives as null is absent.
+// The content of `thicklens estimate --json`. A value that the file leaves out or gives as null is
+// absent.
 struct EstimateRecord {
   std::string solver;
   int u_count = 0, v_count = 0, s_count = 0, t_count = 0;
@@ -23,12 +24,12 @@ struct EstimateRecord {
   std::optional<double> peak_rss_mib, relative_residual, rcond_min;
   std::optional<std::vector<std::string>> effects;
 };
-// Throws Error that begins with the path: no JSON, of another command, refused, wrong types.
+// Throws Error that begins with the path: no JSON, from another command, refused, wrong types.
 EstimateRecord ReadEstimateRecord(const std::string& path);
-// The same of a text; `name` is its file's in messages.
+// Parses a text; `name` is the name of its file in messages.
 EstimateRecord ParseEstimateRecord(const std::string& text, const std::string& name);
 
-// Metrics of a view, or their mean over views. JSON has no infinity: the PSNR of equal pictures is
+// Metrics of a view, or their mean over views. JSON has no infinity: the PSNR of equal images is
 // null there and +inf here.
 struct ScoresRecord {
   double psnr_db = 0;
@@ -39,10 +40,10 @@ struct ViewRecord {
   double psnr_db = 0;
   std::optional<double> dibr_psnr_db;
 };
-// What `thicklens compare TRUE_LF LF --json` wrote.
+// The content of `thicklens compare TRUE_LF LF --json`.
 struct ComparisonRecord {
-  // What was compared: views, pixels of each, and the border that was left out; 0, 0 and absent
-  // where the file does not say it.
+  // The compared area: views, pixels of each, and the border that was left out; 0, 0 and absent if
+  // the file does not state them.
   int u_count = 0, v_count = 0, s_count = 0, t_count = 0;
   std::optional<int> border_px;
   ScoresRecord mean;

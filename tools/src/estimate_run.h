@@ -6,7 +6,7 @@
 
 namespace thicklens::tools {
 
-// `thicklens estimate`, from its files to its files. Throws Error and UsageError.
+// Runs `thicklens estimate` from its input files to its output files. Throws Error and UsageError.
 CommandResult RunEstimate(const EstimateOptions& options);
 
 }  // namespace thicklens::tools

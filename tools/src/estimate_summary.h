@@ -20,47 +20,47 @@
 namespace thicklens::tools {
 
 struct EstimateSeconds {
-  double read = 0;   // of the set-up: until a plan is chosen, and that
+  double read = 0;   // part of the set-up until a plan is chosen, including the choice
   double setup = 0;  // reading included
   double blur_check = 0;
   double solve = 0;
-  double views = 0;  // making them; by blocks they are what is solved for
-  double files = 0;  // writing them
-  double total = 0;  // until the light field was written, a page not included
+  double views = 0;  // making the views; the solver of blocks solves for them
+  double files = 0;  // writing the views
+  double total = 0;  // until the light field was written, without a page
 };
 
-// What came out of a run. One of `scene`, `blocks` and `functional` is there.
+// The result of a run. Exactly one of `scene`, `blocks` and `functional` is present.
 struct EstimateOutcome {
   model::LightField light_field;
   std::optional<estimator::SceneSummary> scene;
-  estimator::SceneMaps maps;  // of `scene`
+  estimator::SceneMaps maps;  // of solver scene
   std::optional<estimator::EstimateSummary> blocks;
-  std::optional<estimator::FunctionalSummary> functional;  // `grid`, too
-  std::optional<BlurProposal> blur;                        // of `scene`, if it was asked for
+  std::optional<estimator::FunctionalSummary> functional;  // also of solver grid
+  std::optional<BlurProposal> blur;                        // of solver scene, if requested
   std::optional<estimator::InpaintSummary> inpainting;     // --fill telea
   EstimateSeconds seconds;
-  double clipped_fraction = 0;             // of the values, by the views' files
-  estimator::ConfidenceShares confidence;  // of all rays
+  double clipped_fraction = 0;             // share of the values, by the views' files
+  estimator::ConfidenceShares confidence;  // shares of all rays
 
-  // What the estimate can know of itself.
+  // Quality checks of the estimate.
   estimator::StepCheck steps;
   std::optional<double> depth_noise_px;       // of the map that was read
-  std::optional<double> depth_noise_left_px;  // where it was smoothed
+  std::optional<double> depth_noise_left_px;  // present if the map was smoothed
   std::vector<estimator::ResidualPatch> patches;
-  std::optional<double> unexplained_share;  // of `scene`
+  std::optional<double> unexplained_share;  // of solver scene
 };
-// Sets the last four from the others.
+// Sets the last four fields from the others.
 void CheckOutcome(const PreparedEstimate& prepared, EstimateOutcome* outcome);
 
-// What speaks against the result, one line each, with its number.
+// Returns the warnings about the result, one line each, with their numbers.
 std::vector<std::string> EstimateWarnings(const EstimateOptions& options,
                                           const PreparedEstimate& prepared,
                                           const EstimateOutcome& outcome);
 
-// What --json writes.
+// Returns what --json writes.
 nlohmann::json EstimateJson(const EstimateOptions& options, const PreparedEstimate& prepared,
                             const EstimateOutcome& outcome);
-// What is printed: the same for people. Ends with a newline.
+// Returns the summary as text for people. It ends with a newline.
 std::string EstimateText(const PreparedEstimate& prepared, const EstimateOutcome& outcome,
                          const nlohmann::json& summary);
 

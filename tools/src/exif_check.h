@@ -10,12 +10,12 @@
 
 namespace thicklens::tools {
 
-// A calibration holds for one lens at one setting. What a photograph's EXIF says of its own is
-// compared with the camera file.
+// A calibration holds for one lens at one setting. A photograph's EXIF is therefore compared with
+// the camera file.
 
 enum class ExifVerdict {
   kAgrees,
-  kUndecided,    // it differs by what roundings and nominal values can explain, or cannot be told
+  kUndecided,  // differs by no more than rounding and nominal values explain, or cannot be compared
   kContradicts,  // the photograph is of another lens, setting or sensor
 };
 std::string ExifVerdictName(ExifVerdict verdict);  // "agrees", "undecided", "contradicts"
@@ -25,31 +25,31 @@ struct ExifFinding {
   std::string quantity;       // "focal length"
   std::string photo, camera;  // "35 mm", "50 +- 0.1 mm"
   ExifVerdict verdict = ExifVerdict::kAgrees;
-  std::string remark;  // what it may mean, where it does not agree
+  std::string remark;  // what a disagreement may mean
 };
 
-// What is known of the photograph beside its EXIF.
+// Facts about the photograph besides its EXIF.
 struct PhotoSize {
   int width_px = 0, height_px = 0;  // as stored
   bool is_part_of_sensor = false;   // --sensor-origin says which
 };
 
-// Compares what both say. Rules (docs/light-fields.md):
-//  - focal length against front_focal_length_mm .. rear_focal_length_mm: half a unit of the last
-//    digit of EXIF, and the camera file's tolerance. Without a stated tolerance EXIF's nominal
-//    value may be 5 % off, which is undecided.
-//  - f-number against f1/(2 r): the same rounding and tolerances; up to 6 % beyond, half of a third
-//    of a stop, is undecided.
-//  - focus distance against zf (from the aperture) .. zf + d1 (from the sensor): 10 % and the
-//    rounding; beyond a factor of 1.5 it contradicts.
-//  - 35 mm equivalent against the size of the sensor; pixel pitch; size of the image as made;
-//    digital zoom; orientation.
+// Compares both statements. Rules (docs/light-fields.md):
+// - Focal length against front_focal_length_mm .. rear_focal_length_mm: half a unit of the last
+//   digit of EXIF, and the camera file's tolerance. Without a stated tolerance EXIF's nominal value
+//   may be 5 % off, which is undecided.
+// - F-number against f1/(2 r): the same rounding and tolerances; up to 6 % beyond, half of a third
+//   of a stop, is undecided.
+// - Focus distance against zf (from the aperture) .. zf + d1 (from the sensor): 10 % and the
+//   rounding; beyond a factor of 1.5 it contradicts.
+// - 35 mm equivalent against the size of the sensor; pixel pitch; size of the image as made;
+//   digital zoom; orientation.
 std::vector<ExifFinding> CompareExif(const PhotoExif& exif, const model::Camera& camera,
                                      const PhotoSize& size);
 
-// Reads the photograph's EXIF and compares it. Warns of what is undecided. Throws Error with both
-// values of all that contradicts the camera, unless `ignore`: then it is told. Without EXIF silent.
-// Returns what --json has of it.
+// Reads the photograph's EXIF and compares it. Warns about undecided values. Throws Error with both
+// values of everything that contradicts the camera; with `ignore` it reports them instead. It is
+// silent without EXIF. Returns the part of --json about EXIF.
 nlohmann::json RequireSameCamera(const std::string& photo_path, const std::string& camera_path,
                                  const model::Camera& camera, const PhotoSize& size, bool ignore);
 

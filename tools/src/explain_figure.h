@@ -7,8 +7,8 @@
 
 namespace thicklens::tools {
 
-// The curve of blur against depth as an SVG file, with the band of two standard errors that the
-// errors of d1 and kappa make. Where the depths go far, they are drawn by 1/depth.
+// Draws the curve of blur against depth as an SVG file, with the band of two standard errors from
+// the errors of d1 and kappa. A wide range of depths is drawn against 1/depth.
 std::string BlurCurveSvg(const model::Camera& camera, const DepthRange& range);
 
 }  // namespace thicklens::tools

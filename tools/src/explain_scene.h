@@ -8,10 +8,10 @@
 
 namespace thicklens::tools {
 
-// The places of a depth map, holes left out, one for each block of 8 x 8 px: the pixel farthest
-// from the axis, the depth of most blur, and, across the steepest step between neighbours in it,
-// what is on the other side. What is photographed is not known: an edge between black and white
-// everywhere.
+// Returns places of a depth map without its holes, for each block of 8 x 8 px: the pixel farthest
+// from the axis, the depth of maximum blur, and, across the steepest step between neighbours in the
+// block, the depth on the other side. The photographed object is not known, so an edge between
+// black and white is assumed everywhere.
 std::vector<model::EffectPlace> PlacesOfDepth(const model::Camera& camera,
                                               const model::Scene& scene);
 

@@ -16,7 +16,7 @@ struct DepthRange {
   double far_mm = 0;
 };
 
-// What a calibrated camera does to points at one depth.
+// The blur and magnification of a calibrated camera at one depth.
 struct DepthRow {
   double depth_mm = 0;  // may be +inf
   double blur_radius_mm = 0;
@@ -25,7 +25,7 @@ struct DepthRow {
   double defocus_sigma_error_px = 0;  // its standard deviation from those of kappa and d1
   double sigma_px = 0;                // with the lens floor; without the pixel box
   double magnification = 0;           // of the chief ray, absolute value
-  double thin_blur_radius_px = 0;     // of the thin lens at the same image distance
+  double thin_blur_radius_px = 0;     // of a thin lens at the same image distance
   double thin_magnification = 0;      // likewise
 };
 
@@ -35,15 +35,15 @@ struct DepthOfFieldRow {
   double far_mm = 0;  // may be +inf
 };
 
-// The same camera taken for a thin lens (f1 = f2 = the front value, rho = 0) whose sensor stays
-// where it is.
+// The camera treated as a thin lens (f1 = f2 = the front value, rho = 0) whose sensor does not
+// move.
 struct ThinComparison {
-  bool same_lens = false;                // the lens is thin already
+  bool same_lens = false;                // the lens is already thin
   std::optional<double> focus_depth_mm;  // absent: the sensor is in front of every image
   double scale_ratio = 1;                // magnification, thin over thick, at every depth
-  double corner_shift_px = 0;            // what that means at the farthest corner
-  // From the front focal length up to here what passes the rim of the aperture lands within
-  // kThinTolerancePx of where it lands behind the thick lens, relative to the chief ray; may be
+  double corner_shift_px = 0;            // the resulting shift at the farthest corner
+  // Between the front focal length and this depth, rays through the rim of the aperture land within
+  // kThinTolerancePx of where they land behind the thick lens, relative to the chief ray; may be
   // +inf.
   double alike_up_to_mm = 0;
 };
@@ -65,7 +65,7 @@ struct Explanation {
   ThinComparison thin;
 };
 
-// `count` depths, equally spaced in 1/z: there the blur changes by equal steps. count >= 2.
+// Returns `count` depths (>= 2), equally spaced in 1/z, where the blur changes by equal steps.
 std::vector<double> InverselySpacedDepthsMm(const DepthRange& range, int count);
 
 // Throws Error naming the field if the camera has no image distance or no blur ratio.

@@ -11,7 +11,7 @@
 
 namespace thicklens::tools {
 
-// The picture files of a sweep, read when asked for, from several threads if need be.
+// The image files of a sweep, read on request; several threads may read.
 class FrameFiles {
  public:
   explicit FrameFiles(std::vector<model::SweepFrame> frames);
@@ -19,8 +19,8 @@ class FrameFiles {
   cv::Mat Read(std::size_t index);  // throws Error naming the file
 
   // SHA-256 over lines "digest reading", one for each frame in the sweep's order, where digest is
-  // that of the file's bytes and reading is in mm. A file is digested the first time it is read, or
-  // here.
+  // that of the file's bytes and reading is in mm. The digest of a file is computed when the file
+  // is first read, or here.
   std::string DataSha256();
 
  private:

@@ -12,17 +12,17 @@
 
 namespace thicklens::tools {
 
-// What one command of a hard case has to come to. Whatever it is: no crash, no hang, and after a
-// refusal nothing where the output would have been, and a summary that says so.
+// The required outcome of one command of a hard case. In every case there must be no crash and no
+// hang, and a refusal must leave no output and a summary that reports it.
 struct Requirement {
-  // Solved: exit code 0, and the error that `error` measures at most `limit`. It may throw Error
-  // where the result is not what it should be.
+  // Solved: exit code 0, and the error that `error` measures is at most `limit`. `error` may throw
+  // Error if the result is wrong.
   std::function<double(const std::filesystem::path& folder, const nlohmann::json& summary)> error;
   double limit = 0;
-  // Refused: exit code 1 or 2, and one line of reason that holds each of these words.
+  // Refused: exit code 1 or 2, and a one-line reason that contains each of these words.
   bool refused = false;
   std::vector<std::string> words;
-  // Solved, or refused with a reason that holds one of these.
+  // Solved, or refused with a reason that contains one of these words.
   std::vector<std::string> or_refused_with;
 };
 Requirement Solved(
@@ -30,25 +30,25 @@ Requirement Solved(
     double limit);
 Requirement Refused(std::vector<std::string> words);
 
-// One command, run in the folder of its case. `--json` is added; `output` is what it writes to.
+// One command, run in the folder of its case. `--json` is added; the command writes to `output`.
 struct HardRun {
   std::vector<std::string> arguments;  // without the program's name
   std::string output;                  // file or folder; empty: none
   Requirement required;
 };
 
-// What there is to run on.
+// The machine that the cases run on.
 struct HardMachine {
-  bool opencl = false;         // a device that works
-  bool opencl_double = false;  // and that has numbers of 64 bits
-  bool every_way = true;       // false: few of each solver, where each command takes long
+  bool opencl = false;         // a working device
+  bool opencl_double = false;  // the device also has numbers of 64 bits
+  bool every_way = true;       // false: a few plans of each solver, where each command takes long
 };
 
 struct HardCase {
-  std::string name;      // of its group and itself: "optics/focus-at-infinity"
+  std::string name;      // group and name: "optics/focus-at-infinity"
   std::string why;       // what makes it hard
   std::string required;  // in words
-  // Writes what the commands read into the folder.
+  // Writes the input files of the commands into the folder.
   std::function<std::vector<HardRun>(const std::filesystem::path& folder,
                                      const HardMachine& machine)>
       prepare;
@@ -56,10 +56,10 @@ struct HardCase {
 
 // How one command of a case ended.
 struct HardOutcome {
-  std::string command;  // as a person types it in the case's folder
+  std::string command;  // as a user types it in the case's folder
   bool as_required = false;
   std::string measured;         // in words
-  std::optional<double> error;  // of a solved one
+  std::optional<double> error;  // of a solved command
   double limit = 0;
   double seconds = 0;
 };
@@ -70,13 +70,13 @@ struct HardResult {
   double seconds = 0;
 
   bool as_required() const;
-  // The worst of all commands, in words.
+  // Returns the worst outcome of all commands, in words.
   std::string Measured() const;
 };
 
-// Runs a case's commands by this program in an empty folder that is there; what each wrote is put
-// aside in run-NN. Each is ended after so many seconds: that is a failure of the case. Throws Error
-// if the case's inputs cannot be written.
+// Runs a case's commands with this program in an existing empty folder; the output of each command
+// is moved to run-NN. A command that exceeds `limit_seconds` is ended, which is a failure of the
+// case. Throws Error if the case's inputs cannot be written.
 HardResult RunHardCase(const HardCase& hard, const std::filesystem::path& folder,
                        const std::string& program, const HardMachine& machine,
                        double limit_seconds);

@@ -8,22 +8,23 @@
 
 namespace thicklens::tools {
 
-// The table of hard cases, by groups; no name twice.
+// The table of hard cases, by groups; names are unique.
 std::vector<HardCase> OpticsHardCases();
 std::vector<HardCase> SceneHardCases();
 std::vector<HardCase> EstimatorHardCases();
 std::vector<HardCase> CalibrationHardCases();
 std::vector<HardCase> AllHardCases();
 
-// Whether there is a device that OpenCL rows can run on.
+// Finds out whether there is a device that OpenCL cases can run on.
 HardMachine ExamineHardMachine();
 
 struct HardCasesOptions {
-  std::string only;         // a name, or a group; empty: all
-  std::string keep_folder;  // inputs and outputs stay there, a folder for each case; empty: nowhere
+  std::string only;  // a name, or a group; empty: all
+  // keeps inputs and outputs, one folder for each case; empty: does not keep them
+  std::string keep_folder;
 };
-// Runs the table, or what is chosen of it, and prints it. Refused if a case is not as required.
-// Throws UsageError for a name that there is not.
+// Runs and prints the table, or the chosen part of it. The result is a refusal if a case is not as
+// required. Throws UsageError for an unknown name.
 CommandResult RunHardCases(const HardCasesOptions& options, const CommonOptions& common);
 
 }  // namespace thicklens::tools

@@ -5,11 +5,11 @@
 
 namespace thicklens::tools {
 
-// What stands in <main> of a page of `thicklens calibrate --report`, to be put into another page
-// that has the style of SvgPlotStyle: headings one level lower, every id and reference to one with
-// "calibration-" in front. Only the elements and attributes that such a page has are accepted, and
-// only if they are well-formed: nothing that a browser would run or load gets in. Throws Error that
-// begins with `name`.
+// Returns the content of <main> of a page of `thicklens calibrate --report`, for another page that
+// has the style of SvgPlotStyle: headings are one level lower, and every id and reference to one
+// gets the prefix "calibration-". Only the elements and attributes that such a page has are
+// accepted, and only if they are well-formed, so nothing that a browser would run or load is
+// included. Throws Error that begins with `name`.
 std::string InlinedCalibrationReport(const std::string& html, const std::string& name);
 
 }  // namespace thicklens::tools

@@ -7,40 +7,41 @@
 
 #include "thicklens/base/cancel.h"
 
-// How SIGINT, SIGTERM and SIGHUP end the program:
-// - The first one cancels ProgramToken(). Loops look at it and end by Interrupted, so that
+// SIGINT, SIGTERM and SIGHUP end the program as follows:
+// - The first signal cancels ProgramToken(). Loops check it and end by Interrupted, so that
 //   half-written outputs are removed on the way.
-// - A library that computes in one call cannot be ended so. Where main has not ended the process
-//   within kGraceSeconds, a thread removes what is unfinished and ends it, with the same exit code
-//   and the same message. A second signal makes it do that at once.
-// - A third one, or a second one where the system gave no such thread, ends the process without
-//   removing anything.
+// - A library call that computes for long cannot be ended in this way. If main has not ended the
+//   process within kGraceSeconds, a thread removes unfinished outputs and ends the process with the
+//   same exit code and the same message. A second signal makes it do so at once.
+// - A third signal, or a second one if the system could not start this thread, ends the process
+//   without removing anything.
 namespace thicklens::tools {
 
 constexpr double kGraceSeconds = 0.5;
 
-// Handles these signals; not SIGHUP where it is ignored at the start, as nohup asks for. SIGPIPE
-// and SIGXFSZ are ignored: a write that fails is told like any other failed write.
+// Handles these signals, except SIGHUP if it is ignored at the start, as with nohup. SIGPIPE and
+// SIGXFSZ are ignored: a failed write is then reported like any other failed write.
 void CatchSignals();
 
-// Starts the thread. Once, after CatchSignals.
+// Starts the thread. Call this once, after CatchSignals.
 void WatchSignals();
 
-// The signals cancel this token. A command runs in a CancelScope of it.
+// The token that the signals cancel. A command runs in a CancelScope of it.
 const CancelToken* ProgramToken();
 
 bool InterruptRequested();
 void ThrowIfInterrupted();  // throws Interrupted
 
-// One line: what an interrupted run has written.
+// Returns one line on the outputs that an interrupted run has written.
 std::string InterruptedText(const std::vector<std::string>& outputs_in_place);
 
-// Main ends the process with that exit code, and says why. Does not return where the thread has
-// begun to do so.
+// Announces that main ends the process with that exit code and reports why. Does not return if the
+// thread has already started to end the process.
 void BeginEnd(int exit_code);
 
-// As long as it lives, the thread says these words (one line; empty: none) as a warning when it
-// ends the process. One at a time; called from that thread.
+// While an object of this class exists, the thread prints the returned words (one line; empty:
+// none) as a warning when it ends the process. Only one object may exist at a time. The function is
+// called from that thread.
 class LastWords {
  public:
   explicit LastWords(std::function<std::string()> words);

@@ -12,21 +12,21 @@
 
 namespace thicklens::tools {
 
-// Whether the options leave an effect out in any case, whatever the scene is.
+// Returns whether the options leave an effect out for every scene.
 bool IsLeftOut(const EffectOptions& options, model::Effect effect);
 
-// Which effects of the photograph an estimate takes into account: of the camera's, fall-off and
-// thickness by what they matter, the others unless they are left out. Without a camera there are
-// defocus, aperture-shape and occlusion, and nothing is known of their impact; the functional
-// solver has no occlusion. `depth`: the range of the map, where there is a camera. Throws
-// UsageError for defocus and occlusion, which are what an estimate is about, and for effects that
-// it does not know.
+// Decides which effects of the photograph an estimate takes into account. Fall-off and thickness
+// are decided by their impact with the camera; the others are on unless they are left out. Without
+// a camera the effects are defocus, aperture-shape and occlusion, and their impact is unknown. The
+// functional solver has no occlusion. `depth` is the range of the map, if there is a camera. Throws
+// UsageError if defocus or occlusion is left out, because an estimate is about them, and for
+// effects that it does not have.
 model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
                                             const std::optional<model::Camera>& camera,
                                             const std::optional<model::DepthStatistics>& depth);
 
-// Likewise of a photograph that is rendered from a light field: without defocus it is that of the
-// views in the middle. Occlusion is in the views.
+// Decides the same for a photograph that is rendered from a light field. Without defocus the
+// photograph is that of the views in the middle. Occlusion is contained in the views.
 model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
                                               const model::LightField& light_field);
 

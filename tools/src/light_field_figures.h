@@ -7,15 +7,15 @@
 
 namespace thicklens::tools {
 
-// The parts of the page about a light field that show pictures, each without its heading and empty
-// where the input has nothing to show.
+// The sections of the page about a light field that show images, each without its heading and empty
+// if the input has nothing to show.
 std::string SweepFigure(const LightFieldPageInput& input);
 std::string PictureAndDepthFigure(const LightFieldPageInput& input);
 std::string ViewFigures(const LightFieldPageInput& input);
 std::string EpipolarFigure(const LightFieldPageInput& input);
 std::string RefocusFigure(const LightFieldPageInput& input);
 
-// The style rules of these.
+// The style rules of these figures.
 std::string LightFieldFigureStyle();
 
 }  // namespace thicklens::tools

@@ -15,7 +15,7 @@
 
 namespace thicklens::tools {
 
-// What a person says about a light field that they read; see light_field_options.h.
+// The user's options for a light field that is read; see light_field_options.h.
 struct LightFieldReading {
   int grid = 0;  // --grid: row length of the HCI numbering; 0: from parameters.cfg, or square
   bool sparse = false;  // --sparse: any set of views may be present
@@ -24,44 +24,45 @@ struct LightFieldReading {
   std::optional<model::PixelRect> crop;  // --crop
 };
 
-// Reads a folder of ours (lightfield.yaml) or of the HCI layout (input_CamNNN.png row-major, NNN =
-// grid * v + u, and parameters.cfg if it is there), then takes the inner views and the crop. HCI
-// light fields are relative, sRGB, with uniform weights. Views that are not present within the
-// smallest rectangle that holds the others are an Error that names them, unless `sparse`. Throws
-// Error naming the folder and the view that is missing, broken or of another size.
+// Reads a folder of our layout (lightfield.yaml) or of the HCI layout (input_CamNNN.png row-major,
+// NNN = grid * v + u, and parameters.cfg if it exists), then takes the inner views and the crop.
+// HCI light fields are relative, sRGB, with uniform weights. Throws Error that names the folder and
+// the view that is missing, broken or of another size. Unless `sparse` is set, a view that is
+// missing within the smallest rectangle that holds the others is such an Error.
 model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading);
 
 enum class ViewFormat {
   kPng,   // 16 bit, encoded by the light field's transfer curve, clipped
   kTiff,  // float, linear light
 };
-// Entries that a folder of ours may hold: for OutputFolder.
+// Entries that a folder of our layout may hold, for OutputFolder.
 extern const char kLightFieldMarker[];  // "lightfield.yaml"
 std::vector<std::string> LightFieldEntries();
 
-// Writes a light field of which there is never more than some views: each as it is made, in any
-// order, from several threads at the same time; and then what describes them.
+// Writes a light field of which only some views are in memory at a time. Views are written as they
+// are made, in any order and from several threads at once; their description follows at the end.
 class LightFieldWriter {
  public:
-  // The folder must outlive it, and is committed by the caller.
+  // `folder` is not owned and must outlive the writer; the caller commits it.
   LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder);
 
   void WriteView(int k, int l, const model::LinearPicture& view);
-  // One byte a ray, row by row (docs/file-formats.md); of all views or of none.
+  // Writes one byte for each ray, row by row (docs/file-formats.md). Call it for all views or for
+  // none.
   void WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence, int width_px);
-  // After the last view. The light field's values are not looked at. Returns how many values were
-  // clipped.
+  // Call this after the last view. The values of `light_field` are not read. Returns the number of
+  // clipped values.
   std::size_t Finish(const model::LightField& light_field);
 
-  // What it holds besides a view of so many values while it writes it.
+  // Returns the bytes that the writer needs besides a view of `values` values while it writes it.
   double BytesForView(double values) const;
-  // How many rays have each confidence.
+  // Number of rays with each confidence.
   const std::array<std::size_t, 256>& confidence_counts() const { return confidence_counts_; }
-  double seconds() const { return seconds_; }  // spent on views, of all threads together
+  double seconds() const { return seconds_; }  // time spent on views, summed over the threads
 
  private:
   const model::TransferCurve transfer_;
-  std::optional<model::StoredLevels> levels_;  // of PNG
+  std::optional<model::StoredLevels> levels_;  // levels of PNG files
   const ViewFormat format_;
   OutputFolder* folder_;
   std::mutex mutex_;
@@ -71,25 +72,25 @@ class LightFieldWriter {
   double seconds_ = 0;
 };
 
-// All views that there are.
+// Writes all views that are present.
 void WriteViews(const model::LightField& light_field, LightFieldWriter* writer);
 
 // Writes views/view_VV_UU.png or .tiff, lightfield.yaml, and camera.yaml if there is a camera,
-// below the folder's staging path; the caller commits. Returns how many values were clipped.
+// below the folder's staging path; the caller commits. Returns the number of clipped values.
 std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
                             OutputFolder* folder);
 
-// HCI layout: input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path. Returns how
-// many values were clipped.
+// Writes the HCI layout: input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path.
+// Returns the number of clipped values.
 extern const char kHciMarker[];  // "parameters.cfg"
 std::size_t WriteHciLightField(const model::LightField& light_field, OutputFolder* folder);
 
-// Claims a folder for it. The benchmark's own folders look the same: one that this program did not
-// write is not replaced. Throws Error.
+// Claims a folder for the HCI layout. The benchmark's own folders look the same, so a folder that
+// this program did not write is not replaced. Throws Error.
 OutputFolder ClaimHciFolder(const std::string& path);
 
-// How many values a file of 8 or 16 bits cannot hold: those more than half a level below 0 or above
-// full scale, and NaN.
+// Counts the values that a file of 8 or 16 bits cannot hold: those more than half a level below 0
+// or above full scale, and NaN.
 std::size_t CountClipped(const model::LinearPicture& picture, const model::TransferCurve& transfer,
                          int bits);
 

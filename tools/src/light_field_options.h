@@ -16,14 +16,14 @@
 
 namespace thicklens::tools {
 
-// Options that several commands about light fields share: texts as typed, and what they say.
+// Options that several commands about light fields share: the texts as typed, and their values.
 
 // --views UxV, --crop X,Y,W,H.
 struct ViewsOption {
   std::string text;
 };
 void AddViewsOption(CLI::App* command, ViewsOption* option, const std::string& help);
-// Throws UsageError. {0, 0} where it was not given.
+// Returns {0, 0} if the option was not given. Throws UsageError.
 std::pair<int, int> ViewCounts(const ViewsOption& option);
 struct CropOption {
   std::string text;
@@ -31,7 +31,7 @@ struct CropOption {
 void AddCropOption(CLI::App* command, CropOption* option);
 std::optional<model::PixelRect> CropRect(const CropOption& option);  // throws UsageError
 
-// --grid N, --sparse, --views, --crop of a light field that is read.
+// The options --grid N, --sparse, --views and --crop for a light field that is read.
 struct ReadingOptions {
   int grid = 0;
   bool sparse = false;
@@ -41,8 +41,9 @@ struct ReadingOptions {
 void AddReadingOptions(CLI::App* command, ReadingOptions* options);
 LightFieldReading ReadingOf(const ReadingOptions& options);  // throws UsageError
 
-// --depth-kind, --depth-unit, --disparity-scale, --disparity-offset: what a depth map's numbers
-// mean. Kind and unit are never guessed: z and range ask for a unit, disparity has none.
+// The options --depth-kind, --depth-unit, --disparity-scale and --disparity-offset state what a
+// depth map's numbers mean. Kind and unit are never guessed: z and range need a unit, disparity has
+// none.
 struct DepthOptions {
   std::string kind;
   std::string unit;
@@ -53,22 +54,23 @@ void AddDepthOptions(CLI::App* command, DepthOptions* options);
 // Throws UsageError if the kind is not given, z or range have no unit, or disparity has one.
 model::DepthConvention ConventionOf(const DepthOptions& options);
 
-// --aperture-shape; empty text: `otherwise`.
+// The option --aperture-shape; for an empty text the result is `otherwise`.
 void AddApertureShapeOption(CLI::App* command, std::string* text);
 model::ApertureShape ApertureShapeOr(const std::string& text, model::ApertureShape otherwise);
 
 // --device auto|cpu|opencl[:PLATFORM[:DEVICE]].
 void AddDeviceOption(CLI::App* command, std::string* text);
 
-// The disparity of a picture's pixels on the grid of its light field, without holes.
+// The disparity of a photograph's pixels on the grid of its light field, without holes.
 struct PreparedDepth {
   estimator::DisparityMap disparity;            // filled
-  std::size_t holes = 0;                        // how many were
+  std::size_t holes = 0;                        // number of filled holes
   std::vector<bool> was_hole;                   // per pixel
-  std::optional<model::DepthStatistics> depth;  // in mm, where there is a camera
+  std::optional<model::DepthStatistics> depth;  // in mm, if there is a camera
 };
-// Without a camera the map must be a disparity (UsageError else). With one, `grid` is its light
-// field's and the map is checked by model::MakeScene. Sizes must be the picture's. Throws Error.
+// Prepares a depth map. Without a camera the map must be a disparity, otherwise UsageError is
+// thrown. With a camera, `grid` is that of its light field, and model::MakeScene checks the map.
+// The sizes must be those of `picture`. Throws Error.
 PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
                            const DepthOptions& options, const model::LinearPicture& picture,
                            const model::Camera* camera, const model::LightFieldGrid* grid);

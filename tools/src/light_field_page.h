@@ -16,13 +16,13 @@ namespace thicklens::tools {
 
 // Some frames of a focus sweep.
 struct SweepShot {
-  cv::Mat picture;  // as stored, of the region that is shown
+  cv::Mat picture;  // as stored, cropped to the region that is shown
   std::string image;
   double reading_mm = 0;
   bool nearest_to_focus = false;
 };
 struct SweepStrip {
-  std::string name;              // file or folder, as the person gave it
+  std::string name;              // file or folder, as the user gave it
   int frame_count = 0;           // of the whole sweep
   std::vector<SweepShot> shots;  // from near to far
 };
@@ -31,24 +31,24 @@ struct SweepStrip {
 struct PageDepth {
   int width_px = 0, height_px = 0;
   std::vector<float> values;
-  bool in_mm = false;  // z from the aperture; else disparity in px per view step
-  double v_per_u = 1;  // of a disparity along v; the values are along u
+  bool in_mm = false;  // z from the aperture; otherwise disparity in px per view step
+  double v_per_u = 1;  // factor from the values, which are along u, to the disparity along v
 };
 
-// What a page tells. Of what is absent (null, empty) it says nothing.
+// The content of a page. The page does not mention absent (null, empty) data.
 struct LightFieldPageInput {
-  std::string name;  // of the light field, as the person gave it
+  std::string name;  // of the light field, as the user gave it
   const model::LightField* light_field = nullptr;
   const model::LightField* truth = nullptr;  // of the same views and size
   std::optional<model::LinearPicture> photo;
   std::optional<PageDepth> depth;
   std::optional<SweepStrip> sweep;
   std::string calibration;                     // from InlinedCalibrationReport
-  const estimator::SceneMaps* maps = nullptr;  // of the photograph, as the estimate knows it
+  const estimator::SceneMaps* maps = nullptr;  // maps of the photograph from the estimate
   std::vector<std::string> warnings;           // of the estimate, one line each
-  // What the estimate read and took for granted: names and what they are.
+  // The inputs and assumptions of the estimate: names and values.
   std::vector<std::pair<std::string, std::string>> sources;
-  bool mosaic = false;  // all views in one picture, not some beside each other
+  bool mosaic = false;  // all views in one image, not some side by side
   std::optional<EstimateRecord> estimate;
   std::optional<ComparisonRecord> comparison;
   std::string version;  // of thicklens
@@ -60,8 +60,8 @@ struct LightFieldPage {
   std::string html;
   std::vector<std::string> sections;  // their ids, in order
 };
-// One page that needs nothing else: no network, no script; its pictures are in it. It is
-// well-formed XML too. Sections without data are left out.
+// Makes one self-contained page without network access or scripts, with its images inside. It is
+// also well-formed XML. Sections without data are left out.
 LightFieldPage MakeLightFieldPage(const LightFieldPageInput& input);
 
 }  // namespace thicklens::tools

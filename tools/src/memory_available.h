@@ -6,17 +6,17 @@
 
 namespace thicklens::tools {
 
-// What the program may hold in all without making the machine swap: what it holds, and four fifths
-// of what the system says is available to it, or its control group (a container). Absent where the
-// system does not say it. `root`: where /proc and /sys are, for tests.
+// Memory that the program may hold in all without making the machine swap: what it holds, and four
+// fifths of what the system or its control group (a container) has available. Absent if the system
+// does not report it. `root` is the folder of /proc and /sys, for tests.
 std::optional<double> UsualMemoryLimitMib(const std::string& root = "");
 
-// This is what a program can still have: of the system, of the control group, and of the address
-// space where that is limited (ulimit -v).
+// Memory that the program can still get from the system, from the control group, and from the
+// address space if that is limited (ulimit -v).
 std::optional<double> MemoryLeftMib(const std::string& root = "");
 
-// From now on what is freed goes back to the system, though that takes longer: what the program
-// holds is what it uses.
+// Returns freed memory to the system from now on, although that takes longer: the program then
+// holds only what it uses.
 void ReturnMemoryAtOnce();
 
 }  // namespace thicklens::tools

@@ -8,13 +8,13 @@
 
 namespace thicklens::tools {
 
-// A text as one line that a person can read and a terminal only shows: names of files and values
-// that stand in a message may be anything, and of any length. Line breaks become blanks, other
-// control characters and what is no UTF-8 U+FFFD; of a text that is longer than a page, the middle
-// is left out.
+// Formats a text as one line that people can read and that cannot control a terminal: file names
+// and values in a message may be anything, and of any length. Line breaks become spaces; other
+// control characters and broken UTF-8 become U+FFFD. The middle of a text that is longer than a
+// page is left out.
 std::string MessageLine(const std::string& text);
 
-// Every message of the program has this form: "thicklens: warning: ..." with the text as a
+// Every message of the program has the form "thicklens: warning: ..." with the text as a
 // MessageLine.
 std::unique_ptr<spdlog::formatter> MakeMessageFormatter();
 

@@ -11,7 +11,8 @@
 
 namespace thicklens::tools {
 
-// What `work` returns. An Error of it, which does not know the file, is told with its name.
+// Returns the result of `work`. An Error of `work`, which does not know the file, is rethrown with
+// the file's name.
 template <typename Work>
 auto NamingTheFile(const std::string& path, const Work& work) {
   try {

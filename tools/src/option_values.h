@@ -9,28 +9,28 @@
 
 namespace thicklens::tools {
 
-// A command line that cannot be meant: exit code 2.
+// A command line that makes no sense: exit code 2.
 class UsageError : public Error {
  public:
   using Error::Error;
 };
 
-// Checks of CLI11 for numbers; unlike CLI11's own they refuse NaN and infinities.
+// Checks of CLI11 for numbers; unlike CLI11's own checks they reject NaN and infinities.
 CLI::Validator Finite();
 CLI::Validator NonNegative();
-// lo <= value <= hi, or lo < value <= hi for lo = 0; `hint` says what is meant.
+// Checks lo <= value <= hi, or lo < value <= hi for lo = 0; `hint` says what is meant.
 CLI::Validator Between(double lo, double hi, const std::string& hint);
-// lo < value < hi.
+// Checks lo < value < hi.
 CLI::Validator Inside(double lo, double hi, const std::string& hint);
 
-// The finite numbers of a text such as "3,4,640,480". Throws UsageError that names the option, what
-// was found and `form`, e.g. "x,y,width,height".
+// Returns the finite numbers of a text such as "3,4,640,480". Throws UsageError that names the
+// option, the invalid text and `form`, e.g. "x,y,width,height".
 std::vector<double> SplitNumbers(const std::string& option, const std::string& text, char separator,
                                  const std::string& form);
-// The same for whole numbers.
+// Returns whole numbers from `least` to `most`, likewise.
 std::vector<int> SplitWhole(const std::string& option, const std::string& text, char separator,
                             const std::string& form, int least, int most);
-// The same from 0 to 100000 px.
+// Returns whole numbers from 0 to 100000 px, likewise.
 std::vector<int> SplitPixels(const std::string& option, const std::string& text, char separator,
                              const std::string& form);
 

@@ -12,16 +12,17 @@
 
 namespace thicklens::tools {
 
-// Pictures as a page shows them: cv::Mat of 8 bit, 1 or 3 (RGB) channels, encoded by sRGB.
+// Images as a page shows them: cv::Mat of 8 bit, 1 or 3 (RGB) channels, encoded by sRGB.
 
-// Larger ones are shrunk to the longest edge, in linear light.
+// Shrinks larger images to the longest edge, in linear light.
 cv::Mat ShownPicture(const model::LinearPicture& picture, int longest_edge_px);
-// As stored by its file, 8 or 16 bit, 1, 3 or 4 channels; alpha is left out.
+// Converts an image as stored by its file, 8 or 16 bit, 1, 3 or 4 channels; alpha is left out.
 cv::Mat ShownPicture(const cv::Mat& stored);
 
-// Mid grey + gain * (picture - reference); both of one size and number of channels.
+// Returns mid grey + gain * (picture - reference); both have one size and number of channels.
 cv::Mat AmplifiedDifference(const cv::Mat& picture, const cv::Mat& reference, double gain);
-// The power of two that makes differences fill the range up to their largest hundredth; 1 to 32.
+// Returns the power of two, 1 to 32, that makes differences fill the range up to their largest
+// hundredth.
 int GainForDifferences(const std::vector<std::pair<cv::Mat, cv::Mat>>& pairs);
 
 // A colour map whose lightness rises evenly, from dark blue through green to yellow (after
@@ -36,22 +37,22 @@ struct ColourRange {
 
   double Position(double value) const;
 };
-// A map in colours; NaN is hatched grey. Larger ones are shrunk by leaving samples out, since a
-// mean of two depths is the depth of nothing.
+// Shows a map in colours; NaN is hatched grey. Larger maps are shrunk by leaving samples out, since
+// a mean of two depths is not a depth of the scene.
 cv::Mat ColourMapped(const std::vector<float>& values, int width_px, int height_px,
                      const ColourRange& range, int longest_edge_px);
 
-// A signed map in greys: mid grey is 0, white `range` and more, black -range and less. Larger ones
-// are shrunk by leaving samples out, so that noise stays as large as it is.
+// Shows a signed map in greys: mid grey is 0, white is `range` and more, black is -range and less.
+// Larger maps are shrunk by leaving samples out, so that noise keeps its amplitude.
 cv::Mat GreyMapped(const std::vector<float>& values, int width_px, int height_px, double range,
                    int longest_edge_px);
 
 enum class Packing {
   kExact,  // PNG
-  kSmall,  // JPEG of quality 90, where the picture is large enough for it to pay
+  kSmall,  // JPEG of quality 90, if the image is large enough for it to pay
 };
-// An <img> that carries its picture, for a place `place_px` wide. A narrower picture is enlarged at
-// most four times and keeps crisp pixels (class "crisp").
+// Returns an <img> with its image inside, for a place `place_px` wide. A narrower image is enlarged
+// at most four times and keeps crisp pixels (class "crisp").
 std::string EmbeddedPicture(const cv::Mat& shown, const std::string& alt, Packing packing,
                             int place_px);
 

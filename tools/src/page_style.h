@@ -5,14 +5,14 @@
 
 namespace thicklens::tools {
 
-// The style rules that the program's HTML pages share: light, dark and on paper.
+// The style rules that the program's HTML pages share: light, dark and for print.
 std::string PageStyle();
 
-// A page's text up to its <main>, closed by "</main>\n</body>\n</html>\n". `style` follows the
-// rules above.
+// Returns a page's text up to its <main>; close it with "</main>\n</body>\n</html>\n". `style`
+// follows the rules of PageStyle.
 std::string PageHead(const std::string& title, const std::string& style);
 
-// Hyphens of negative numbers as minus signs; those of exponents stay.
+// Replaces hyphens of negative numbers by minus signs; those of exponents stay.
 std::string TrueMinus(const std::string& text);
 
 // A table cell; one of class "number" holds a number.

@@ -6,8 +6,9 @@
 
 namespace thicklens::tools {
 
-// Of points (cost, error): which no other beats in one without being worse in the other. Equal
-// points are on the front together; one that is not finite is not on it and beats none.
+// Returns which points (cost, error) are on the Pareto front: no other point is better in one
+// without being worse in the other. Equal points are on the front together. A point that is not
+// finite is not on the front and dominates none.
 std::vector<bool> ParetoFront(const std::vector<std::pair<double, double>>& points);
 
 }  // namespace thicklens::tools

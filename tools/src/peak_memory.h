@@ -5,11 +5,11 @@
 
 namespace thicklens::tools {
 
-// Most that the process held since it began, or since the last ForgetPeakMemory().
+// Maximum memory that the process held since it began, or since the last ForgetPeakMemory().
 double PeakMemoryMib();
 
-// Makes the peak what the process holds now, and returns that. Absent where the system does not let
-// it (Linux does).
+// Resets the peak to what the process holds now, and returns that. Absent if the system does not
+// support it (Linux does).
 std::optional<double> ForgetPeakMemory();
 
 }  // namespace thicklens::tools

@@ -5,10 +5,11 @@
 
 namespace thicklens::tools {
 
-// The bytes of a PNG file with a text (UTF-8) that says what the picture is: the text chunk
-// "Description", which programs show. The pixels stay as they are. Throws Error if they are no PNG.
+// Returns the bytes of a PNG file with a text (UTF-8) that describes the image: the text chunk
+// "Description", which programs show. The pixels do not change. Throws Error if `png` is no PNG
+// file.
 std::string WithDescription(const std::string& png, const std::string& text);
-// That text; empty if there is none. Throws Error that begins with `name`.
+// Returns that text; empty if there is none. Throws Error that begins with `name`.
 std::string DescriptionOf(const std::string& png, const std::string& name);
 
 }  // namespace thicklens::tools

@@ -8,21 +8,21 @@
 
 namespace thicklens::tools {
 
-// The kinds of picture files that are read. OpenCV would take many more, by libraries that nobody
-// here has looked at.
+// The kinds of image files that are read. OpenCV would accept many more, through libraries that
+// nobody in this project has reviewed.
 enum class PictureKind { kPng, kJpeg, kTiff, kExr, kBmp, kPnm };
 
-// By the first bytes; absent: another kind.
+// Finds the kind by the first bytes; absent: another kind.
 std::optional<PictureKind> KindOfPicture(const std::string& bytes);
 
-// Decoders take memory by the size that a header states. Throws Error that begins with `name` where
-// so few bytes cannot hold it, by what the kind's compression does at most; a header that cannot be
-// understood passes, for the decoder to say so.
+// Decoders allocate memory by the size that a header states. Throws Error that begins with `name`
+// if so few bytes cannot hold that size at the kind's maximum compression. A header that cannot be
+// parsed passes; the decoder reports it.
 void RequirePossibleSize(const std::string& bytes, PictureKind kind, const std::string& name);
 
-// The picture in the bytes of a file, unchanged and never turned, red first. Empty if it is of no
-// such kind or cannot be decoded; `why` then says what is known, or nothing. Throws Error that
-// begins with `name` for PNG files that are not whole and for impossible sizes.
+// Decodes the image in the bytes of a file, unchanged and never rotated, red first. Empty if it is
+// of none of the kinds or cannot be decoded; `why` then gets the reason if it is known. Throws
+// Error that begins with `name` for incomplete PNG files and for impossible sizes.
 cv::Mat DecodeUnchanged(const std::string& bytes, const std::string& name,
                         const std::vector<PictureKind>& kinds, std::string* why);
 

@@ -6,8 +6,8 @@
 
 namespace thicklens::tools {
 
-// What of a picture, its depth and its views decides how long an estimate takes. Makes the file of
-// something like a part of a view, to measure what that takes.
+// Returns the properties of a photograph, its depth and its views that determine how long an
+// estimate takes. Encodes a file like a part of a view to measure how long that takes.
 PictureLoad PictureLoadOf(const estimator::EstimateInput& input);
 
 }  // namespace thicklens::tools

@@ -12,24 +12,26 @@ namespace thicklens::tools {
 
 struct PlanChoice {
   EstimatePlan plan;
-  double expected_seconds = 0;  // of all of the run, with what is over already
-  double loss_db = 0;           // below the best of the profile
-  double median_error = 0;      // of the law's predictions, relative
-  double speed_ratio = 1;       // of this machine's times over the profile's
-  std::string message;          // one line: what, for how much, and what it gives up
+  double expected_seconds = 0;  // of the whole run, including the time that has passed already
+  double loss_db = 0;           // below the best plan of the profile
+  double median_error = 0;      // relative error of the law's predictions
+  double speed_ratio = 1;       // time on this machine over that of the profile
+  std::string message;          // one line: the plan, its cost and its loss
 };
 
-// `speed_ratio`: how much longer than the profile says all takes here.
-//   draft     the fastest plan that gains over warping at least half of what the best one does
-//   standard  the same for nine tenths
-//   best      the best
-// within_s: the best that is expected to be done by then; psnr_loss_db: the fastest that loses no
-// more; both: the fastest that does both. Throws Error where no plan does, and names the nearest.
-// `spent_seconds`: what reading, and finding the ratio, took: they count.
+// Chooses a plan. `speed_ratio` is the time here over the time in the profile.
+// - draft: the fastest plan with at least half of the gain over warping that the best plan has
+// - standard: the same with nine tenths
+// - best: the best plan
+// - within_s: the best plan that is expected to end by then
+// - psnr_loss_db: the fastest plan that loses no more
+// If both limits are given, the choice is the fastest plan that satisfies both. Throws Error if no
+// plan does, and names the nearest. `spent_seconds` is the time that reading and finding the ratio
+// took; it counts toward the limit.
 PlanChoice ChoosePlan(const EstimateProfile& profile, const PlanWish& wish, const PictureLoad& load,
                       double speed_ratio, double spent_seconds = 0);
 
-// Its summary once the run took so long.
+// Returns the summary of the choice, when the run took `seconds`.
 nlohmann::json ChoiceJson(const PlanChoice& choice, const PlanWish& wish, double seconds);
 std::string ChoiceText(const PlanChoice& choice, double seconds);
 

@@ -7,17 +7,18 @@
 
 namespace thicklens::tools {
 
-// What a person asks for in place of a solver.
+// The user's wish that replaces the choice of a solver.
 struct PlanWish {
-  std::string quality;                 // "draft", "standard", "best"; empty: not said
-  std::optional<double> within_s;      // of the whole program
-  std::optional<double> psnr_loss_db;  // against the best of the profile
+  std::string quality;                 // "draft", "standard", "best"; empty: not given
+  std::optional<double> within_s;      // limit for the whole program
+  std::optional<double> psnr_loss_db;  // relative to the best plan of the profile
 
   bool IsMade() const { return !quality.empty() || within_s || psnr_loss_db; }
-  std::string Text() const;  // as on the command line
+  std::string Text() const;  // text as on the command line
 };
 
-// --quality, --within and --psnr-loss. Call it after the options of the solver, which they exclude.
+// Adds --quality, --within and --psnr-loss. Call it after the options of the solver, which they
+// exclude.
 void AddPlanWishOptions(CLI::App* command, PlanWish* wish);
 
 }  // namespace thicklens::tools

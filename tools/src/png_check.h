@@ -5,21 +5,21 @@
 
 namespace thicklens::tools {
 
-// Throws Error that begins with `name` if the bytes are a PNG file that ends early or of which a
-// chunk is damaged; other files pass. To be called before such a file is decoded: decoders do not
-// know the file's name, nor where the chunk is.
+// Throws Error that begins with `name` if the bytes are a PNG file that ends early or has a damaged
+// chunk; other files pass. Call it before such a file is decoded: decoders know neither the file's
+// name nor the position of the chunk.
 void RequireWholePng(const std::string& bytes, const std::string& name);
 
-// A PNG file without what does not say how its pixels look: texts, which unpack to anything,
-// profiles, and a palette that is only suggested. Other files, and those that end early, as they
-// are.
+// Returns a PNG file without chunks that do not affect the look of its pixels: texts, which may
+// decompress to any size, profiles, and a merely suggested palette. Other files, and files that end
+// early, are returned unchanged.
 std::string WithoutPngTexts(const std::string& bytes);
 
-// Bits a value of a PNG file; 0 for other files.
+// Bits of each value of a PNG file; 0 for other files.
 int PngBits(const std::string& bytes);
 
-// A PNG file, which must be whole and have no resolution yet, with its resolution: the chunk pHYs,
-// by which programs print it at its true size.
+// Returns a PNG file with its resolution: the chunk pHYs, by which programs print it at its true
+// size. `png` must be complete and have no resolution yet.
 std::string WithPngResolution(const std::string& png, int pixels_per_metre);
 
 }  // namespace thicklens::tools

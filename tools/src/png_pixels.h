@@ -6,18 +6,18 @@
 
 namespace thicklens::tools {
 
-// The pixels of a PNG file as they are stored, by libspng: 8 or 16 bits (fewer are spread over 8);
-// 1, 3 (RGB) or 4 channels (RGBA: of grey with alpha as well, and where one of the colours, other
-// than of greys, is called transparent). Empty if they cannot be decoded; `why` then says why.
+// Decodes the pixels of a PNG file as they are stored, with libspng: 8 or 16 bits (fewer are spread
+// over 8); 1, 3 (RGB) or 4 channels (RGBA: also for grey with alpha, and for images other than grey
+// with a transparent colour). Empty if they cannot be decoded; `why` then gets the reason.
 cv::Mat DecodePngPixels(const std::string& bytes, std::string* why);
 
 enum class PngPacking {
-  kFast,         // of noise: what trying harder hardly makes smaller
-  kRepetitions,  // of flat areas
-  kSmall,        // as far as it goes
+  kFast,         // for noise, which stronger compression hardly makes smaller
+  kRepetitions,  // for flat areas
+  kSmall,        // the strongest compression
 };
 
-// 8 or 16 bits; 1, 3 (RGB) or 4 (RGBA) channels. Throws Error if there is no memory for it.
+// Encodes 8 or 16 bits; 1, 3 (RGB) or 4 (RGBA) channels. Throws Error if memory is short.
 std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing);
 
 }  // namespace thicklens::tools

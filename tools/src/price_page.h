@@ -9,14 +9,15 @@
 
 namespace thicklens::tools {
 
-// Error against seconds on logarithmic axes, of the rows of one scene and one number of views: each
-// solver a colour, the front joined, the baseline a line across. `id`: unique on its page.
+// Plots error against seconds on logarithmic axes, for the rows of one scene and one number of
+// views: one colour for each solver, the Pareto front joined, the baseline as a horizontal line.
+// `id` is unique on its page.
 Plot PriceFigure(const std::vector<PriceRow>& rows, const std::string& id);
 
-// Rows of one scene and number of views each, in the order in which they begin.
+// Groups the rows by scene and number of views, in the order of their first rows.
 std::vector<std::vector<PriceRow>> PriceGroups(const std::vector<PriceRow>& rows);
 
-// A page with the figures and tables of all. `about`: what the times are to be read with.
+// Makes a page with the figures and tables of all rows. `about` states the conditions of the times.
 std::string PricePage(const std::vector<PriceRow>& rows, const std::string& about);
 
 }  // namespace thicklens::tools

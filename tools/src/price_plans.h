@@ -7,13 +7,13 @@
 
 namespace thicklens::tools {
 
-// What the price list is made of.
+// The choices that the price list combines.
 struct PlanGrid {
-  bool full = false;       // each choice with each other, not one after the other
-  bool opencl = false;     // a device is there
-  bool base_only = false;  // each solver and prior as it is by itself
+  bool full = false;       // combines each choice with each other, not one after the other
+  bool opencl = false;     // a device is present
+  bool base_only = false;  // each solver and prior with its defaults only
 };
-// No plan twice.
+// Returns the plans without duplicates.
 std::vector<EstimatePlan> PlansOf(const PlanGrid& grid);
 
 }  // namespace thicklens::tools

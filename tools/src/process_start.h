@@ -7,11 +7,11 @@
 
 namespace thicklens::tools {
 
-// Throws Error where the stack is limited to less than the program needs (ulimit -s): it would end
-// by a fault of memory somewhere.
+// Throws Error if the stack limit is less than the program needs (ulimit -s): the program would end
+// with a memory fault at an arbitrary place.
 void RequireStack();
 
-// The folders for compiled kernels (name of the variable, value) that were taken out of the
+// Returns the folders for compiled kernels (name of the variable, value) that were removed from the
 // environment before main() because they are not absolute.
 std::vector<std::pair<std::string, std::string>> ForgottenCaches();
 

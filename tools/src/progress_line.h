@@ -6,8 +6,8 @@
 
 namespace thicklens::tools {
 
-// One line on stderr that is written over itself and wiped at the end. Silent unless stderr is a
-// terminal. May be updated from several threads.
+// One line on stderr that is overwritten and erased at the end. It is silent unless stderr is a
+// terminal. Several threads may update it.
 class ProgressLine {
  public:
   ProgressLine(std::string what, bool quiet);

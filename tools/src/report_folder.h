@@ -8,8 +8,8 @@
 
 namespace thicklens::tools {
 
-// A folder that is made if it is missing, and is removed again if nothing was written into it, also
-// where the process is interrupted.
+// A folder that is created if it is missing, and removed again if nothing was written into it, even
+// if the process is interrupted.
 class ReportFolder {
  public:
   explicit ReportFolder(const std::string& path);  // empty: none. Throws Error
@@ -19,7 +19,7 @@ class ReportFolder {
 
  private:
   std::filesystem::path path_;
-  Temporary made_;  // by this run
+  Temporary made_;  // the folder, if this run created it
 };
 
 }  // namespace thicklens::tools

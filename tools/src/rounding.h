@@ -7,12 +7,12 @@ namespace thicklens::tools {
 
 bool UsableSigma(double sigma);  // finite and above 0
 
-// A number with the digits that its error leaves meaningful: two of the error's. With an error that
-// is 0, NaN or infinite: five significant digits.
+// Rounds a number to the digits that its error leaves meaningful: two digits of the error. With an
+// error that is 0, NaN or infinite: five significant digits.
 std::string RoundedTo(double value, double sigma);
 std::string RoundedSigma(double sigma);  // two digits; "-" if 0, NaN or infinite
 std::string SignedRoundedTo(double value, double sigma);
-// "400.12 +- 0.11 mm"; without a sigma the number alone.
+// Returns "400.12 +- 0.11 mm"; without a usable sigma the number alone.
 std::string WithError(double value, double sigma, const std::string& unit);
 std::string SignedWithError(double value, double sigma, const std::string& unit);
 

@@ -9,11 +9,11 @@
 
 namespace thicklens::tools {
 
-// The pictures that a scene's layers name, read from their files. Those of unknown origin are taken
-// as sRGB, as a screen would show them. What a mask stores is no light. Throws Error.
+// Reads the images that a scene's layers name. Images of unknown origin are read as sRGB, as a
+// screen would show them. The values of a mask are not light. Throws Error.
 std::vector<model::LayerPixels> ReadScenePixels(const model::SceneSimulationOptions& scene);
 
-// `picture` and `light-field`, below `simulate`.
+// Adds `picture` and `light-field` below `simulate`.
 void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action);
 
 }  // namespace thicklens::tools

@@ -8,14 +8,14 @@
 
 namespace thicklens::tools {
 
-// The user's own picture in linear light; empty for other targets. Throws Error.
+// Reads the user's own image in linear light; empty for other targets. Throws Error.
 model::LinearPicture ReadTargetPicture(const model::TargetOptions& target);
 
-// The sweep as the person at the bench would describe it; paths as seen from its own folder.
+// Describes the sweep as a user at the bench would; paths are relative to the sweep's folder.
 model::SweepFile DescribeSweep(const model::SweepSimulationOptions& simulation,
                                const model::SweepSimulator& simulator, bool unknown_offset);
 
-// A picture as it would come out of its file.
+// Returns an image as it would be read from its file.
 cv::Mat AsFile(const model::StoredPicture& picture);
 
 }  // namespace thicklens::tools

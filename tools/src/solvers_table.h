@@ -11,26 +11,26 @@
 
 namespace thicklens::tools {
 
-// One solver of `bench solvers`. Of solvers by blocks a part of the picture alone may have been
-// solved: their time is extrapolated then, and they have no PSNR of the whole.
+// One solver of `bench solvers`. Solvers by blocks may have solved only a part of the image: their
+// time is then extrapolated, and they have no PSNR of the whole.
 struct SolversRow {
-  std::string solver, block_solver, prior;  // empty: it has none
+  std::string solver, block_solver, prior;  // empty: not applicable
   WholeTime time;
-  double psnr_part_db = 0;              // of the part that every solver is judged on
+  double psnr_part_db = 0;              // on the part that every solver is judged on
   std::optional<double> psnr_whole_db;  // absent: the whole was not solved
 };
 
-// What all rows share.
+// Data that all rows share.
 struct SolversRun {
   int width_px = 0, height_px = 0, u_count = 0, v_count = 0, threads = 0, repeat = 0;
-  ScoredArea part;          // that psnr_part_db is of
+  ScoredArea part;          // the part that psnr_part_db is computed on
   bool is_sampled = false;  // false: the part is the whole, without its border
-  double pixels_ratio = 1;  // of the whole over the part that blocks solved
+  double pixels_ratio = 1;  // pixels of the whole over those of the part that blocks solved
   int solved_px = 0;        // edge of that part
 };
 
-// A table for the terminal: measured and extrapolated seconds, and PSNRs of different areas, stand
-// in columns of their own. Ratios are to the first row.
+// Returns a table for the terminal: measured and extrapolated seconds, and PSNRs of different
+// areas, are in columns of their own. Ratios are to the first row.
 std::string SolversTableText(const SolversRun& run, const std::vector<SolversRow>& rows);
 nlohmann::json SolversRowJson(const SolversRun& run, const SolversRow& row,
                               const SolversRow& first);

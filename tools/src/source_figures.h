@@ -7,17 +7,18 @@
 
 namespace thicklens::tools {
 
-// What the source published of its four pictures of one size, in their order: K1 to K4 (640 x 480)
-// or L1 to L4 (256 x 256).
+// Published values of the paper for its four images of one size, in their order: K1 to K4 (640 x
+// 480) or L1 to L4 (256 x 256).
 using PublishedFigures = std::array<double, 4>;
 
-// Seconds of its tables 1 (implementation "opencl" or "cpu"), 2 (the same) and 3 ("bicgstab",
-// "umfpack", "viennacl"). Size: 'K' or 'L'; views: 3, 5 or 7 across and down. Absent: the source
-// has no such row.
+// Returns the seconds of the paper's tables 1 (implementation "opencl" or "cpu"), 2 (the same) and
+// 3 ("bicgstab", "umfpack", "viennacl"). Size: 'K' or 'L'; views: 3, 5 or 7 across and down. Absent
+// if the paper has no such row.
 std::optional<PublishedFigures> PublishedSeconds(int table, const std::string& implementation,
                                                  char size, int views);
 
-// Of its table 4, lens "thick" or "thin"; it does not say of how many views.
+// Values of the paper's table 4, lens "thick" or "thin"; the paper does not state the number of
+// views.
 struct PublishedFidelity {
   PublishedFigures macade, delta_e94_mean;
 };

@@ -1,4 +1,4 @@
-// Seconds on a clock that nobody sets.
+// Seconds on a steady clock, which is never adjusted.
 #ifndef THICKLENS_TOOLS_STOPWATCH_H_
 #define THICKLENS_TOOLS_STOPWATCH_H_
 

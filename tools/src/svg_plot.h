@@ -10,19 +10,18 @@
 
 namespace thicklens::tools {
 
-// Round positions within [lo, hi], a step of 1, 2 or 5 times a power of ten apart, the smallest
-// such step that gives at most `at_most` of them. Empty unless lo < hi, both finite, and at_most
-// >= 1.
+// Returns round positions within [lo, hi], with the smallest step of 1, 2 or 5 times a power of ten
+// that gives at most `at_most` of them. Empty unless lo < hi, both finite, and at_most >= 1.
 std::vector<double> NiceTicks(double lo, double hi, int at_most);
 
-// The same on a logarithmic axis, for 0 < lo < hi: powers of ten, or 1, 2 and 5 times these, or
-// where the axis is shorter those of NiceTicks.
+// Returns positions on a logarithmic axis, for 0 < lo < hi: powers of ten, or 1, 2 and 5 times
+// these, or, if the axis is shorter, those of NiceTicks.
 std::vector<double> NiceLogTicks(double lo, double hi, int at_most);
 
 // A tick's label with the digits that its step needs, and a true minus sign.
 std::string TickLabel(double value, double step);
 
-// Who speaks: a colour means the same in every figure of a page.
+// The origin of a curve; its colour means the same in every figure of a page.
 enum class Ink { kFit, kSource, kPeak, kData, kMuted, kTruth };
 enum class Mark { kNone, kDot, kRing, kCross, kDiamond };
 enum class Stroke { kNone, kSolid, kDashed, kDotted };
@@ -30,24 +29,24 @@ enum class Stroke { kNone, kSolid, kDashed, kDotted };
 // Points that are not finite are left out and break the line. Points above or below the plotted
 // range are drawn as a triangle at its edge.
 struct PlotSeries {
-  std::string label;  // in the legend; empty: not there
+  std::string label;  // in the legend; empty: not in the legend
   Ink ink = Ink::kData;
   Mark mark = Mark::kDot;
   Stroke stroke = Stroke::kNone;
-  bool thin = false;  // a line of less weight
+  bool thin = false;  // a thinner line
   std::vector<double> x, y;
   std::vector<double> y_error;     // half lengths of the error bars; empty: none
   std::vector<std::string> names;  // of the points, shown when pointed at; empty: none
 };
 
-// What lies between two curves over the same abscissas. It does not widen the plot.
+// The area between two curves over the same abscissas. It does not widen the plot.
 struct PlotBand {
-  std::string label;  // in the legend; empty: not there
+  std::string label;  // in the legend; empty: not in the legend
   Ink ink = Ink::kFit;
   std::vector<double> x, lo, hi;
 };
 
-// A line across the whole plot. One far outside the data is left out, and the legend says so.
+// A line across the whole plot. A line far outside the data is left out, and the legend says so.
 struct PlotLine {
   std::string label;
   Ink ink = Ink::kFit;
@@ -65,7 +64,7 @@ struct PlotNote {
 struct PlotAxis {
   std::string label;                               // with its unit
   std::optional<std::pair<double, double>> range;  // absent: from the data
-  // Values are shown by their logarithms; those that are not above 0 are left out.
+  // The axis is logarithmic; values that are not above 0 are left out.
   bool logarithmic = false;
 };
 
@@ -82,13 +81,13 @@ struct Plot {
   int height_px = 320;
 };
 
-// An <svg> element to be put into an HTML page that has the style below.
+// Returns an <svg> element for an HTML page that has the style below.
 std::string SvgPlot(const Plot& plot);
 
 // The style rules of every plot, light and dark.
 std::string SvgPlotStyle();
 
-// An <svg> element of class "plot" as a file of its own, with its style and a ground.
+// Returns an <svg> element of class "plot" as a file of its own, with its style and a background.
 std::string SvgFile(const std::string& element);
 
 }  // namespace thicklens::tools

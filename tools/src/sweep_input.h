@@ -12,7 +12,7 @@
 
 namespace thicklens::tools {
 
-// A sweep as the command line names it. Texts are as typed; empty: not given.
+// A sweep as the command line specifies it. Texts are as typed; empty: not given.
 struct SweepArguments {
   std::string input;  // SWEEP.yaml, or a folder with `readings_csv`
   std::string readings_csv;
@@ -27,20 +27,20 @@ struct SweepArguments {
   std::string target;
   std::string roi;  // x,y,width,height
 
-  // Files that no output may replace.
+  // Returns the files that no output may replace.
   std::vector<std::string> Files() const;
 };
 
 struct SweepInput {
-  model::SweepFile file;  // with what the command line says
+  model::SweepFile file;  // with the overrides of the command line
   calib::FocusSweep sweep;
   std::shared_ptr<FrameFiles> frame_files;
   std::optional<model::SweepTruth> truth;  // --truth, or truth.yaml beside the sweep's file
   std::vector<std::string> notices;        // one line each
 };
 
-// Reads the sweep's and the camera's file; of the frames only whether they exist. Throws Error, and
-// UsageError for arguments that cannot be meant.
+// Reads the sweep's and the camera's file, and checks only that the frames exist. Throws Error, and
+// UsageError for arguments that make no sense.
 SweepInput ReadSweepInput(const SweepArguments& arguments);
 
 }  // namespace thicklens::tools

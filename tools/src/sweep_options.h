@@ -7,7 +7,7 @@
 
 namespace thicklens::tools {
 
-// What the command line says of a sweep in place of its file: --offset-mm, --offset-sigma-mm,
+// Adds the options that override statements of a sweep's file: --offset-mm, --offset-sigma-mm,
 // --direction, --reading-sigma-mm, --floor-px, --floor-from, --target, --roi.
 void AddSweepStatements(CLI::App* command, SweepArguments* sweep);
 

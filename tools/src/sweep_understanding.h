@@ -10,7 +10,7 @@
 
 namespace thicklens::tools {
 
-// What a dry run finds out without measuring.
+// The findings of a dry run, which does not measure.
 struct Understanding {
   cv::Size frame_size_px;
   int frame_bits = 0, frame_channels = 0;
@@ -18,11 +18,11 @@ struct Understanding {
   std::size_t distinct_readings = 0;
 };
 
-// Opens the first frame alone, so that it takes no longer for a large sweep. Throws Error for what
-// would stop the calibration.
+// Opens only the first frame, so that a large sweep takes no longer. Throws Error for everything
+// that would stop the calibration.
 Understanding Understand(const SweepInput& input);
 
-// What a dry run tells. `outputs` names the files that a run would write.
+// Returns the text of a dry run. `outputs` names the files that a run would write.
 std::string UnderstandingText(const SweepInput& input, const Understanding& found,
                               const std::string& method, const std::string& outputs);
 nlohmann::json UnderstandingJson(const SweepInput& input, const Understanding& found,

@@ -9,19 +9,19 @@
 
 namespace thicklens::tools {
 
-// The bytes of a file that shows the target at true scale. Equal pages give equal bytes on one
-// machine; text in PDF and PNG is set in the sans serif font that the machine has.
+// Return the bytes of a file that shows the target at true scale. Equal pages give equal bytes on
+// one machine; text in PDF and PNG uses the sans serif font of the machine.
 std::string TargetPdf(const TargetPage& page, const std::vector<Leaf>& leaves);
 std::string TargetSvg(const TargetPage& page, const std::vector<Leaf>& leaves);
 
-// Picture size at a resolution. PNG states whole px per metre, and the picture is drawn at what is
-// stated, so that it has true scale to half a px over the sheet.
+// Image size at a resolution. PNG states whole px per metre, and the image is drawn at the stated
+// resolution, so that its scale is true to half a px over the sheet.
 struct PngSize {
   int pixels_per_metre = 0;
   int width_px = 0;
   int height_px = 0;
 };
-// Throws Error if there would be too many px, or too few for the smallest feature.
+// Throws Error for too many px, or too few for the smallest feature.
 PngSize TargetPngSize(const TargetPage& page, double dots_per_inch);
 std::string TargetPng(const TargetPage& page, const std::vector<Leaf>& leaves, const PngSize& size);
 

@@ -13,13 +13,13 @@ struct Leaf {
   int grey = 0;  // 0 to 255, as stored
 };
 
-// The texture of a target: dead leaves, discs that hide each other, from the hindmost to the
-// foremost. Radii are distributed as r^-3, so that every octave of sizes takes the same part of the
-// area: whatever the blur, some of it is left to be seen, and nothing repeats. Leaves that others
-// hide are left out. The same page gives the same leaves on every machine.
+// The texture of a target: dead leaves, discs that occlude each other, from the back to the front.
+// The radii are distributed as r^-3, so that every octave of sizes takes the same part of the area:
+// whatever the blur, some of the texture stays visible, and nothing repeats. Occluded leaves are
+// left out. The same page gives the same leaves on every machine.
 std::vector<Leaf> DeadLeaves(const TargetPage& page);
 
-// What shows where no leaf lies, below a thousandth of the area.
+// The grey value where no leaf lies, on less than a thousandth of the area.
 int GreyBehindLeaves(const TargetPage& page);
 
 }  // namespace thicklens::tools

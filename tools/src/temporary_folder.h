@@ -8,10 +8,10 @@
 
 namespace thicklens::tools {
 
-// A new folder below TMPDIR, gone with all that is in it.
+// A new folder below TMPDIR, removed at the end with everything in it.
 class TemporaryFolder {
  public:
-  // "thicklens-PURPOSE-XXXXXX". Throws Error that names TMPDIR.
+  // The folder is named "thicklens-PURPOSE-XXXXXX". Throws Error that names TMPDIR.
   explicit TemporaryFolder(const std::string& purpose);
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;

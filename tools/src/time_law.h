@@ -6,50 +6,51 @@
 
 namespace thicklens::tools {
 
-// What the time of an estimate depends on, of what is known before it.
+// Quantities known before an estimate that determine its time.
 struct PictureLoad {
   double megapixels = 0;
   int channels = 1;
   int views = 0;             // U V
-  double blur_sigma_px = 0;  // of the photograph by its depth, root mean square of the pixels
-  // What one thread takes to make the files of all views: it depends on what they show.
+  double blur_sigma_px = 0;  // of the photograph by its depth, root mean square over the pixels
+  // Seconds that one thread needs to encode the files of all views, which depend on the content.
   double file_seconds = 0;
 };
 
-// Of the seconds of a run: what is left of the whole is making the views, and the end.
+// Parts of the seconds of a run. The rest of the whole is making the views, and the end.
 struct PartSeconds {
-  double read = 0;   // of the files, until the plan is chosen: over by then, and in no law
+  // of the files, until the plan is chosen; it has passed by then and is in no law
+  double read = 0;
   double setup = 0;  // geometry
-  double solve = 0;  // what the plan alone decides; all else is the same for others of its kind
+  double solve = 0;  // depends on the plan alone; all other parts are equal for plans of one kind
   double files = 0;  // writing the views
 };
 
 struct TimedLoad {
   PictureLoad load;
-  double seconds = 0;  // > 0, of the whole run
-  PartSeconds parts;   // none below 0, together no more than the whole
+  double seconds = 0;  // of the whole run, > 0
+  PartSeconds parts;   // none below 0; their sum is at most the whole
 };
 
-// Seconds of a run from when its files are read [D120], as a sum of terms, none of them negative.
-// Pixels are in millions.
+// Seconds of a run from the start of reading its files [D120], as a sum of terms, none of them
+// negative. Pixels are in millions.
 class TimeLaw {
  public:
-  // In the order of the profile's file, whose schema changes with it. s: the blur's sigma in px.
+  // The terms are in the order of the profile's file, whose schema changes with it. s is the blur's
+  // sigma in px.
   enum Term {
-    kStart,                          // seconds, whatever the picture
-    kPixels,                         // depth
-    kPixelsChannels,                 // what iterations do for a pixel
-    kPixelsViews,                    // the geometry of the views
-    kPixelsViewsChannels,            // making them
-    kPixelsChannelsBlur,             // times s: what iterations do for a blur
-    kPixelsViewsBlur,                // times s: what geometry does for it
-    kFileSeconds,                    // the share of the threads in encoding
-    kViews,                          // a view's files and threads, whatever their size
-    kPixelsViewsChannelsIterations,  // times s / (1 + s): a blur of many pixels takes no more
-                                     // iterations than one of a few, and none at all takes few
-    kPixelsChannelsIterations,       // times s / (.2 + s), of what is solved on scene points: with
-                                     // more blur their iterations soon level off
-    kPixelsViewsBlurArea,            // times s^2: the pixels that a blur reaches
+    kStart,                // seconds, independent of the image
+    kPixels,               // depth
+    kPixelsChannels,       // work of iterations for a pixel
+    kPixelsViews,          // the geometry of the views
+    kPixelsViewsChannels,  // making the views
+    kPixelsChannelsBlur,   // times s: work of iterations for a blur
+    kPixelsViewsBlur,      // times s: work of the geometry for a blur
+    kFileSeconds,          // the threads' share in encoding
+    kViews,                // files and threads of a view, independent of size
+    // times s / (1 + s): iterations level off with blur, and are few without it
+    kPixelsViewsChannelsIterations,
+    kPixelsChannelsIterations,  // times s / (0.2 + s), on scene points: iterations level off sooner
+    kPixelsViewsBlurArea,       // times s^2: pixels that a blur reaches
   };
   static constexpr int kTerms = kPixelsViewsBlurArea + 1;
   using Terms = Eigen::Matrix<double, kTerms, 1>;
@@ -64,19 +65,19 @@ class TimeLaw {
   Terms coefficients_;
 };
 
-// Plans that took the same pictures, in one order, and do the same but for what they solve.
+// Times of plans on the same images in the same order. The plans differ only in what they solve.
 using TimesOfPlans = std::vector<std::vector<TimedLoad>>;
 
-// A law for each plan, the sum of a law for each part of a run, of the terms that such work has:
-// few pictures cannot tell all of them apart. What the plans have in common is found from the mean
-// of them all, so that noise does not tell them apart where the pictures do not; each law has the
-// least sum of squared errors, relative to the whole time, with no coefficient below 0. Throws
-// Error for fewer than two pictures, times that are not above 0, parts that are not of them, or
-// plans of different pictures.
+// Fits a law for each plan. It is the sum of a law for each part of a run, with only the terms that
+// such work has, because a few images cannot separate all terms. The common parts of the plans are
+// fitted to the mean of all plans, so that noise does not separate plans where the images do not.
+// Each law has the least sum of squared errors, relative to the whole time, with no coefficient
+// below 0. Throws Error for fewer than two images, times that are not above 0, parts that do not
+// fit their times, or plans with different images.
 std::vector<TimeLaw> FitTimeLaws(const TimesOfPlans& plans);
 
-// Of each plan and picture what was foreseen once it was read, by the law from the pictures of all
-// other sizes, over what was measured.
+// Returns for each plan and image the ratio of predicted to measured time. The prediction is made
+// when the image has been read, by the law from the images of all other sizes.
 std::vector<std::vector<double>> LeftOutRatios(const TimesOfPlans& plans);
 
 }  // namespace thicklens::tools

@@ -6,14 +6,14 @@
 
 namespace thicklens::tools {
 
-// Takes out of the environment what would let a library load code or configuration from the current
-// folder, which may be a stranger's data set, or from a folder that every user may write to:
+// Removes from the environment what would let a library load code or configuration from the current
+// folder, which may hold somebody else's data set, or from a folder that every user may write to:
 // variables with a path (of caches, drivers, plugins, temporary files) that is not absolute, and
-// the cache of OpenCL programs that PoCL puts into /tmp where there is no home folder. Returns a
-// line for each that was taken out. To be called before any library reads them.
+// the cache of OpenCL programs that PoCL puts into /tmp if there is no home folder. Returns one
+// line for each removed variable. Call it before any library reads them.
 std::vector<std::string> DistrustRelativePaths();
 
-// The line about a variable that holds one path.
+// Returns the line about a variable that holds one path.
 std::string RelativePathIsIgnored(const std::string& name, const std::string& value);
 
 }  // namespace thicklens::tools

@@ -7,18 +7,19 @@
 
 namespace thicklens::tools {
 
-// Seconds of runs on a whole picture that were measured on it, or that parts of it stand for. Both
-// kinds never stand in one column, nor under one key.
+// Seconds of runs on a whole image, either measured on it or extrapolated from parts. The two kinds
+// never share a column or a key.
 struct WholeTime {
-  std::vector<double> seconds;  // of each run, at least one
+  std::vector<double> seconds;  // one for each run, at least one
   bool is_extrapolated = false;
 
   double median() const;
-  // Two cells of a table: as measured and as extrapolated; "-" in the one that it is not.
+  // Two cells of a table: as measured and as extrapolated; "-" in the cell that does not apply.
   std::string MeasuredCell() const;
   std::string ExtrapolatedCell() const;
-  std::string RangeCell() const;  // "least .. most", of either
-  // seconds, seconds_of_runs, extrapolated_seconds, extrapolated_seconds_of_runs; two are null.
+  std::string RangeCell() const;  // "least .. most", of either kind
+  // The keys are seconds, seconds_of_runs, extrapolated_seconds and extrapolated_seconds_of_runs;
+  // two are null.
   nlohmann::json Json() const;
 };
 
