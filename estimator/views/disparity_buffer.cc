@@ -8,7 +8,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// A triangle with less than this, twice its area, is seen edge-on: a line.
+// A triangle is seen edge-on, as a line, if twice its area is less than this.
 constexpr double kEdgeOnPx2 = 1e-9;
 
 constexpr double kTolerancePx = kEdgeTolerancePx;
@@ -18,12 +18,12 @@ double Edge(const Vertex& p, const Vertex& q, double x, double y) {
   return (p.x - x) * (q.y - y) - (q.x - x) * (p.y - y);
 }
 
-// The integers in [from, to] and in [0, count - 1]; `last` < `first` if there are none.
+// The integers in both [from, to] and [0, count - 1]; `last` < `first` if there are none.
 struct Samples {
   int first = 0, last = -1;
 };
-// Cut before the conversion: a point may be anywhere. Numbers are then not negative, where the
-// conversion is floor.
+// Bounds are clamped before the conversion because a point may be anywhere. The clamped numbers are
+// not negative, so that the conversion to int is floor.
 Samples SamplesBetween(double from, double to, int count) {
   const double low = std::clamp(from - kTolerancePx, 0.0, static_cast<double>(count));
   const double above_high = std::clamp(to + kTolerancePx, -1.0, count - 1.0) + 1;
@@ -48,7 +48,7 @@ void DisparityBuffer::DrawTriangle(const Vertex& p, const Vertex& q, const Verte
       double share_q = sign * Edge(r, p, x, y);
       double share_r = sign * Edge(p, q, x, y);
       if (std::min({share_p, share_q, share_r}) < -kTolerancePx) continue;
-      // Never extrapolated, however thin the triangle.
+      // Extrapolation is excluded, however thin the triangle is.
       share_p = std::max(share_p, 0.0);
       share_q = std::max(share_q, 0.0);
       share_r = std::max(share_r, 0.0);

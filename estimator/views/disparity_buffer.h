@@ -8,7 +8,7 @@
 
 namespace thicklens::estimator {
 
-// A point of the centre view where it stands in another view.
+// Position of a point of the centre view in another view.
 struct Vertex {
   double x = 0, y = 0;
   double disparity = 0;
@@ -20,12 +20,12 @@ class DisparityBuffer {
   DisparityBuffer(int width_px, int height_px)
       : width_px_(width_px), height_px_(height_px), disparity_(Index(0, height_px), kUncovered) {}
 
-  // Interpolated linearly. Both sides of a triangle are drawn: the back of a surface is hidden by
-  // its front. What is seen edge-on is not.
+  // Draws a triangle with linearly interpolated disparity. Both sides are drawn because the front
+  // of a surface occludes its back. A triangle seen edge-on is not drawn.
   void DrawTriangle(const Vertex& p, const Vertex& q, const Vertex& r);
-  // +-.5 px.
+  // Draws a square of +-0.5 px.
   void DrawSquare(const Vertex& centre);
-  // The sample must be inside.
+  // Stores the disparity if it is nearer than the stored one. The sample must be inside.
   void Put(int x, int y, float disparity) {
     float& there = disparity_[Index(x, y)];
     there = there < disparity ? disparity : there;

@@ -1,4 +1,4 @@
-// DisparityRenderer: a disparity map drawn into other views.
+// DisparityRenderer draws a disparity map into other views.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,13 +21,13 @@
 namespace thicklens::estimator {
 namespace {
 
-// Neighbours whose disparities differ by more, px per view step, belong to two surfaces.
+// Neighbours whose disparities differ by more than this, px per view step, belong to two surfaces.
 constexpr double kSameSurfacePx = 0.2;
 
-// Farther than any picture is wide; whole numbers up to there are exact in float.
+// This exceeds the width of any image; whole numbers up to it are exact in float.
 constexpr float kFarAwayPx = 4194304;
 
-// So that the displacement of disparity 0 is 0 in float as well.
+// The limit keeps the displacement of disparity 0 at 0 in float as well.
 constexpr double kLargestShift = 1e30;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
@@ -52,7 +52,7 @@ Vertex VertexOf(const PixelRow& row, int x, int y) {
           row.disparity[i]};
 }
 
-// The cell at x of the row between `upper` and `lower`, whatever its kind.
+// Paints the cell at x of the row between `upper` and `lower`, whatever its kind.
 void PaintCell(const PixelRow& upper, const PixelRow& lower, int x, int y,
                DisparityBuffer* buffer) {
   const Vertex p00 = VertexOf(upper, x, y);
@@ -61,7 +61,7 @@ void PaintCell(const PixelRow& upper, const PixelRow& lower, int x, int y,
   buffer->DrawTriangle(p00, p11, VertexOf(lower, x, y + 1));
 }
 
-// The same for one that is not odd.
+// Paints such a cell if it is not odd.
 void PaintRegularCell(const PixelRow& upper, const PixelRow& lower, int x, int y,
                       DisparityBuffer* buffer) {
   const ViewRow row{y, buffer->width_px(), buffer->height_px()};
@@ -95,7 +95,8 @@ void PaintSurfaces(const DisparityMap& map, const std::vector<char>& is_surface,
       const std::size_t i = Index(x);
       const CellSamples samples = is_cell[i] ? cells.samples[i] : CellSamples::kNone;
       if (samples <= CellSamples::kTwo) {
-        // None, one (the first is the last) and two take turns on a slope: no branch.
+        // None, one (the first is the last) and two samples alternate on a slope; the code avoids a
+        // branch.
         const bool any = samples != CellSamples::kNone;
         float* const first = any ? row + x + cells.first[i] : &nowhere;
         *first = Most(*first, cells.first_disparity[i]);
@@ -128,7 +129,7 @@ void FindSources(const DisparityMap& map, const SupportedPixels& supported, Disp
   HoleFiller filler(map, supported, buffer, view->shift);
   const std::vector<HoleFiller::Sample>& holes = filler.holes();
   view->hidden.reserve(holes.size());
-  if (holes.size() == map.disparity.size()) {  // looks past the picture: the centre stands in
+  if (holes.size() == map.disparity.size()) {  // the view looks past the image: use the centre view
     for (std::size_t i = 0; i < holes.size(); ++i) {
       view->hidden.push_back({static_cast<std::int32_t>(i), 0, 0, map.disparity[i]});
     }

@@ -11,7 +11,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// std::floor is a call where the processor may be an old one. `x` must be in the range of int.
+// std::floor is a function call in builds for older processors. `x` must be in the range of int.
 int Floor(double x) {
   const int toward_zero = static_cast<int>(x);
   return toward_zero > x ? toward_zero - 1 : toward_zero;
@@ -21,7 +21,8 @@ std::array<HoleFiller::Sample, 4> Neighbours(const HoleFiller::Sample& of) {
   return {{{of.x + 1, of.y}, {of.x - 1, of.y}, {of.x, of.y + 1}, {of.x, of.y - 1}}};
 }
 
-// The whole numbers n of [first, last] at which floor(x + n step + 1/2) may be 0 to count - 1.
+// Limits [first, last] to the whole numbers n at which floor(x + n step + 1/2) may be 0 to count -
+// 1.
 void CutSteps(double x, double step, int count, int* first, int* last) {
   if (step == 0) return;
   const double at_start = (-0.5 - x) / step, at_end = (count - 0.5 - x) / step;
@@ -37,7 +38,7 @@ SupportedPixels FindSupported(const DisparityMap& map, const std::vector<char>& 
   SupportedPixels supported;
   std::vector<char>& is_supported = supported.is_supported;
   is_supported.assign(map.disparity.size(), 0);
-  // Three of a pixel's neighbours are in each of its cells.
+  // Each cell of a pixel contains three of the pixel's neighbours.
   for (std::size_t i = 0; i < is_surface.size(); ++i) {
     if (is_surface[i] == 0) continue;
     is_supported[i] = is_supported[i + 1] = 1;
@@ -51,7 +52,7 @@ SupportedPixels FindSupported(const DisparityMap& map, const std::vector<char>& 
     for (int x = 0; x < width_px; ++x, ++i) {
       const float disparity = map.disparity[i];
       if (is_supported[i] == 0) {
-        int found = -1;  // itself
+        int found = -1;  // the pixel itself is found as well
         for (int v = std::max(y - 1, 0); v <= std::min(y + 1, height_px - 1); ++v) {
           const float* const row = map.disparity.data() + static_cast<std::size_t>(v) * width;
           for (int u = std::max(x - 1, 0); u <= std::min(x + 1, width_px - 1); ++u)
@@ -86,7 +87,7 @@ HoleFiller::HoleFiller(const DisparityMap& map, const SupportedPixels& supported
       --count;
     }
   }
-  // Those that are longer than the picture lead out of it.
+  // Steps that are longer than the image lead out of it.
   const double longest = std::max(map.width_px, map.height_px);
   first_step_ = static_cast<int>(
       std::clamp(std::floor(px_per_unit_ * supported.lowest.value_or(0)), -longest, longest));
@@ -129,10 +130,10 @@ HoleFiller::Sample HoleFiller::At(int x, int y, int steps) const {
   return {Floor(x + steps * direction_.x() + 0.5), Floor(y + steps * direction_.y() + 0.5)};
 }
 
-// The ray of the sample goes over the centre view's pixel at n steps where its own disparity is n
-// over the px per unit: from the far end on, it is behind the pixels, up to the one whose disparity
-// is below that. Beyond that pixel, away from the viewer, it is hidden from the centre for good. A
-// pixel without support is no surface to pass in front of.
+// The ray of the sample passes over the centre view's pixel at n steps where its own disparity is n
+// / px_per_unit_. From the far end on, the ray is behind the pixels, up to the first pixel whose
+// disparity is below that. Beyond that pixel, away from the viewer, the ray stays occluded from the
+// centre. A pixel without support is no surface to pass in front of.
 std::optional<HoleFiller::Sample> HoleFiller::LastBefore(int x, int y) const {
   if (!supported_.lowest) return std::nullopt;
   int first = first_step_;
@@ -162,7 +163,7 @@ HoleFiller::Sample HoleFiller::Closest(int x, int y) {
   return {origin % buffer_.width_px(), origin / buffer_.width_px()};
 }
 
-// Breadth first, from all covered samples beside a hole at once, row by row.
+// The search is breadth first, from all covered samples beside a hole at once, row by row.
 void HoleFiller::SpreadCovered() {
   closest_.assign(buffer_.Index(0, buffer_.height_px()), -1);
   const auto closest_of = [this](const Sample& of) -> int& {

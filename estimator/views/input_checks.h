@@ -5,12 +5,12 @@
 
 namespace thicklens::estimator {
 
-// Throws Error, naming field and value, unless an estimate can start from the input. A file must be
-// named by whoever read it; here the numbers are.
+// Throws Error, naming field and value, unless an estimate can start from the input. The message
+// names numbers only; the caller that read a file must name the file.
 void CheckInput(const EstimateInput& input);
-// The light field that the input leads to, without its values.
+// Returns the light field that the input leads to, without its values.
 model::LightField DescriptionOf(const EstimateInput& input);
-// The same with values, all 0.
+// Returns DescriptionOf(input) with all values set to 0.
 model::LightField FrameOf(const EstimateInput& input);
 
 }  // namespace thicklens::estimator

@@ -18,19 +18,20 @@ namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Of a sample's pixel; what is less is not told from none, nor what leaves less from all.
+// Minimum share of a sample's pixel. A smaller share counts as none, and a share that leaves less
+// than this counts as the whole pixel.
 constexpr float kLeastShare = 0.01F;
 
 struct Step {
   int x, y;
 };
-// Those that share a side with the sample before those that share a corner.
+// Neighbours that share a side with the sample are before those that share a corner.
 constexpr std::array<Step, 8> kAround{
     {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 
 struct Candidate {
   kernels::MixedSample mixed;
-  // Of a hidden sample's surface itself, so much as is seen of it after all.
+  // True: the visible share of a hidden sample's own surface.
   bool is_same_surface = false;
 };
 
@@ -43,8 +44,8 @@ class Mixer {
         far_px_(static_cast<float>(map.width_px) + static_cast<float>(map.height_px)),
         is_done_(view.disparity.size(), 0) {}
 
-  // The sample's pixel where one at a jump, of that disparity, lands in it. Of a sample and what is
-  // behind it only once.
+  // Returns how the sample's pixel is mixed when a pixel at a jump, of the disparity `landing`,
+  // lands in it. The background of a sample is returned only once.
   std::optional<Candidate> At(int x, int y, float landing) {
     if (!IsInside(x, y)) return std::nullopt;
     const bool is_hidden = std::isnan(view_.disparity[At(x, y)]);
@@ -55,7 +56,7 @@ class Mixer {
       const kernels::HiddenSample landed = On(x, y, landing);
       return Mixed(x, y, landed, Cover(x, y, landed), is_same_surface);
     }
-    // What is behind does not depend on which pixel lands.
+    // The background does not depend on which pixel lands.
     if (std::exchange(is_done_[At(x, y)], 1) != 0) return std::nullopt;
     const float cover = Cover(x, y, On(x, y, shown));
     if (cover > 1 - kLeastShare) return std::nullopt;
@@ -69,11 +70,12 @@ class Mixer {
   }
   std::size_t At(int x, int y) const { return Index(y) * Index(view_.width_px) + Index(x); }
 
-  // At a way from a sample, of its pixel the share that the surface of a disparity covers: each of
-  // the centre view's pixels is a square, and so is the sample's.
+  // Returns the share of a sample's pixel that the surface at `from` covers: each of the centre
+  // view's pixels is a square, and so is the sample's pixel.
   float Cover(int x, int y, const kernels::HiddenSample& from) const {
     if (!(std::abs(from.source_x) < far_px_ && std::abs(from.source_y) < far_px_)) return 0;
-    // Whole steps and the rest, so that all rows and columns round alike.
+    // The displacement is split into whole steps and the rest, so that all rows and columns round
+    // alike.
     const float left = std::floor(from.source_x), above = std::floor(from.source_y);
     const float right_share = from.source_x - left, below_share = from.source_y - above;
     const int column = x + static_cast<int>(left), row = y + static_cast<int>(above);
@@ -90,14 +92,15 @@ class Mixer {
     return (1 - below_share) * share_in_row(row) + below_share * share_in_row(row + 1);
   }
 
-  // Where a sample would see a surface.
+  // Returns the source of a sample on a surface of that disparity.
   kernels::HiddenSample On(int x, int y, float disparity) const {
     return {static_cast<std::int32_t>(At(x, y)), static_cast<float>(view_.shift.x() * disparity),
             static_cast<float>(view_.shift.y() * disparity), disparity};
   }
 
-  // What the samples around show beyond a surface: what is seen before what is hidden. Where the
-  // centre view does not show that surface here, what it shows there.
+  // Returns the surface that the neighbouring samples show beyond a surface; visible samples
+  // precede hidden ones. Where the centre view does not show that surface here, the neighbour's own
+  // source is returned.
   std::optional<kernels::HiddenSample> Behind(int x, int y, float disparity) const {
     std::optional<kernels::HiddenSample> beside, hidden;
     for (const Step& step : kAround) {
@@ -131,11 +134,11 @@ class Mixer {
   const CompactView& view_;
   const float tolerance_;
   const float far_px_;
-  std::vector<unsigned char> is_done_;  // of each sample: with what is behind
+  std::vector<unsigned char> is_done_;  // 1: the sample's background was returned
 };
 
-// Of one sample, another surface before its own; the larger share before others; of the same, the
-// nearer.
+// Orders the candidates of one sample: another surface before the sample's own, then the larger
+// share, then the nearer surface.
 bool IsBefore(const Candidate& a, const Candidate& b) {
   const auto key = [](const Candidate& candidate) {
     return std::tuple(candidate.is_same_surface, -candidate.mixed.share,
@@ -144,7 +147,7 @@ bool IsBefore(const Candidate& a, const Candidate& b) {
   return key(a) < key(b);
 }
 
-// The first of the candidates of each sample.
+// Collects the first candidate (by IsBefore) of each sample.
 class FirstCandidates {
  public:
   explicit FirstCandidates(std::size_t samples) : place_(samples, kNone) {}
@@ -171,7 +174,7 @@ class FirstCandidates {
  private:
   static constexpr std::int32_t kNone = -1;
 
-  std::vector<std::int32_t> place_;  // among the candidates, of each sample
+  std::vector<std::int32_t> place_;  // index of each sample's candidate in candidates_
   std::vector<Candidate> candidates_;
 };
 

@@ -7,8 +7,8 @@
 
 namespace thicklens::estimator {
 
-// The samples of a view whose pixels two surfaces share, by index; as RenderDisparity has them.
-// `at_jump`: the indices of the map's pixels at a jump of the disparity.
+// Returns, by index, the samples of a view whose pixels two surfaces share, as RenderDisparity
+// specifies them. `at_jump`: the indices of the map's pixels at a jump of the disparity.
 std::vector<kernels::MixedSample> FindMixedSamples(const DisparityMap& map,
                                                    const std::vector<int>& at_jump,
                                                    const CompactView& view);

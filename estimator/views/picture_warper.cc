@@ -1,4 +1,4 @@
-// PictureWarper: a picture seen from other views.
+// PictureWarper warps an image to other views.
 #include <fmt/format.h>
 
 #include <Eigen/Core>
@@ -15,11 +15,12 @@
 namespace thicklens::estimator {
 namespace {
 
-// A pixel whose disparity differs by more, px per view step, is not of the sample's surface.
+// A pixel whose disparity differs by more than this, px per view step, is not of the sample's
+// surface.
 constexpr double kSamePointPx = 0.3;
 
 // Repeated pixels before the first and after the last pixel of a row or a column: a sample reads
-// those at -1, 0, 1 and 2.
+// the pixels at -1, 0, 1 and 2.
 constexpr int kBefore = 1;
 constexpr int kAfter = 2;
 
@@ -27,7 +28,7 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 std::size_t Stride(int width_px) { return Index(width_px + kBefore + kAfter); }
 
-// So many channels of a pixel are read at once, of a picture with more than one.
+// Number of channels of a pixel that are read at once if the image has more than one.
 constexpr int kFour = 4;
 int ChannelsOfPixel(int channels) { return channels == 1 ? 1 : kFour; }
 
@@ -55,7 +56,7 @@ inline __attribute__((always_inline)) Four Load(const float* from) {
   return four;
 }
 
-// The weights of catmull_rom.h, in float and the four at once.
+// The weights of catmull_rom.h, in float, all four at once.
 inline __attribute__((always_inline)) Four CatmullRom(float fraction) {
   constexpr Four kCubic{-0.5F, 1.5F, -1.5F, 0.5F};
   constexpr Four kSquare{1, -2.5F, 2, -0.5F};
@@ -64,16 +65,16 @@ inline __attribute__((always_inline)) Four CatmullRom(float fraction) {
   return ((kCubic * fraction + kSquare) * fraction + kLinear) * fraction + kConstant;
 }
 
-// Four taps below each other, `stride` numbers apart.
+// Sums four taps below each other, `stride` numbers apart.
 inline __attribute__((always_inline)) Four Down(const float* tap, std::size_t stride,
                                                 const Four& weight) {
   return weight[0] * Load(tap) + weight[1] * Load(tap + stride) +
          weight[2] * Load(tap + 2 * stride) + weight[3] * Load(tap + 3 * stride);
 }
 
-// The 16 taps from `tap` on, of pixels with four channels. Summed in the same order as those of
-// pixels with one, so that each channel gets the same bits as alone
-// (where the compiler fuses no sums with products).
+// Sums the 16 taps from `tap` on, of pixels with four channels. The order of the sum is that of
+// pixels with one channel, so that each channel gets the same bits as alone (where the compiler
+// fuses no sums with products).
 inline __attribute__((always_inline)) Four BicubicOfFour(const float* tap, std::size_t stride,
                                                          const Four& weight_x,
                                                          const Four& weight_y) {
@@ -90,9 +91,9 @@ inline __attribute__((always_inline)) float BicubicOfOne(const float* tap, std::
   return (terms[0] + terms[1]) + (terms[2] + terms[3]);
 }
 
-// Sources along one axis, cut to the pixels 0 to `last`: the pixel before and the rest. The source
-// of sample n is at origin + n step + source[n]. `limit_px`: more than the picture is wide and
-// high.
+// Splits the positions of sources along one axis into the pixel before each (clamped to 0 to
+// `last`) and the rest. The source of sample n is at origin + n step + source[n]. `limit_px` must
+// exceed the width and the height of the image.
 void SplitSources(const float* source, int count, std::int32_t origin, std::int32_t step,
                   std::int32_t last, float limit_px, std::int32_t* __restrict pixel,
                   float* __restrict rest) {
@@ -111,8 +112,8 @@ void SplitSources(const float* source, int count, std::int32_t origin, std::int3
 
 }  // namespace
 
-// Of one row of a view: disparities, ways to the sources; and of these the pixels before, and the
-// rest of the way.
+// One row of a view: the disparities, the displacements to the sources, the pixels before the
+// sources, and the remaining fractions.
 struct PictureWarper::TapRow {
   explicit TapRow(int count)
       : way_x(Index(count)),
@@ -171,7 +172,7 @@ void PictureWarper::FindRanges() {
   const int width = map_.width_px;
   const int height = map_.height_px;
   ranges_.resize(map_.disparity.size());
-  // Of the four pixels in each column.
+  // Range of the four pixels in each column.
   std::vector<Range> columns(Index(width));
   const auto row_of = [&](int y) {
     return map_.disparity.data() + Index(std::clamp(y, 0, height - 1)) * Index(width);
@@ -195,14 +196,14 @@ void PictureWarper::FindRanges() {
   }
 }
 
-// Of the first channel.
+// Returns the address of the pixel's first channel.
 const float* PictureWarper::Tap(int x, int y) const {
   return pixels_.data() + (Index(y + kBefore) * Stride(map_.width_px) + Index(x + kBefore)) *
                               Index(ChannelsOfPixel(channels_));
 }
 
-// The loop: the processor's own vector instructions come in with the caller that it is inlined
-// into. kChannels: 0 for any.
+// This loop is inlined into its caller, which selects the processor's vector instructions.
+// kChannels: 0 for any number.
 template <int kChannels>
 inline __attribute__((always_inline)) void PictureWarper::WarpRowOf(const TapRow& row,
                                                                     float* warped) const {
@@ -246,7 +247,7 @@ __attribute__((target("avx2"))) void PictureWarper::WarpRowAvx2(const TapRow& ro
 template <int kChannels>
 void PictureWarper::WarpRow(const TapRow& row, float* warped) const {
 #if defined(__x86_64__)
-  // Without FMA, which would round sums of one channel and of four differently.
+  // FMA is not enabled because it would round sums of one channel and of four differently.
   if (__builtin_cpu_supports("avx2")) return WarpRowAvx2<kChannels>(row, warped);
 #endif
   WarpRowOf<kChannels>(row, warped);
@@ -262,7 +263,8 @@ void PictureWarper::WarpRow(const TapRow& row, float* warped) const {
   }
 }
 
-// Of the taps of the surface alone; where none is, the tap nearest to it in disparity.
+// Interpolates the taps of the surface alone; if there is none, the tap nearest in disparity is
+// used.
 void PictureWarper::Bilinear(int x0, int y0, float fraction_x, float fraction_y, float disparity,
                              float* value) const {
   const int of_pixel = ChannelsOfPixel(channels_);
@@ -278,7 +280,7 @@ void PictureWarper::Bilinear(int x0, int y0, float fraction_x, float fraction_y,
     for (int i = 0; i < 2; ++i) {
       const double weight = (i == 0 ? 1 - static_cast<double>(fraction_x) : fraction_x) *
                             (j == 0 ? 1 - static_cast<double>(fraction_y) : fraction_y);
-      if (weight == 0) continue;  // perhaps outside of the picture
+      if (weight == 0) continue;  // the tap may be outside of the image
       const float there = map_.disparity[Index(y0 + j) * Index(map_.width_px) + Index(x0 + i)];
       const float* const tap = Tap(x0 + i, y0 + j);
       const double difference = std::abs(static_cast<double>(there) - disparity);

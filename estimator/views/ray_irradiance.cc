@@ -18,8 +18,8 @@ double IrradianceOf(const model::Camera& camera, const model::LightFieldGrid& gr
   return model::RelativeIrradiance(camera.lens, camera.image_distance_mm(), grid.planes, ray);
 }
 
-// Of the ray of view (k, l) that lands at the principal point: P s = Q u by [S16], so s = Q u/P; s
-// = 0 with ST in the plane of focus.
+// Returns the irradiance of the ray of view (k, l) that lands at the principal point: P s = Q u by
+// [S16], so s = Q u/P; s = 0 with ST in the plane of focus.
 double IrradianceAtPrincipalPoint(const model::LightFieldGrid& grid, const model::Camera& camera,
                                   int k, int l) {
   const model::ProjectionCoefficients projection =
@@ -31,7 +31,7 @@ double IrradianceAtPrincipalPoint(const model::LightFieldGrid& grid, const model
   return IrradianceOf(camera, grid, ray);
 }
 
-// One over that of every view, V x U.
+// Returns one over the irradiance at the principal point of every view, V x U.
 Eigen::ArrayXXd Exposures(const model::LightFieldGrid& grid, const model::Camera& camera) {
   Eigen::ArrayXXd exposures(grid.v_count, grid.u_count);
   for (int l = 0; l < grid.v_count; ++l) {
@@ -41,12 +41,12 @@ Eigen::ArrayXXd Exposures(const model::LightFieldGrid& grid, const model::Camera
   return exposures;
 }
 
-// Samples from a pixel to the ray of view k that lands nearest to it.
+// Returns the number of samples from a pixel to the ray of view k that lands nearest to it.
 int NearestRayShift(double landing_step_px, int k, int count) {
   return -static_cast<int>(std::floor(landing_step_px * (k - (count - 1) / 2.0) + 0.5));
 }
 
-// tan^2 of alpha and beta for rays in the plane of one axis, samples x positions on the aperture.
+// tan^2 of alpha and beta for rays in the plane of one axis; samples x positions on the aperture.
 struct SquaredSlopes {
   Eigen::ArrayXXd alpha, beta;
 };
@@ -69,8 +69,8 @@ SquaredSlopes SlopesOnAxis(const model::LightFieldGrid& grid, const model::Camer
   return slopes;
 }
 
-// [S12] for rows of rays. The tangent of an angle to the axis is the hypotenuse of those in the
-// planes of the two axes: tables of these are all that is needed.
+// [S12] for rows of rays. The tangent of an angle to the axis is the hypotenuse of the tangents in
+// the planes of the two axes, so that two tables are sufficient.
 class RowIrradiance {
  public:
   RowIrradiance(const model::LightFieldGrid& grid, const model::Camera& camera)
@@ -84,7 +84,7 @@ class RowIrradiance {
           return model::Ray{0, ray.t_mm, 0, ray.v_mm};
         })) {}
 
-  // Of the rays (i, j, k, l), `count` of them from i = `first`.
+  // Returns the irradiance of `count` rays (i, j, k, l) from i = `first` on.
   Eigen::ArrayXd Of(int first, int count, int j, int k, int l) const {
     const auto alpha = across_.alpha.col(k).segment(first, count) + (1 + down_.alpha(j, l));
     const auto beta = across_.beta.col(k).segment(first, count) + (1 + down_.beta(j, l));
@@ -95,7 +95,8 @@ class RowIrradiance {
   SquaredSlopes across_, down_;
 };
 
-// The mean over the rays of all views that land nearest to the pixel (x, y), samples or not.
+// Returns the mean over the rays of all views that land nearest to the pixel (x, y), whether they
+// are samples of the grid or not.
 double MeanIrradianceAt(const model::LightFieldGrid& grid, const model::Camera& camera,
                         const Eigen::ArrayXXd& weights, const Eigen::ArrayXXd& exposures,
                         const Eigen::Vector2d& landing_step_px, int x, int y) {
@@ -150,7 +151,7 @@ std::vector<float> FalloffOfPicture(const model::LightFieldGrid& grid, const mod
   const auto width = static_cast<std::size_t>(width_px);
   std::vector<float> falloff(width * static_cast<std::size_t>(height_px));
   ParallelFor(height_px, threads, [&](int y) {
-    // Over the rays that are samples of the grid, of each pixel.
+    // Sums for each pixel over the rays that are samples of the grid.
     Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(width_px), weight = sum;
     for (int l = 0; l < grid.v_count; ++l) {
       const int j = y + NearestRayShift(landing_step_px.y(), l, grid.v_count);

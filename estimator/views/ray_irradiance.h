@@ -9,22 +9,22 @@
 
 namespace thicklens::estimator {
 
-// Throws Error for weights of another size than the grid's views (V x U), below 0 or without a
-// positive sum.
+// Throws Error if the weights differ in size from the grid's views (V x U), if one is below 0, or
+// if their sum is not positive.
 void CheckViewWeights(const model::LightFieldGrid& grid, const Eigen::ArrayXXd& weights);
 
-// Relative irradiance [D29], dimensionless, of every ray of the view (k, l), T x S row by row:
-// cos(alpha) cos^3(beta) of [S12] over the same of the view's ray that lands at the principal
-// point. The calibrated blur is that of a point on the axis with its fall-off, and the weights of
-// the views carry it; so [S12] adds only what changes from there. A uniform radiance 1 gives 1 at
-// the principal point. Throws Error for weights of another size than the grid's views (V x U), or
-// without a positive sum.
+// Returns the relative irradiance [D29], dimensionless, of every ray of the view (k, l), T x S row
+// by row: cos(alpha) cos^3(beta) of [S12], divided by its value for the view's ray that lands at
+// the principal point. The calibrated blur is that of a point on the axis with its fall-off, and
+// the weights of the views contain it; so [S12] adds only the change from there. A uniform radiance
+// 1 gives 1 at the principal point. Throws Error if the weights differ in size from the grid's
+// views (V x U), if one is below 0, or if their sum is not positive.
 std::vector<float> RelativeFalloff(const model::LightFieldGrid& grid, const model::Camera& camera,
                                    const Eigen::ArrayXXd& weights, int k, int l);
 
-// What a uniform radiance 1 gives at each pixel of the picture: the mean of the above, by
-// `weights`, over the rays that land nearest to the pixel, one a view. Where a ray is no sample of
-// the grid, the others; where none is, all of them, as if they were.
+// Returns the image of a uniform radiance 1: for each pixel the mean of RelativeFalloff, by
+// `weights`, over the rays that land nearest to the pixel, one per view. A ray that is not a sample
+// of the grid is left out; where none is a sample, all rays are used as if they were samples.
 std::vector<float> FalloffOfPicture(const model::LightFieldGrid& grid, const model::Camera& camera,
                                     const Eigen::ArrayXXd& weights, int width_px, int height_px,
                                     int threads = 1);

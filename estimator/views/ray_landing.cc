@@ -6,10 +6,10 @@
 namespace thicklens::estimator {
 namespace {
 
-// Less than this beside its sample, over all views, a ray lands on it.
+// A ray lands on its sample if its distance to it, over all views, is less than this.
 constexpr double kRoundingPx = 1e-9;
 
-// floor(. + 1/2): the pixel that g takes for the nearest.
+// The nearest pixel is floor(. + 1/2), as in g.
 void SetLanding(double step_px, int count, std::vector<int>* shift, std::vector<double>* fraction) {
   for (int k = 0; k < count; ++k) {
     const double landing_px = step_px * (k - (count - 1) / 2.0);

@@ -8,12 +8,13 @@
 
 namespace thicklens::estimator {
 
-// [D19] q = Q du/p per axis: px that a ray lands beside its sample, per view step. 0 where ST lies
-// in the plane of focus, also where rounding has left a trace of Q.
+// [D19] Returns q = Q du/p per axis: the distance in px, per view step, between a ray's landing
+// point and its sample. It is 0 where ST is in the plane of focus, also where rounding has left a
+// trace of Q.
 Eigen::Vector2d LandingStepPx(const model::Camera& camera, const model::LightFieldGrid& grid);
 
-// The rays of a rectangle of pixels in plain numbers; `weights` (V x U) may be others than the
-// light field's own. Values are not looked at.
+// Returns the rays of a rectangle of pixels in plain numbers. `weights` (V x U) may differ from the
+// light field's own. The values of the light field are not read.
 kernels::BlockGeometry BlockOf(const model::LightField& light_field, const model::PixelRect& rect,
                                const Eigen::ArrayXXd& weights);
 

@@ -7,7 +7,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// A point whose disparity differs by more than this from a sample's is not what the sample shows.
+// A sample does not show a point whose disparity differs from the sample's by more than this.
 constexpr double kSamePointPx = 0.3;
 
 }  // namespace
@@ -15,7 +15,7 @@ constexpr double kSamePointPx = 0.3;
 bool ShowsSamePoint(const DisparityMap& map, const std::vector<float>& of_view, double s, double t,
                     double disparity) {
   const double px_per_unit = std::max(std::abs(map.step.x()), std::abs(map.step.y()));
-  // Before they become integers; NaN is outside, too.
+  // The range is checked before the conversion to integers; NaN is outside as well.
   if (!(s >= 0 && s <= map.width_px - 1 && t >= 0 && t <= map.height_px - 1)) return false;
   const auto s0 = static_cast<std::size_t>(std::floor(s));
   const auto t0 = static_cast<std::size_t>(std::floor(t));

@@ -7,9 +7,10 @@
 
 namespace thicklens::estimator {
 
-// Whether a view shows at (s, t), between its samples, a point of that disparity: every tap of the
-// bilinear neighbourhood that has weight does, to .3 px per view step. `of_view`: the disparity
-// rendered into the view, of the size and in the unit of `map`. False outside of the view.
+// Returns whether a view shows, at (s, t) between its samples, a point of that disparity: every tap
+// of the bilinear neighbourhood that has weight agrees to 0.3 px per view step. `of_view` is the
+// disparity rendered into the view, with the size and unit of `map`. Returns false outside of the
+// view.
 bool ShowsSamePoint(const DisparityMap& map, const std::vector<float>& of_view, double s, double t,
                     double disparity);
 

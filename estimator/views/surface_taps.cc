@@ -22,7 +22,7 @@ SurfaceTaps TapsAt(const DisparityMap& map, double tolerance, double x, double y
   for (int corner = 0; corner < 4; ++corner) {
     const int i = corner % 2, j = corner / 2;
     const double weight = (i == 0 ? 1 - fx : fx) * (j == 0 ? 1 - fy : fy);
-    if (weight == 0) continue;  // perhaps outside of the picture
+    if (weight == 0) continue;  // the tap may be outside of the image
     const std::size_t pixel =
         static_cast<std::size_t>(y0 + j) * static_cast<std::size_t>(map.width_px) +
         static_cast<std::size_t>(x0 + i);

@@ -8,18 +8,18 @@
 
 namespace thicklens::estimator {
 
-// Pixels whose disparities differ by more are not of one surface, in the unit of the map (.3 px per
-// view step); infinite where the steps are 0.
+// Returns the largest difference of the disparities of one surface, in the unit of the map (0.3 px
+// per view step); infinite where the steps are 0.
 double SurfaceTolerance(const DisparityMap& map);
 
-// The picture between its pixels on one surface: up to four pixels and their weights, sum 1.
+// Interpolation of the image on one surface: up to four pixels and their weights, sum 1.
 struct SurfaceTaps {
   int count = 0;
   std::array<std::size_t, 4> pixel{};
   std::array<double, 4> weight{};
 };
-// Bilinear at (x, y), cut to the picture, of the pixels whose disparity agrees; where none does,
-// the one closest to it.
+// Returns the bilinear taps at (x, y), clamped to the image, whose disparity agrees to `tolerance`.
+// If none agrees, the tap is the pixel with the closest disparity.
 SurfaceTaps TapsAt(const DisparityMap& map, double tolerance, double x, double y, float disparity);
 
 }  // namespace thicklens::estimator

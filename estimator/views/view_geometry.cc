@@ -28,8 +28,8 @@ void CheckCount(const char* what, int width_px, int height_px, int channels, std
 }  // namespace
 
 // disparity * step = -m, m = (1 - d0/(z - zl)) du/ds of model::SlopeOnGrid, and the same in v. The
-// disparity is that of a step of 1 mm, in px per mm: (d0/(z - zl) - 1)/ds, both factors negated
-// where d0 < 0, so that nearer is always larger.
+// disparity is that of a step of 1 mm, in px per mm: (d0/(z - zl) - 1)/ds. Both factors are negated
+// where d0 < 0, so that nearer points always have the larger disparity.
 DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vector<float>& depth_mm,
                              int width_px, int height_px) {
   CheckCount("depth map", width_px, height_px, 1, depth_mm.size());

@@ -7,8 +7,8 @@
 
 namespace thicklens::estimator {
 
-// The picture warped to every view, with the disparity of each view's samples (l * U + k) that the
-// warp went by; `disparity` may be null.
+// Returns the image warped to every view. `disparity` receives the disparity of each view's samples
+// (view l * U + k) that the warp used; it may be null.
 model::LightField WarpToAllViews(const EstimateInput& input, bool falloff, int threads,
                                  std::vector<std::vector<float>>* disparity);
 

@@ -13,30 +13,32 @@
 
 namespace thicklens::estimator {
 
-// What the estimate starts from.
+// The data that an estimate starts from. Valid inputs satisfy CheckInput (input_checks.h).
 struct EstimateInput {
   model::LinearPicture picture;
-  DisparityMap disparity;   // without holes, of the picture's size
+  DisparityMap disparity;   // without holes, of the image's size
   Eigen::ArrayXXd weights;  // V x U, sum 1, >= 0
   model::TransferCurve transfer = model::TransferCurve::Srgb();
-  // Both or none. S x T of the grid is the size of the picture.
+  // Either both are set or neither is. The S x T samples of the grid are the size of the image.
   std::optional<model::LightFieldGrid> grid;
   std::optional<model::Camera> camera;
-  std::optional<model::Camera>
-      falloff_camera;  // of the fall-off, if it is another, for example thin
+  std::optional<model::Camera> falloff_camera;  // camera of the fall-off if it differs from
+                                                // `camera`, for example a thin lens
 
   const model::Camera& camera_of_falloff() const {
     return falloff_camera ? *falloff_camera : *camera;
   }
 };
 
-// A photograph as radiance: divided by what the irradiance fall-off of [S12] leaves of a uniform
-// radiance at each of its pixels.
+// Returns the radiance of a photograph: each pixel is divided by the value that the irradiance
+// fall-off of [S12] leaves of a uniform radiance 1 at that pixel (FalloffOfPicture). Throws Error
+// if the weights (V x U) do not fit the grid.
 model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
                                     const model::LightFieldGrid& grid, const model::Camera& camera,
                                     const Eigen::ArrayXXd& weights, int threads);
 
-// The picture warped to every view: the prior of the estimate, and the baseline DIBR.
+// Returns the image warped to every view: the prior of the estimate and the baseline DIBR.
+// `falloff`: the fall-off is divided out of the image first if the input has a camera.
 model::LightField WarpedLightField(const EstimateInput& input, bool falloff, int threads);
 
 }  // namespace thicklens::estimator

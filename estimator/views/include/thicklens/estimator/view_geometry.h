@@ -14,52 +14,58 @@
 
 namespace thicklens::estimator {
 
-// The depth of a picture in the only form that the rays of its light field need: the displacement
-// of each scene point between views.
+// The depth of an image in the only form that the rays of its light field need: the displacement of
+// each scene point between views.
 struct DisparityMap {
   int width_px = 0;
   int height_px = 0;
-  // One number a pixel, near positive: what stands at sample x of the centre view stands at
-  // x - disparity * (a step.x, b step.y) in the view (a, b). NaN marks a hole.
+  // One number per pixel, row by row; nearer points have larger values. The scene point at sample x
+  // of the centre view is at x - disparity * (a step.x, b step.y) in the view (a, b). NaN marks a
+  // hole.
   std::vector<float> disparity;
-  // Per view in u and v. (1, 1) where the disparity is in px per view step; steps of the grid in mm
-  // where it is in px per mm.
+  // Step per view in u and v. It is (1, 1) where the disparity is in px per view step, and the
+  // steps of the grid in mm where the disparity is in px per mm.
   Eigen::Vector2d step{1, 1};
 };
 
-// From depths to the samples of a grid [D16]: disparity * step = -m, m of model::SlopeOnGrid.
-// Throws Error unless every depth is beyond the UV plane (where nearer is larger).
+// Converts depths (mm) to the disparity of the samples of a grid [D16]: disparity * step = -m, with
+// m of model::SlopeOnGrid. A depth of NaN becomes a hole. Throws Error unless every other depth is
+// beyond the UV plane (where nearer points have a larger disparity).
 DisparityMap DisparityOnGrid(const model::LightFieldGrid& grid, const std::vector<float>& depth_mm,
                              int width_px, int height_px);
-// A map that says px per view step: scale * value + offset; NaN and infinities are holes, and so is
-// 0 in an integer map. Throws Error if all are holes.
+// Converts a map to px per view step: scale * value + offset. NaN and infinities are holes, and so
+// is 0 in an integer map. Throws Error if all values are holes, if the scale is 0, or if the scale
+// or the offset is not finite.
 DisparityMap DisparityFromMap(const model::RawDepthMap& map, double scale, double offset_px);
 
-// The disparity on that grid of what is infinitely far, in the unit of DisparityOnGrid.
+// Returns the disparity on that grid of an infinitely far point, in the unit of DisparityOnGrid.
 double DisparityAtInfinity(const model::LightFieldGrid& grid);
 
 enum class Seen : std::uint8_t {
-  kSeen,    // a point of the centre view
-  kHidden,  // not seen from the centre; disparity and source are those of the background beside it
+  kSeen,    // the sample shows a point of the centre view
+  kHidden,  // no point of the centre view is visible here; disparity and source are of the
+            // background beside it
 };
 
-// What a view sees: one disparity for each of its samples.
+// The content of a view: one disparity for each of its samples.
 struct ViewDisparity {
   int width_px = 0;
   int height_px = 0;
   std::vector<float> disparity;  // in the unit of the DisparityMap
   std::vector<Seen> seen;
-  // Where in the centre view the sample's source is, px: sample + (source_x, source_y). For kSeen
-  // the displacement is disparity * (a step.x, b step.y); for kHidden it leads to the background:
-  // the source of the sample that shows it, or a pixel of the centre view.
-  // May lead outside of the picture by rounding; readers cut it.
+  // Displacement from the sample to its source in the centre view, px: its source is at sample +
+  // (source_x, source_y). For kSeen the displacement is disparity * (a step.x, b step.y). For
+  // kHidden it leads to the background: either the source of the sample that shows the background,
+  // or a pixel of the centre view. Rounding may place this position outside of the image;
+  // readers clamp it.
   std::vector<float> source_x, source_y;
-  // Samples whose pixels two surfaces share, by index: above is what has the sample's middle.
+  // Samples whose pixels two surfaces share, by index. The members above describe the surface at
+  // the sample's middle.
   std::vector<kernels::MixedSample> mixed;
 };
 
-// ViewDisparity in less memory (a third, where few samples are hidden or mixed): the way to the
-// source of what is seen follows from its disparity.
+// A ViewDisparity in less memory (a third, where few samples are hidden or mixed). The displacement
+// to the source of a visible sample follows from its disparity.
 struct CompactView {
   using Hidden = kernels::HiddenSample;
   using Mixed = kernels::MixedSample;
@@ -67,53 +73,64 @@ struct CompactView {
   int height_px = 0;
   Eigen::Vector2d shift{0, 0};   // px per unit of disparity
   std::vector<float> disparity;  // NaN: hidden
-  std::vector<Hidden> hidden;    // by index
-  std::vector<Mixed> mixed;      // by index
+  std::vector<Hidden> hidden;    // sorted by index
+  std::vector<Mixed> mixed;      // sorted by index
 
-  // Of a sample that is hidden.
+  // Returns the entry of a sample that must be hidden.
   const Hidden& HiddenAt(std::size_t index) const;
 };
 
-// Sets `view`, in the memory that it has where that is enough.
+// Sets `view`; its memory is reused where it is large enough.
 void Expand(const CompactView& compact, ViewDisparity* view);
 
-// The disparity rendered into the view at (a, b) steps: every 2 x 2 cell of centre pixels whose
-// disparities differ by at most .2 px per view step is two triangles at (x - a d, y - b d), and
-// every pixel of the other cells a square of +-.5 px; the nearest wins. Px per view step are those
-// of the larger of the two steps. Samples that nothing covers are hidden, those beyond the border
-// of the centre picture as well. The ray of such a sample x goes over the centre view's pixel at
-// x + D (a step.x, b step.y) at the disparity D, from near to far, looked at in whole px of the
-// larger part: the last pixel before which it passes belongs to the edge behind which it is hidden
-// from the centre, and that pixel's surface (to .3 px per view step) stands behind. Pixels of whose
-// surface there are no two beside them do not count. The samples walk both ways along the
-// displacement to the first covered sample and take the closer one that shows this surface; where
-// neither does, the pixel itself. A ray that passes before none takes the farther of the two, or
-// the only one; where there is none, the closest in any direction; where nothing of the picture is
-// in the view, the centre view's own sample. (0, 0) gives the map itself. Throws Error if the map
-// has holes.
-// So far a sample shows what its middle does. At the edge of a surface its pixel shows two: with
-// (x, y) its source on a surface of disparity D, that one covers of it the share
-//   sum over the four pixels q around (x, y) that are of the surface (|D_q - D| <= .3 px per view
-//   step) of (1 - |x - q_x|) (1 - |y - q_y|),
-// the area on which squares of the size of a pixel overlap; the border of the map is repeated.
-// Where a pixel at a jump lands less than 1 px beside a sample both ways, the sample is `mixed`:
-// with that pixel's surface, by its share, if it is nearer than what the sample shows; with what is
-// behind, by what is left, if it is of the surface that the sample shows (to .3 px per view step).
-// Behind is what the first of the eight samples around (sides before corners) shows that is
-// farther: one that is seen and whose surface the centre view has here as well; else one that is
-// seen, at its own source; else one that is hidden, by its way to a source where that leads to its
-// surface from here as well, else at its own source. A hidden sample that nothing nearer shares has
-// the share of its own surface that is seen after all. Of several the largest share counts, of the
-// same the nearer; less than .01 does not. Derived here [D91].
+// Renders the disparity into the view at (a, b) steps. (0, 0) gives the map itself. Throws Error if
+// the map has holes or a wrong count of values, or if (a, b) is not finite.
+//
+// Surfaces. Every 2 x 2 cell of centre pixels whose disparities d differ by at most 0.2 px per view
+// step is drawn as two triangles with vertices at (x - a d, y - b d). Every pixel of the other
+// cells is drawn as a square of +-0.5 px. The nearest surface is kept. Px per view step refers to
+// the larger of the two steps.
+//
+// Hidden samples. Samples that nothing covers are hidden; this includes samples beyond the border
+// of the centre image. At the disparity D, the ray of such a sample x passes over the centre view's
+// pixel at x + D (a step.x, b step.y). The pixels are inspected in whole px of the larger
+// component. From near to far, the last pixel in front of which the ray passes belongs to the edge
+// behind which the ray is occluded from the centre. The background of the sample is that pixel's
+// surface (to 0.3 px per view step). Pixels without two neighbours of their own surface are
+// ignored. The samples in both directions along the displacement are searched for the first covered
+// one. The closer one that shows this surface becomes its source; if neither shows it, the pixel
+// itself does. If the ray passes in front of no pixel, the farther of the two samples (or the only
+// one) becomes its source; if there is none, the closest covered sample in any direction; if
+// nothing of the image is in the view, the centre view's own sample.
+//
+// Mixed samples. So far a sample shows the surface at its middle, but at the edge of a surface its
+// pixel shows two surfaces. With (x, y) the source of the sample on a surface of disparity D, that
+// surface covers this share of the pixel:
+//
+//   sum over the four pixels q around (x, y) that are of the surface (|D_q - D| <= 0.3 px per view
+//   step) of (1 - |x - q_x|) (1 - |y - q_y|).
+//
+// This is the overlap of two squares of the size of a pixel; the border of the map is repeated. A
+// sample is `mixed` where a pixel at a jump lands less than 1 px beside it on both axes. If that
+// pixel is nearer than the sample's surface, the sample is mixed with the pixel's surface, by that
+// surface's share. If that pixel is of the sample's surface (to 0.3 px per view step), the sample
+// is mixed with the background, by the remaining share. The background is what the first suitable
+// one of the eight samples around (sides before corners) shows that is farther. In this order: a
+// visible sample whose surface the centre view also has here; a visible sample, at its own source;
+// a hidden sample, by its displacement to a source if that also leads to its surface from here, and
+// at its own source if it does not. A hidden sample that shares its pixel with no nearer surface is
+// mixed with the visible share of its own surface. Of several shares the largest counts, and of
+// equal shares the nearer; shares less than 0.01 are ignored. Derived here [D91].
 ViewDisparity RenderDisparity(const DisparityMap& map, double a, double b);
 
-struct SupportedPixels;  // hole_filler.h
+struct SupportedPixels;  // defined in hole_filler.h
 
-// RenderDisparity for many views of one map: what all of them need is found once. Read by many
-// threads.
+// RenderDisparity for many views of one map: data that all views need is computed once. Several
+// threads may render at the same time.
 class DisparityRenderer {
  public:
-  // The map must outlive it. Throws Error if it has holes.
+  // Throws Error if the map has holes or a wrong count of values. The map is kept by reference and
+  // must outlive the renderer.
   explicit DisparityRenderer(const DisparityMap& map);
   explicit DisparityRenderer(const DisparityMap&& map) = delete;
 
@@ -122,28 +139,30 @@ class DisparityRenderer {
 
  private:
   const DisparityMap& map_;
-  std::vector<char> is_surface_;  // of the cell below and to the right of each pixel: no jump
-  std::vector<int> alone_;        // indices of the pixels at a jump, which are squares
+  std::vector<char> is_surface_;  // 1: the cell below and to the right of the pixel has no jump
+  std::vector<int> alone_;        // indices of the pixels at a jump, which are drawn as squares
   std::shared_ptr<const SupportedPixels> supported_;
 };
 
-// The picture warped to that view by its depth (with the blurred photograph: depth-image-based
-// rendering, DIBR). Bicubic (Catmull-Rom) where all 16 taps agree with the sample's disparity to
-// .3 px per view step, else bilinear from the taps that do, renormalised; hidden samples take their
-// background source's value; of mixed samples the share of the other surface is bilinear.
+// Returns the image warped to that view by its depth (with the blurred photograph:
+// depth-image-based rendering, DIBR). A sample is bicubic (Catmull-Rom) where all 16 taps agree
+// with its disparity to 0.3 px per view step. Otherwise it is bilinear from the taps that agree,
+// renormalised. Hidden samples take the value of their background source. The share of the other
+// surface in mixed samples is bilinear. Throws Error if the sizes of image, map and view differ.
 model::LinearPicture WarpPicture(const model::LinearPicture& picture, const DisparityMap& map,
                                  const ViewDisparity& view);
 
-// WarpPicture for many views of one picture: what all of them need is found once. Read by many
-// threads.
+// WarpPicture for many views of one image: data that all views need is computed once. Several
+// threads may warp at the same time.
 class PictureWarper {
  public:
-  // The map must outlive it.
+  // The map is kept by reference and must outlive the warper; the image is copied. Throws Error if
+  // the sizes of image and map differ.
   PictureWarper(const model::LinearPicture& picture, const DisparityMap& map);
   PictureWarper(const model::LinearPicture& picture, const DisparityMap&& map) = delete;
 
   model::LinearPicture Warp(const ViewDisparity& view) const;
-  // To a picture whose memory is taken again where it has enough.
+  // Warps into `warped`, whose memory is reused where it is large enough.
   void Warp(const CompactView& view, model::LinearPicture* warped) const;
 
  private:
@@ -172,8 +191,9 @@ class PictureWarper {
   const DisparityMap& map_;
   const int channels_;
   const float tolerance_;      // in the unit of the map; infinite where the steps are 0
-  std::vector<float> pixels_;  // fours of channels, a plane each, with their borders repeated
-  std::vector<Range> ranges_;  // of the disparities of the 16 taps of each pixel
+  std::vector<float> pixels_;  // planes of four channels each (a single channel is stored alone),
+                               // with repeated borders
+  std::vector<Range> ranges_;  // minimum and maximum disparity of the 16 taps of each pixel
 };
 
 }  // namespace thicklens::estimator
