@@ -18,8 +18,8 @@ namespace {
 
 constexpr int kReachPx = 3;
 constexpr double kWindowSigmaPx = 2;
-// Of two pixels of one surface the difference has 1.4 times the noise: of those 1 in 2500 is left
-// out.
+// The difference of two pixels of one surface has 1.4 times the noise; 1 in 2500 such differences
+// exceeds this limit.
 constexpr double kSameSurface = 5;
 constexpr int kLeastNeighbours = 6;
 
@@ -34,8 +34,8 @@ std::array<double, 2 * kReachPx + 1> WindowWeights() {
   return weights;
 }
 
-// Normal equations of the plane d + gx x + gy y around a pixel, and those with squared weights, for
-// the variance of its middle.
+// Normal equations of the plane d + gx x + gy y around a pixel, and their form with squared
+// weights, from which the variance of the central value follows.
 struct PlaneSums {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero(), squared = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -51,15 +51,15 @@ struct PlaneSums {
 };
 
 struct Middle {
-  double value = 0;     // from the pixel's own
-  double variance = 1;  // of that of the noise
+  double value = 0;     // relative to the pixel's own value
+  double variance = 1;  // in units of the variance of the noise
 };
 Middle MiddleOf(const PlaneSums& sums) {
   if (sums.count <= kLeastNeighbours) return {};
   const Eigen::LDLT<Eigen::Matrix3d> factor(sums.normal);
   const Eigen::Vector3d pivots = factor.vectorD();
   if (!(pivots.minCoeff() > 1e-6 * pivots.maxCoeff())) return {};
-  // The middle is e^T N^-1 b with e = (1, 0, 0): its variance is e^T N^-1 Q N^-1 e.
+  // The central value is e^T N^-1 b with e = (1, 0, 0): its variance is e^T N^-1 Q N^-1 e.
   const Eigen::Vector3d share = factor.solve(Eigen::Vector3d::UnitX());
   return {share.dot(sums.right), share.dot(sums.squared * share)};
 }
@@ -77,7 +77,7 @@ SmoothedDepth SmoothDepth(const DisparityMap& map, double noise_px, int threads)
   const auto tolerance = static_cast<float>(kSameSurface * noise_px / step);
   const auto window = WindowWeights();
   SmoothedDepth smoothed{map, 0};
-  std::vector<double> variance(Index(map.height_px), 0.0);  // sums of rows
+  std::vector<double> variance(Index(map.height_px), 0.0);  // sum over each row
   ParallelFor(map.height_px, ResolveThreads(threads), [&](int y) {
     for (int x = 0; x < map.width_px; ++x) {
       const std::size_t i = Index(y) * Index(map.width_px) + Index(x);

@@ -15,7 +15,7 @@ namespace {
 constexpr int kPatchPx = 32;
 constexpr double kFarAbove = 4;
 constexpr double kAbove = 1.5;
-constexpr double kLeastCounted = 0.1;  // of all blocks
+constexpr double kLeastCounted = 0.1;  // share of all blocks
 constexpr float kMostHidden = 0.01F;
 
 std::size_t Index(int width_px, int x, int y) {
@@ -23,7 +23,7 @@ std::size_t Index(int width_px, int x, int y) {
          static_cast<std::size_t>(x);
 }
 
-// The upper one where there are two.
+// Returns the upper one if there are two medians.
 template <typename Number>
 Number Median(std::vector<Number>* values) {
   const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
@@ -31,7 +31,7 @@ Number Median(std::vector<Number>* values) {
   return *middle;
 }
 
-// Of a large map, every so many rows and columns tell enough.
+// A subset of the rows and columns of a large map is sufficient.
 int StrideFor(int width_px, int height_px) {
   constexpr double kEnough = 1 << 20;
   return std::max(1, static_cast<int>(std::sqrt(width_px * 1.0 * height_px / kEnough)));
@@ -62,7 +62,7 @@ std::size_t Blocks(int size_px) {
   return static_cast<std::size_t>((size_px + kPatchPx - 1) / kPatchPx);
 }
 
-// The blocks of which enough is seen by the whole aperture.
+// Returns the blocks of which the whole aperture sees enough.
 std::vector<ResidualPatch> MeasurePatches(const std::vector<float>& residual,
                                           const std::vector<float>& hidden_share, int width_px,
                                           int height_px) {
@@ -105,7 +105,8 @@ StepCheck CheckSteps(const DisparityMap& map, const Eigen::Vector2d& landing_ste
 }
 
 std::optional<double> DepthNoisePx(const DisparityMap& map) {
-  // Of normal noise: standard deviation of a second difference, and of that the median |.|.
+  // Normal noise of unit variance: the standard deviation of its second difference, times the
+  // median absolute value of a unit normal variable.
   const double kMedianOfUnitNoise = 0.6745 * std::sqrt(6.0);
   const int stride = StrideFor(map.width_px, map.height_px);
   std::vector<float> second;

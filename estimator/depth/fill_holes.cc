@@ -17,34 +17,36 @@
 namespace thicklens::estimator {
 namespace {
 
-// Neighbours whose disparities differ by more belong to two surfaces: so many times the noise of
-// the map, within these, px per view step.
+// Neighbours whose disparities differ by more than this belong to two surfaces: a multiple of the
+// noise of the map, limited to a minimum and a maximum in px per view step.
 constexpr double kJumpOfNoise = 6;
 constexpr double kLeastJumpPx = 0.2;
 constexpr double kMostJumpPx = 1;
-// Sweeps of successive over-relaxation that a hole needs, for each px of distance to what is known;
-// and what all holes of a map together may have: what is larger is bent near its rims alone.
+// Sweeps of successive over-relaxation that a hole needs for each px of distance to a known pixel,
+// and the number available to all holes of a map together. Holes that are too large for this are
+// bent only near their rims.
 constexpr double kSweepsPerPx = 6;
 constexpr double kSweepsOfAll = 16;
-constexpr double kMostUpdates = 1e6;  // besides
+constexpr double kMostUpdates = 1e6;  // in addition
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Within one hole: each pixel's disparity u is the mean over its neighbours of u + (p - q) slope,
-// the slope being the mean of their planes'; there is no neighbour where the surfaces differ. An
-// exact plane solves this, whatever its borders are, and what the planes do not explain is spread
-// between the rims as a membrane.
+// Solves for one hole: each pixel's disparity u is the mean over its neighbours of u + (p - q)
+// slope, where the slope is the mean of their planes' slopes. Pixels of different surfaces are not
+// neighbours. An exact plane solves this, whatever its borders are, and the residual of the planes
+// is spread between the rims as a membrane.
 class SurfaceRelaxation {
  public:
   SurfaceRelaxation(const HoleFinder& finder, const HoleRegion& region, double jump,
                     double most_sweeps)
       : finder_(finder), region_(region), jump_(jump), most_sweeps_(most_sweeps) {}
 
-  // `rim_of` and `disparity`: of the region's pixels; the latter is where to start.
+  // `rim_of` and `disparity` belong to the region's pixels; `disparity` holds the start and
+  // receives the solution.
   void Solve(const std::vector<int>& rim_of, std::vector<double>* disparity) {
     Link(rim_of, *disparity);
     const double sweeps = std::min(kSweepsPerPx * region_.widest_px, most_sweeps_);
-    // The best for a strip as wide as what so many sweeps can reach.
+    // This is the optimum for a strip as wide as so many sweeps can reach.
     const double reach_px = sweeps / kSweepsPerPx;
     const double omega = 2 / (1 + std::sin(3.14159265358979 / (2 * reach_px + 1)));
     for (int sweep = 0; sweep < static_cast<int>(sweeps); ++sweep) {
@@ -55,8 +57,8 @@ class SurfaceRelaxation {
  private:
   struct Links {
     std::array<int, 4> others{-1, -1, -1, -1};  // places of pixels without a depth
-    double known = 0;                           // of the rim, and all (p - q) slope
-    double share = 0;                           // one over their number
+    double known = 0;                           // sum over the rim's values and all (p - q) slope
+    double share = 0;                           // one over the number of neighbours
   };
 
   static void Relax(const Links& links, double omega, std::size_t i, std::vector<double>* values) {
@@ -112,7 +114,8 @@ model::LinearPicture RootsOf(const model::LinearPicture& picture) {
   return roots;
 }
 
-// Planes that lead far beyond all that is known are not believed, and none leads beyond infinity.
+// Range of credible disparities. Planes that lead far beyond all known values are rejected, and no
+// plane leads beyond infinity.
 struct Range {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();

@@ -8,10 +8,10 @@ namespace thicklens::estimator {
 namespace {
 
 constexpr std::int32_t kNoPlace = -1;
-// How far behind the rim a surface is looked at: as far as the hole is wide, within these.
+// A surface is examined as far behind the rim as the hole is wide, within these limits.
 constexpr int kLeastDepthPx = 3;
 constexpr int kMostDepthPx = 48;
-// A rim with so many pixels in some group does not need its lone ones.
+// If some group has so many rim pixels, isolated rim pixels are ignored.
 constexpr int kManyRimPixels = 3;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
@@ -74,7 +74,7 @@ void HoleFinder::Spread(int first, HoleRegion* region) {
   }
 }
 
-// Places of known pixels may still be those on the rim of another region.
+// The place of a known pixel may still be that on the rim of another region.
 bool HoleFinder::IsOnRim(const HoleRegion& region, int index) const {
   const std::int32_t place = place_[Index(index)];
   return place >= 0 && Index(place) < region.rim.size() && region.rim[Index(place)].index == index;
@@ -124,14 +124,14 @@ void HoleFinder::GroupRim(HoleRegion* region) {
   for (const std::size_t i : lone) rim[i].group = -1;
 }
 
-// -1 outside of the picture.
+// Returns -1 outside of the image.
 int HoleFinder::Beyond(int index, int dx, int dy) const {
   const int x = X(index) + dx;
   const int y = Y(index) + dy;
   return x >= 0 && x < width_ && y >= 0 && y < height_ ? y * width_ + x : -1;
 }
 
-// Across holes of one pixel, too: speckle cuts no surface.
+// Collects a surface across holes of one pixel as well, because speckle does not separate surfaces.
 void HoleFinder::CollectSurface(std::size_t group, int depth_px) {
   ++surface_;
   samples_.clear();

@@ -16,38 +16,39 @@ namespace thicklens::estimator {
 // A known pixel beside a hole.
 struct RimPixel {
   int index = 0;
-  int group = -1;  // -1: a lone value, which is not believed
+  int group = -1;  // -1: an isolated value, which is ignored
 };
 
-// Missing pixels that hang together by sides or corners, and what is known around them.
+// Missing pixels connected by sides or corners, and the known values around them.
 struct HoleRegion {
   std::vector<int> pixels;  // ascending
   std::vector<RimPixel> rim;
-  // Rim pixels of one group lie beside each other without a jump: one surface, as far as the rim
-  // tells. Known pixels behind the rim are looked at where the hole is open to one side.
-  std::vector<SurfacePlane> planes;  // one a group
-  int widest_px = 0;                 // the largest distance to a known pixel
+  // Rim pixels of one group are adjacent without a jump: one surface, as far as the rim shows.
+  // Known pixels behind the rim are included unless the region is closed and has only one group.
+  std::vector<SurfacePlane> planes;  // one per group
+  int widest_px = 0;                 // maximum distance to a known pixel
 };
 
-// The holes of a map, one after the other.
+// Finds the holes of a map, one after the other.
 class HoleFinder {
  public:
   // Neighbours whose disparities differ by more than `jump` are of two surfaces. The map must
-  // outlive it.
+  // outlive the finder.
   HoleFinder(const DisparityMap& map, double jump);
 
-  // False where there is no other.
+  // Returns false if there is no further hole.
   bool Next(HoleRegion* region);
 
   bool IsHole(int index) const {
     return std::isnan(map_.disparity[static_cast<std::size_t>(index)]);
   }
-  // Whether it is one of the pixels of that region, which must be the last.
+  // Returns whether the pixel belongs to that region, which must be the last one found.
   bool IsIn(const HoleRegion& region, int index) const {
-    const auto place = static_cast<std::size_t>(PlaceOf(index));  // of another region, if of any
+    const auto place =
+        static_cast<std::size_t>(PlaceOf(index));  // the place may be of another region
     return IsHole(index) && place < region.pixels.size() && region.pixels[place] == index;
   }
-  // Calls visit(neighbour, dx, dy) for the 4, or all 8, neighbours inside the picture.
+  // Calls visit(neighbour, dx, dy) for the 4 or all 8 neighbours inside the image.
   template <int kCount, typename Visit>
   void ForNeighbours(int index, const Visit& visit) const {
     const int x = index % width_;
@@ -59,9 +60,10 @@ class HoleFinder {
       visit(index + dy * width_ + dx, dx, dy);
     }
   }
-  // Of the last region: index of a hole among its pixels, of a known pixel on its rim.
+  // Returns an index into the last region: into its pixels for a hole, into its rim for a known
+  // pixel.
   int PlaceOf(int index) const { return place_[static_cast<std::size_t>(index)]; }
-  // Chessboard distance of a hole to the next known pixel.
+  // Chessboard distance of a hole to the nearest known pixel.
   int DistancePx(int index) const;
   int X(int index) const { return index % width_; }
   int Y(int index) const { return index / width_; }
@@ -83,10 +85,10 @@ class HoleFinder {
   const DisparityMap& map_;
   const double jump_;
   const int width_, height_;
-  cv::Mat distance_px_;  // float
+  cv::Mat distance_px_;  // type float
   int next_ = 0;
   std::vector<std::int32_t> place_;
-  std::vector<std::int32_t> seen_;  // the last surface that looked at it
+  std::vector<std::int32_t> seen_;  // number of the last surface that visited the pixel
   std::int32_t surface_ = 0;
   std::vector<int> members_;  // pixels of the rim, group after group
   std::vector<std::size_t> first_member_;

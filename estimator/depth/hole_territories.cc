@@ -8,9 +8,10 @@
 namespace thicklens::estimator {
 namespace {
 
-// Steps of a picture's values that count as much as one px of way in a narrow hole.
+// Step of the roots that costs as much as one px of path in a narrow hole.
 constexpr double kUsualStep = 0.02;
-// So much a hole's width in px makes edges dearer: those of .1 must outweigh the start behind.
+// Increase of the cost of edges per px of a hole's width: edges of 0.1 must outweigh the head start
+// of the surface behind.
 constexpr double kEdgePerWidth = 0.1;
 constexpr int kMostLevels = 4;
 constexpr int kMostRounds = 3;
@@ -44,7 +45,7 @@ void HoleTerritories::Find(const HoleRegion& region, std::vector<int>* rim_of,
   width_px_.clear();
   near_and_far_.clear();
   std::vector<int> levels(region.planes.size(), 0);
-  // Behind a near surface others may meet.
+  // Behind a near surface other surfaces may meet.
   for (int round = 0; round < kMostRounds; ++round) {
     Spread(region, levels, rim_of);
     Start(region, *rim_of, start);
@@ -56,8 +57,8 @@ void HoleTerritories::Find(const HoleRegion& region, std::vector<int>* rim_of,
   }
 }
 
-// Dijkstra's shortest ways from all of the rim at once; pixels wait in buckets of nearly equal
-// cost, and again where a shorter way is found.
+// Dijkstra's shortest paths from the whole rim at once. Pixels wait in buckets of nearly equal
+// cost, and again where a shorter path is found.
 void HoleTerritories::Spread(const HoleRegion& region, const std::vector<int>& levels,
                              std::vector<int>* rim_of) {
   cost_.assign(region.pixels.size(), std::numeric_limits<float>::infinity());
@@ -81,7 +82,7 @@ void HoleTerritories::Spread(const HoleRegion& region, const std::vector<int>& l
     if (region.rim[i].group < 0) continue;
     const int from = region.rim[i].index;
     finder_.ForNeighbours<8>(from, [&](int beside, int dx, int dy) {
-      // On its other side there may be another hole.
+      // The rim pixel may also border another hole.
       if (finder_.IsIn(region, beside)) reach(from, 0, 0, static_cast<int>(i), beside, dx, dy);
     });
   }
@@ -109,8 +110,8 @@ void HoleTerritories::Start(const HoleRegion& region, const std::vector<int>& ri
   }
 }
 
-// 1 for a group that meets a farther one, now or before, and one more than the groups that it meets
-// behind it.
+// The level is 1 for a group that meets a farther one, now or in an earlier round, and one more
+// than the levels of the groups behind it that it meets.
 std::vector<int> HoleTerritories::LevelsOf(const HoleRegion& region, const std::vector<int>& rim_of,
                                            const std::vector<double>& start) {
   const auto meet = [&](int group, double disparity, int other, double other_disparity) {
@@ -152,8 +153,8 @@ float HoleTerritories::StepCost(int from, int to, bool diagonal) const {
   return (diagonal ? 1.41421356F : 1.0F) + static_cast<float>(edge_cost_) * squared;
 }
 
-// Of the hole around each pixel: the way up to the greatest distance from its rim. Pixels that are
-// farther from it come first.
+// Sets the width of the hole around each pixel, along the ascent to the greatest distance from the
+// rim. Pixels that are farther from the rim are processed first.
 void HoleTerritories::FindWidths(const HoleRegion& region) {
   std::vector<std::vector<int>> at_distance(Index(region.widest_px) + 1);
   for (const int pixel : region.pixels) {

@@ -9,18 +9,18 @@
 
 namespace thicklens::estimator {
 
-// Which known pixel each pixel of a hole goes with: that to which the shortest way leads. A step
-// costs its length, and more where it crosses an edge of the picture. Surfaces that meet a farther
-// one pay for the width of the hole that they enter, so that the farther one takes what the picture
-// leaves open: a depth sensor is blind beside near things, not on them.
+// Assigns each pixel of a hole to a known pixel: the one with the shortest path. The cost of a step
+// is its length, and more where it crosses an edge of the image. A surface that meets a farther one
+// also pays for the width of the hole that it enters, so that the farther surface takes the pixels
+// that the image leaves undecided: a depth sensor loses values beside near objects, not on them.
 class HoleTerritories {
  public:
-  // `roots`: square roots of the picture's linear light, nearly as it is stored. `jump`: as in
-  // HoleFinder. Both, and the finder, must outlive it.
+  // `roots`: square roots of the image's linear light, nearly equal to its stored values. `jump`:
+  // as in HoleFinder. `finder` and `roots` must outlive the object.
   HoleTerritories(const HoleFinder& finder, const model::LinearPicture& roots, double jump);
 
-  // For each pixel of the finder's last region the index of its rim pixel, and in `start` what the
-  // surface of that says there.
+  // Sets, for each pixel of the finder's last region, the index of its rim pixel and in `start` the
+  // disparity of that rim pixel's surface there.
   void Find(const HoleRegion& region, std::vector<int>* rim_of, std::vector<double>* start);
 
  private:
@@ -35,19 +35,19 @@ class HoleTerritories {
   const HoleFinder& finder_;
   const model::LinearPicture& roots_;
   const double jump_;
-  double edge_cost_ = 0;  // of a squared step of the roots
+  double edge_cost_ = 0;  // cost of a squared step of the roots
   struct Waiting {
     float cost;
     int place;
   };
-  std::vector<std::vector<Waiting>> waiting_;  // by their cost
+  std::vector<std::vector<Waiting>> waiting_;  // ordered by cost
   std::vector<float> cost_;
   std::vector<std::pair<int, int>> near_and_far_;  // groups that meet
-  std::vector<int> width_px_;                      // of the hole around each pixel
+  std::vector<int> width_px_;                      // width of the hole around each pixel
 };
 
-// What the surface of a rim pixel says at another pixel: its plane, if that explains its rim to
-// within a jump, else its own disparity.
+// Returns the disparity of a rim pixel's surface at another pixel: that of its plane if the plane
+// explains its rim to within a jump, otherwise the rim pixel's own disparity.
 double SurfaceAt(const HoleFinder& finder, const HoleRegion& region, const RimPixel& rim, int pixel,
                  double jump);
 bool HasPlane(const HoleRegion& region, const RimPixel& rim, double jump);

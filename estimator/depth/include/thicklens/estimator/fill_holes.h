@@ -9,16 +9,21 @@
 
 namespace thicklens::estimator {
 
-// Holes (NaN) filled along the surfaces around them, never between two. Each pixel goes with one of
-// the known pixels around the hole, that to which the shortest way leads without crossing edges of
-// the picture; where the picture does not tell, with the farther surface, since depth sensors are
-// blind beside near things. Inside of one surface the plane through it, fitted with its noise in
-// mind, is bent to meet its rims (the more and the larger the holes are, the nearer to the rims
-// alone); neighbours belong to two surfaces where their disparities differ by more than six times
-// the map's noise, at least .2, at most 1 px per view step. `picture` shows what the map is the
-// depth of. `filled` (may be null) is told how many. No hole is filled with less than
-// `at_infinity`, the disparity of what is infinitely far, where that is known. Throws Error if all
-// are holes or the sizes differ.
+// Fills the holes (NaN) of a map along the surfaces around them, never between two surfaces.
+//
+// Each pixel is assigned to one of the known pixels around the hole: the one with the shortest path
+// that crosses no edges of the image. Where the image does not decide, the pixel is assigned to the
+// farther surface, because depth sensors lose values beside near objects.
+//
+// Inside one surface, the plane through it, fitted with allowance for its noise, is bent to meet
+// the rims. The more and the larger the holes are, the closer to the rims the bending ends.
+// Neighbours belong to two surfaces where their disparities differ by more than six times the map's
+// noise, but at least 0.2 and at most 1 px per view step.
+//
+// `picture` shows the scene of the map and has its size. `filled` (may be null) receives the number
+// of filled pixels. No filled value is below `at_infinity`, the disparity of an infinitely far
+// point, where that is known. Throws Error if all values are holes, the sizes differ, or a value of
+// the image is not finite.
 DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
                        std::size_t* filled,
                        double at_infinity = -std::numeric_limits<double>::infinity());
