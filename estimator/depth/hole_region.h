@@ -24,7 +24,8 @@ struct HoleRegion {
   std::vector<int> pixels;  // ascending
   std::vector<RimPixel> rim;
   // Rim pixels of one group are adjacent without a jump: one surface, as far as the rim shows.
-  // Known pixels behind the rim are included unless the region is closed and has only one group.
+  // Known pixels behind the rim are included as well if the region touches the border of the image
+  // or its rim has several groups.
   std::vector<SurfacePlane> planes;  // one per group
   int widest_px = 0;                 // maximum distance to a known pixel
 };

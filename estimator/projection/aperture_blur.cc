@@ -7,8 +7,8 @@
 namespace thicklens::estimator {
 namespace {
 
-// The ray of view (k, l) of the point in focus that lands at a position of the image, px from the
-// principal point: landing = P s - Q u by [S16], -p x upright.
+// Returns the ray of view (k, l) of the point in focus that lands at a position of the image, px
+// from the principal point: landing = P s - Q u by [S16], -p x upright.
 model::Ray RayLandingAt(const model::LightFieldGrid& grid, const model::Camera& camera,
                         const Eigen::Vector2d& from_axis_px, int k, int l) {
   const model::ProjectionCoefficients projection =

@@ -1,4 +1,4 @@
-// Where a fan of rays is the product of two axes, and the filters of these.
+// Finds where a fan of rays is the product of two axes, and makes the filters of these.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,7 +17,7 @@ namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// The lowest and highest disparity of the 2 x 2 pixels from each pixel to the right and down.
+// Minimum and maximum disparity of the 2 x 2 pixels from each pixel to the right and down.
 struct CellRange {
   std::vector<float> low, high;
   explicit CellRange(const DisparityMap& map) : low(map.disparity), high(map.disparity) {
@@ -34,7 +34,7 @@ struct CellRange {
   }
 };
 
-// From `first` to before `last`.
+// The range from `first` to before `last`.
 struct Stretch {
   int first, last;
 };
@@ -89,9 +89,9 @@ std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
 
 namespace {
 
-// What one ray of a pixel reads along an axis.
+// The pixels that one ray of a pixel reads along an axis.
 struct Taps {
-  int offset = 0;  // of the first, from the pixel
+  int offset = 0;  // offset of the first tap from the pixel
   int count = 1;
   std::array<double, 4> weight{1, 0, 0, 0};
 };
@@ -109,14 +109,14 @@ Taps TapsOnLine(int pixel, float source_px, int count, Between between, const Is
   return {below - pixel, 2, {1 - fraction, fraction, 0, 0}};
 }
 
-// The filter of an axis in one row of the picture.
+// The filter of an axis in one row of the image.
 template <typename Real>
 struct FilterRow {
-  std::vector<std::int32_t> radius_px;  // of each block
-  std::vector<Real> coefficients;       // as those of a PixelFilter
+  std::vector<std::int32_t> radius_px;  // radius of each block
+  std::vector<Real> coefficients;       // in the order of a PixelFilter
 };
 
-// What rows of a filter are made from, and room for it.
+// Makes rows of a filter from its inputs, with reusable memory.
 class FilterMaker {
  public:
   FilterMaker(const FanAxis& axis, kernels::Axis direction, const DisparityMap& disparity,
@@ -191,7 +191,7 @@ class FilterMaker {
   const Eigen::VectorXd& weights_;
   const Between between_;
   const float tolerance_;
-  std::vector<Taps> taps_;  // of a row: of each pixel, of each position
+  std::vector<Taps> taps_;  // taps of a row: of each pixel, of each position
 };
 
 }  // namespace
@@ -222,7 +222,7 @@ kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction
       filter.start.push_back(filter.start.back() + Index(2 * radius + 1) * kernels::kFilterBlockPx);
     }
   }
-  // Row by row, each freed at once: never held twice.
+  // The rows are appended one by one and freed at once, so that they are never held twice.
   filter.coefficients.reserve(filter.start.back());
   for (FilterRow<Real>& row : rows) {
     ThrowIfCancelled();

@@ -20,16 +20,16 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
 struct Band {
-  std::vector<std::int32_t> pixel, runs;  // of each row, and how many runs it has
-  std::vector<std::int32_t> index;        // of each run
+  std::vector<std::int32_t> pixel, runs;  // pixel of each row, and its number of runs
+  std::vector<std::int32_t> index;        // index of each run
   std::vector<Real> weight;
 };
 
-// Sums what falls on the same pixel.
+// Sums the weights that fall on the same pixel.
 template <typename Real>
 class Gatherer {
  public:
-  // Rows of the picture lie stride_px apart.
+  // Rows of the image are stride_px apart.
   Gatherer(int stride_px, int height_px)
       : sum_(Index(stride_px) * Index(height_px), Real{0}), stride_(Index(stride_px)) {}
 
@@ -38,7 +38,7 @@ class Gatherer {
     Reach(row, column, 1);
   }
 
-  // To the pixels (row, column), the one at its right, and the two below.
+  // Adds to the pixel (row, column), the one at its right, and the two below.
   void AddFour(int row, int column, Real upper, Real upper_right, Real lower, Real lower_right) {
     Real* const at = sum_.data() + PlaceOf(row, column);
     at[0] += upper;
@@ -48,7 +48,7 @@ class Gatherer {
     Reach(row, column, 2);
   }
 
-  // All sums to the end of a band, as the runs of one row.
+  // Moves all sums to the end of a band, as the runs of one row.
   void MoveTo(Band<Real>* band) {
     const std::size_t before = band->index.size();
     for (int row = reached_.first_row; row < reached_.end_row; ++row) MoveRuns(row, band);
@@ -57,7 +57,7 @@ class Gatherer {
   }
 
  private:
-  // Of the picture, where sums may be.
+  // The part of the image where sums may be.
   struct Part {
     int first_row = std::numeric_limits<int>::max(), end_row = 0;
     int first_column = std::numeric_limits<int>::max(), end_column = 0;
@@ -72,7 +72,7 @@ class Gatherer {
     reached_.end_column = std::max(reached_.end_column, column + count);
   }
 
-  // What is moved is 0 afterwards, so that runs need not end where the sums do.
+  // Moved sums become 0, so that runs may extend beyond the sums.
   void MoveRuns(int row, Band<Real>* band) {
     constexpr std::size_t kPixels = kernels::kPixelsOfRun;
     const std::size_t end = PlaceOf(row, reached_.end_column);
@@ -87,7 +87,7 @@ class Gatherer {
     }
   }
 
-  std::vector<Real> sum_;  // of each pixel of the picture
+  std::vector<Real> sum_;  // sum of each pixel of the image
   std::size_t stride_;
   Part reached_;
 };
@@ -97,7 +97,8 @@ int Floor(float x) {
   return toward_zero - (static_cast<float>(toward_zero) > x ? 1 : 0);
 }
 
-// Finds the samples of a list by their indices, asked for by growing ones from `first` on.
+// Finds the samples of a list by their indices, which must be requested in ascending order from
+// `first` on.
 template <typename Sample>
 class Cursor {
  public:
@@ -107,7 +108,7 @@ class Cursor {
             [](const Sample& sample, std::size_t at) { return Index(sample.index) < at; })),
         end_(samples.data() + samples.size()) {}
 
-  // Null: it is none.
+  // Returns null if there is none.
   const Sample* At(std::size_t i) {
     while (next_ != end_ && Index(next_->index) < i) ++next_;
     return next_ != end_ && Index(next_->index) == i ? next_ : nullptr;
@@ -124,7 +125,7 @@ struct FanRay {
   double weight = 0;
 };
 
-// Its taps, as TapsAt has them.
+// Adds the ray's taps, as TapsAt returns them.
 template <typename Real>
 void AddTaps(const DisparityMap& map, double tolerance, int x, int y, const FanRay& ray,
              Gatherer<Real>* gatherer) {
@@ -137,8 +138,8 @@ void AddTaps(const DisparityMap& map, double tolerance, int x, int y, const FanR
   }
 }
 
-// The same of most rays: they read four pixels of one surface. False for the others. `limit_px`:
-// more than the picture is wide and high.
+// Adds the taps of the most frequent rays, which read four pixels of one surface. Returns false for
+// the other rays. `limit_px` must exceed the width and the height of the image.
 template <typename Real>
 bool AddFourTaps(const DisparityMap& map, float tolerance, float limit_px, int x, int y,
                  const FanRay& ray, Gatherer<Real>* gatherer) {
@@ -161,8 +162,8 @@ bool AddFourTaps(const DisparityMap& map, float tolerance, float limit_px, int x
   return true;
 }
 
-// Room for as many runs in the rows to come as there were in those that are done. What is reserved
-// and never written takes no memory.
+// Reserves memory for as many runs in the remaining rows as in the finished ones. Memory that is
+// reserved and never written is not used.
 template <typename Real>
 void Reserve(int rows_done, int rows, Band<Real>* band) {
   if (rows_done == rows) return;
@@ -227,8 +228,8 @@ void FillBand(const ViewFan& fan, const DisparityMap& map,
   }
 }
 
-// The first rows of the parts, and the end: at most so many pixels with a row of their own each, or
-// one row of the picture, and no more rows than make work for all threads to the end.
+// Returns the first rows of the parts, and the end. A part has at most so many pixels with a row of
+// their own, or one row of the image, and so few rows that all threads have work to the end.
 std::vector<int> PartsOf(const ViewFan& fan, const std::vector<unsigned char>& is_product,
                          int threads) {
   constexpr int kMostRows = 32;
@@ -267,7 +268,7 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
   const std::vector<int> borders = PartsOf(fan, is_product, threads);
   const int count = static_cast<int>(borders.size()) - 1;
   std::vector<Band<Real>> parts(Index(count));
-  // A sum of a pixel has a place for each pixel of the picture: of these each thread has one set.
+  // A gatherer has a place for each pixel of the image; each thread therefore has only one.
   std::atomic<int> next{0};
   ParallelFor(std::min(threads, count), threads, [&](int) {
     Gatherer<Real> gatherer(runs.stride_px(), fan.height_px);
@@ -276,7 +277,7 @@ kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparit
                &parts[Index(n)]);
     }
   });
-  std::vector<std::size_t> first(1, 0);  // run of each part; and the end
+  std::vector<std::size_t> first(1, 0);  // first run of each part, and the end
   for (const Band<Real>& part : parts) {
     ThrowIfCancelled();
     first.push_back(first.back() + part.index.size());

@@ -13,13 +13,13 @@
 namespace thicklens::estimator {
 namespace {
 
-// Rows of the photograph that one thread sums together: of each view so many one after the other,
-// as memory is read fastest, while the photograph's stay in the processor's second cache.
+// Rows of the photograph that one thread sums together. Each view's rows are read in succession,
+// which is fastest for memory, while the photograph's rows stay in the processor's second cache.
 constexpr int kMostBandRows = 128, kFewestBandRows = 8;
 constexpr std::size_t kMostBandBytes = 320 * 1024;
 // Rows of rays that one thread adds to together.
 constexpr int kMostRayRows = 256;
-// To start a thread for less takes longer than it saves.
+// Starting a thread for less takes longer than it saves.
 constexpr std::size_t kLeastBytesOfThread = 3 * 1024 * 1024;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
@@ -31,11 +31,11 @@ int BandRows(std::size_t bytes_of_row) {
 
 struct Rows {
   int count = 0;
-  int most = 0;  // that one thread takes together
+  int most = 0;  // maximum count that one thread takes together
   std::size_t bytes = 0;
 };
 
-// Calls work(first, last) for bands of the rows, as many for each thread.
+// Calls work(first, last) for bands of the rows; each thread gets the same number of bands.
 template <typename Work>
 void ForBands(const Rows& rows, int threads, const Work& work) {
   const int resolved = ResolveThreads(threads);
@@ -49,32 +49,33 @@ void ForBands(const Rows& rows, int threads, const Work& work) {
               [&](int band) { work(begin(band), begin(band + 1)); });
 }
 
-// A pixel gets `share` of the ray nearest to the pixel that is `offset` beside it.
+// A pixel gets `share` of a ray: the one that lands nearest to the pixel `offset` beside it.
 struct RayTap {
   int offset = 0;
-  double share = 0;  // 0: nothing
+  double share = 0;  // 0: no contribution
 };
 
-// A ray that lands f beside the pixel nearest to it gives that 1 - |f|, and |f| to the next one on
-// that side.
+// A ray that lands f beside the pixel nearest to it contributes 1 - |f| to that pixel and |f| to
+// the next one on that side.
 std::array<RayTap, 2> TapsOf(double fraction) {
   return {RayTap{0, 1 - std::abs(fraction)}, RayTap{fraction > 0 ? -1 : 1, std::abs(fraction)}};
 }
 
-// Of the columns (rows) of views, one whose rays reach a pixel.
+// A column (row) of views whose rays reach a pixel.
 struct Reach {
   int of_views = 0;
   RayTap tap;
   int begin = 0, end = 0;  // pixels
 };
 
-// Neighbouring columns (rows) of the picture that the columns (rows) of views reach alike.
+// Neighbouring columns (rows) of the photograph that the columns (rows) of views reach alike.
 struct Run {
   int end = 0;
   std::vector<Reach> reaches;
 };
 
-// Of the pixels 0 to `count_px` - 1, from samples 0 to `samples` - 1 of each column of views.
+// Returns the runs of the pixels 0 to `count_px` - 1, reached from the samples 0 to `samples` - 1
+// of each column of views.
 std::vector<Run> RunsOf(int count_px, int samples, const std::vector<int>& shifts,
                         const std::vector<double>& fractions) {
   std::vector<Reach> reaches;
@@ -101,7 +102,7 @@ std::vector<Run> RunsOf(int count_px, int samples, const std::vector<int>& shift
   return runs;
 }
 
-// Of a pixel of the run in the rays of each of `count` columns (rows) of views.
+// Returns the shares of a pixel of the run in the rays of each of `count` columns (rows) of views.
 std::vector<double> SharesOf(const Run& run, int count) {
   std::vector<double> shares(Index(count));
   for (const Reach& reach : run.reaches) shares[Index(reach.of_views)] += reach.tap.share;
@@ -155,7 +156,8 @@ void GridPhotograph<Real>::SetTaps() {
         sum += picture_.view_weight[Index(view)] * shares_of_row[Index(view / picture_.u_count)] *
                shares[Index(view % picture_.u_count)];
       }
-      // As real as the weights that Apply takes: what is 0 there has no inverse.
+      // The sum is rounded to Real like the weights that Apply uses: a sum that is 0 there has no
+      // inverse.
       const Real real_sum = static_cast<Real>(sum);
       of_columns.push_back(real_sum > 0 ? 1 / real_sum : Real{0});
     }
@@ -178,7 +180,7 @@ void GridPhotograph<Real>::AddViews(int l, int first, int last, const Real* rays
   const LandingRect inside = LandingIn(picture_, 0, l);
   const Real* const of_views = rays + Index(l) * Index(picture_.u_count) * view_size();
   const std::array<RayTap, 2> taps = TapsOf(picture_.t_fraction[Index(l)]);
-  const int begin = std::max(inside.y_begin, first - 1);  // of pixels that rays land nearest to
+  const int begin = std::max(inside.y_begin, first - 1);  // first pixel that rays land nearest to
   const int end = std::min(inside.y_end, last + 1);
   for (int ray_y = begin; ray_y < end; ++ray_y) {
     std::array<PixelRow<Real>, 2> rows;
@@ -222,7 +224,7 @@ void GridPhotograph<Real>::AddToView(int view, int first, int last, const Real* 
   const int begin = std::max(first, inside.y_begin - t_shift);
   const int end = std::min(last, inside.y_end - t_shift);
   if (begin >= end || inside.x_begin >= inside.x_end) return;
-  std::vector<RayPixel<Real>> pixels;  // of the first ray in a row
+  std::vector<RayPixel<Real>> pixels;  // pixels of the first ray in a row
   for (const RayTap& in_y : TapsOf(picture_.t_fraction[Index(l)])) {
     for (const RayTap& in_x : TapsOf(picture_.s_fraction[Index(k)])) {
       const double weight = picture_.view_weight[Index(view)] * in_y.share * in_x.share;
@@ -243,7 +245,7 @@ void GridPhotograph<Real>::AddToView(int view, int first, int last, const Real* 
 
 template <typename Real>
 void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) const {
-  // Black all around, so that rays at the border need no loop of their own.
+  // The frame is black, so that rays at the border need no loop of their own.
   std::vector<Real> framed(framed_width() * Index(picture_.height_px + 2));
   const Rows of_picture{picture_.height_px, kMostBandRows, framed.size() * sizeof(Real)};
   ForBands(of_picture, threads_, [&](int first, int last) {
@@ -265,7 +267,7 @@ void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) con
 
 template <typename Real>
 double GridPhotograph<Real>::bytes() const {
-  // Framed for the transpose.
+  // The framed copy for the transpose.
   double sum = static_cast<double>(framed_width() * Index(picture_.height_px + 2) * sizeof(Real));
   for (const auto& view : irradiance_) {
     sum += static_cast<double>(view.capacity() * sizeof(float));

@@ -9,22 +9,26 @@
 
 namespace thicklens::estimator {
 
-// The samples of a view that land nearest to a pixel of the picture, as pixels: sample
+// The samples of a view that land nearest to a pixel of the photograph, expressed as pixels: sample
 // (x - s_shift, y - t_shift).
 struct LandingRect {
   int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 LandingRect LandingIn(const kernels::BlockGeometry& picture, int k, int l);
 
-// H on the grid [M10], for a whole picture: from the rays of a light field of one channel, views
-// (l * u_count + k) * t_count * s_count + t * s_count + s, to the photograph,
+// H on the grid [M10], for a whole photograph. It maps the rays of a light field of one channel,
+// stored at (l * u_count + k) * t_count * s_count + t * s_count + s, to the photograph,
+//
 //   (H L)(x) = sum over rays of E w g L / sum over rays of w g,
-// w the weight of the view, g the share of the pixel in the ray (bilinear), E the irradiance; the
-// numbers of kernels::Kernels::WeighRays. Rays that land outside of the picture take no part.
+//
+// where w is the weight of the view, g the share of the pixel in the ray (bilinear), and E the
+// irradiance; the numbers are those of kernels::Kernels::WeighRays. Rays that land outside of the
+// photograph are ignored.
 template <typename Real>
 class GridPhotograph {
  public:
-  // `irradiance`: of each view's samples; empty: 1. The block is the whole picture.
+  // `irradiance`: one value for each sample, per view; empty: 1. The block must be the whole
+  // photograph.
   GridPhotograph(const kernels::BlockGeometry& picture, std::vector<std::vector<float>> irradiance,
                  int threads);
   GridPhotograph(const GridPhotograph&) = delete;
@@ -46,21 +50,24 @@ class GridPhotograph {
   std::size_t bytes_of_rays() const {
     return static_cast<std::size_t>(picture_.views()) * view_size() * sizeof(Real);
   }
-  // Of the photograph with a frame of one pixel.
+  // Width of the photograph with a frame of one pixel.
   std::size_t framed_width() const { return static_cast<std::size_t>(picture_.width_px) + 2; }
   void SetTaps();
-  // Adds to rows `first` to `last` - 1 of the photograph what the views of row l send there.
+  // Adds the contributions of the views of row l to the rows `first` to `last` - 1 of the
+  // photograph.
   void AddViews(int l, int first, int last, const Real* rays, Real* photograph) const;
-  // Adds to the rays of a view, of the samples t from `first` to `last` - 1, what `framed` sends.
+  // Adds the contributions of `framed` to the rays of a view, for the samples t from `first` to
+  // `last` - 1.
   void AddToView(int view, int first, int last, const Real* framed, Real* rays) const;
-  // Multiplies by 1/(sum of w g), 0 where that is 0.
+  // Multiplies by 1/(sum of w g), or by 0 where the sum is 0.
   void Normalise(int y, const Real* from, Real* to) const;
 
   kernels::BlockGeometry picture_;
   std::vector<std::vector<float>> irradiance_;
   int threads_;
-  // Which views have rays for a pixel, and 1/(sum of w g), borders of views alone change: of each
-  // run of columns, for every row of views, and for every run of rows.
+  // The views that have rays for a pixel, and 1/(sum of w g), change only at the borders of views.
+  // They are therefore stored for each run of columns and every row of views, and for each run of
+  // rows.
   std::vector<int> column_ends_;
   std::vector<std::vector<std::vector<PixelTap<Real>>>> taps_;
   std::vector<std::vector<Real>> inverse_sums_;

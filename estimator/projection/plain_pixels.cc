@@ -10,12 +10,12 @@
 namespace thicklens::estimator {
 namespace {
 
-// A ray reads pixels so far beside its source.
+// A ray reads pixels up to this far beside its source.
 constexpr int kTapsPx = 2;
 
-// filter(from, to, size) over rectangles of that reach around each pixel, where that is the same as
-// along the rows and then along the columns: in strips, as one call for a whole picture may take
-// long.
+// Applies filter(from, to, size) to rectangles of that reach around each pixel, for filters that
+// are separable into rows and columns. It works in strips because one call for a whole image may
+// take long.
 template <typename Filter>
 cv::Mat InStrips(const cv::Mat& values, const cv::Size& reach_px, const Filter& filter) {
   constexpr int kStripPx = 64;
@@ -33,14 +33,14 @@ cv::Mat InStrips(const cv::Mat& values, const cv::Size& reach_px, const Filter& 
   return both;
 }
 
-// The most that is within a reach of each pixel.
+// Returns the maximum within a reach of each pixel.
 cv::Mat MostAround(const cv::Mat& values, const cv::Size& reach_px) {
   return InStrips(values, reach_px, [](const cv::Mat& from, cv::Mat to, const cv::Size& size) {
     cv::dilate(from, to, cv::getStructuringElement(cv::MORPH_RECT, size));
   });
 }
 
-// Differences to the next pixel; 0 for the last.
+// Returns the differences to the next pixel; 0 for the last.
 cv::Mat StepsTo(const cv::Mat& values, int right, int down) {
   cv::Mat steps = cv::Mat::zeros(values.size(), CV_32F);
   const cv::Rect from(0, 0, values.cols - right, values.rows - down);
@@ -82,7 +82,8 @@ PlainPixels FindPlainPixels(const DisparityMap& disparity, int u_count, int v_co
       const double d = most.at<float>(y, x);
       const double e = across * g * d / (1 - down * h);
       const double f = h * (1 + down * e + beside_middle * d) / (1 - across * g);
-      // What is read lies less than three pixels from what it is compared with.
+      // The pixels that are read are less than three pixels from the pixel that they are compared
+      // with.
       is_product.at<unsigned char>(y, x) = across * g + down * h < 0.5 &&
                                            down * e <= tolerance_px && across * f <= tolerance_px &&
                                            3 * (g + h) <= same_surface;

@@ -47,7 +47,7 @@ std::vector<float> HiddenShare(const ViewFan& fan, std::size_t pixels) {
   return {share.begin(), share.end()};
 }
 
-// Which is the map itself.
+// The centre view is the map itself.
 void DropCentre(ViewFan* fan) {
   const auto is_centre = [](const FanView& view) { return view.a == 0 && view.b == 0; };
   fan->views.erase(std::remove_if(fan->views.begin(), fan->views.end(), is_centre),
@@ -111,7 +111,7 @@ double SceneProjection<Real>::row_share() const {
   return static_cast<double>(rows.pixel.size()) / static_cast<double>(pixels());
 }
 
-// Indices into `rows`.
+// Returns indices into `rows`.
 template <typename Real>
 std::pair<std::size_t, std::size_t> SceneProjection<Real>::RowsOfOwn(int first_row,
                                                                      int last_row) const {
@@ -185,7 +185,7 @@ SceneProjection<Real> MakeSceneProjection(const DisparityMap& disparity,
       auto& term = projection.terms.back();
       term.across = FilterOf<Real>(axes.across, kernels::Axis::kAcross, disparity, product.across,
                                    options.between, options.threads);
-      // The last one's axes are not read again, and make room for its other filter.
+      // The axes of the last term are not read again; freeing them makes room for the other filter.
       if (&product == &products.back()) axes.across = {};
       term.down = FilterOf<Real>(axes.down, kernels::Axis::kDown, disparity, product.down,
                                  options.between, options.threads);

@@ -13,22 +13,22 @@
 
 namespace thicklens::estimator {
 
-// The rays of one view: where in the centre view each of its samples has its source.
+// The rays of one view: the position in the centre view of each sample's source.
 template <typename Real>
 class ViewRays {
  public:
   ViewRays() = default;
-  // `lowest` and `highest`: of the disparities of the four pixels from each one to the right and
-  // down.
+  // `lowest` and `highest`: minimum and maximum disparity of the 2 x 2 pixels from each pixel to
+  // the right and down.
   ViewRays(const DisparityMap& map, const std::vector<float>& lowest,
            const std::vector<float>& highest, const ViewDisparity& view, double a, double b);
 
-  // Numbers that a row of values needs after its last, and a picture too.
+  // Count of extra numbers that a row of values, and an image, needs after its last one.
   static constexpr std::size_t kMargin = 2 * kLanes;
 
-  // warped(x) = sum_taps t(x, p) picture(p) of one row, by the taps of SurfaceTaps.
+  // Computes warped(x) = sum_taps t(x, p) picture(p) of one row, by the taps of SurfaceTaps.
   void Warp(int row, const Real* picture, Real* warped) const;
-  // The transpose, added to the picture. Leaves other values behind.
+  // Adds the transpose to the image. `values` is overwritten.
   void Spread(int row, Real* values, Real* picture) const;
 
   double bytes() const;
@@ -40,7 +40,7 @@ class ViewRays {
     std::array<std::int32_t, 4> pixel{};
     std::array<Real, 4> weight{};
   };
-  // A ray of which `rest` is left: it reads another place too.
+  // A ray that keeps the share `rest` and also reads another place.
   struct MixedRay {
     OddRay other;
     Real rest = 0;
@@ -56,35 +56,37 @@ class ViewRays {
   std::vector<RayRun> runs_;
   std::vector<OddRay> odd_;
   std::vector<MixedRay> mixed_;
-  std::vector<std::size_t> run_start_, odd_start_, mixed_start_;  // of each row, and the end
+  std::vector<std::size_t> run_start_, odd_start_, mixed_start_;  // start of each row, and the end
 };
 
-// H in scene-ray form: R(p, k) is the radiance of the scene point that the pixel p of the centre
+// H in scene-ray form. R(p, k) is the radiance of the scene point that the pixel p of the centre
 // view shows, toward the aperture sample k;
+//
 //   (H R)(x) = sum_k w_k sum_taps t_k(x, p) R(p, k),
-// with the rays of SceneProjection and its taps for Between::kLinear: where all R(p, k) of a point
-// are equal, this is its photograph. Derived here [D114].
-// A plane R(., k) stands at k * stride, k row by row of the aperture.
+//
+// with the rays of SceneProjection and its taps for Between::kLinear. Where all R(p, k) of a point
+// are equal, this is its photograph. Derived here [D114]. A plane R(., k) starts at k * stride,
+// with k row by row of the aperture.
 template <typename Real>
 class SceneRays {
  public:
-  // `disparity`: px per view step, 0 in the plane of focus, without holes. Weights V x U, sum 1.
-  // `progress` is called for each view, from any thread, and may throw to stop.
+  // `disparity`: px per view step, 0 in the plane of focus, without holes. The weights are V x U
+  // with sum 1. `progress` is called for each view, from any thread, and may throw to stop.
   SceneRays(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
             const std::function<void()>& progress);
 
   std::size_t pixels() const {
     return static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_);
   }
-  // From plane to plane: the pixels, and what the loops need after them.
+  // Distance from plane to plane: the pixels and the margin that the loops need after them.
   std::size_t plane_stride() const;
   std::size_t view_count() const { return views_.size(); }
 
-  // photograph = H R. Stride 0: all planes are that one.
+  // photograph = H R. Stride 0: all planes are the same one.
   void Apply(const Real* planes, std::size_t stride, Real* photograph);
-  // R = H^T photograph; planes at plane_stride(), of which the margins become 0.
+  // R = H^T photograph; the planes are plane_stride() apart, and their margins become 0.
   void ApplyTransposed(const Real* photograph, Real* planes);
-  // What view k shows of its plane (which has a margin), without the weight.
+  // Computes what view k shows of its plane (which has a margin), without the weight.
   void Show(std::size_t k, const Real* plane, float* shown) const;
 
   double bytes() const;
@@ -94,7 +96,7 @@ class SceneRays {
   int threads_ = 1;
   std::vector<ViewRays<Real>> views_;
   std::vector<Real> weights_;
-  std::vector<Real> rows_;  // one with a margin for each piece of work
+  std::vector<Real> rows_;  // one row with a margin for each piece of work
 };
 
 }  // namespace thicklens::estimator

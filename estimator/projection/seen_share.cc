@@ -17,15 +17,16 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 // The rays of one view from a row of the centre view's points.
 struct SeenRow {
   int width_px, height_px, y;
-  float shift_x, shift_y;         // of the view, px per unit of disparity
-  const float* points_disparity;  // of the row
-  const float* view_disparity;    // of the view; NaN: hidden
-  const unsigned char* known;     // of the row
+  float shift_x, shift_y;         // shift of the view, px per unit of disparity
+  const float* points_disparity;  // disparity of the row
+  const float* view_disparity;    // disparity of the view; NaN: hidden
+  const unsigned char* known;     // flags of the row
   float same_surface, weight;
 };
 
-// Adds the view's weight to the share of each point whose ray comes through. Without branches, for
-// the vector instructions of the caller that it is inlined into. NaN fails every comparison.
+// Adds the view's weight to the share of each point whose ray is not occluded. The code has no
+// branches, for the vector instructions of the caller that it is inlined into. NaN fails every
+// comparison.
 inline __attribute__((always_inline)) void AddSeen(const SeenRow& given, float* share) {
   const SeenRow row = given;
   const auto outer_x = static_cast<float>(row.width_px) - 0.5F;
@@ -36,7 +37,8 @@ inline __attribute__((always_inline)) void AddSeen(const SeenRow& given, float* 
     const float disparity = row.points_disparity[x];
     const float at_x = static_cast<float>(x) - row.shift_x * disparity;
     const float at_y = static_cast<float>(row.y) - row.shift_y * disparity;
-    // The pixels around: four, or fewer if it is in the middle of one, or beside the outer ones.
+    // The pixels around the ray: four, or fewer if the ray is in the middle of one or beside the
+    // outer ones.
     const std::int32_t x0 = Cut(at_x, row.width_px - 1), y0 = Cut(at_y, row.height_px - 1);
     const std::int32_t x1 =
         std::min(x0 + (at_x > static_cast<float>(x0) ? 1 : 0), row.width_px - 1);

@@ -8,11 +8,12 @@
 
 namespace thicklens::estimator {
 
-// The share of the aperture, by its weights, that sees each point p of the centre view through the
-// photograph. The ray of the view (a, b) meets it at p - D (a, b); it is the point's if the
-// disparity rendered into that view is the point's at one of the pixels around (a surface's edge
-// may run between them). Rays that miss the photograph by more than half a pixel see nothing.
-// `disparity` is the fan's. Points that are known to be seen by all are not looked at.
+// Returns the share of the aperture, by its weights, that sees each point p of the centre view
+// through the photograph. The ray of the view (a, b) meets the photograph at p - D (a, b). The ray
+// sees the point if the disparity rendered into that view is the point's at one of the pixels
+// around (a surface's edge may run between them). Rays that miss the photograph by more than half a
+// pixel see nothing. `disparity` is the fan's. Points with `known` set are visible to all views and
+// are not examined.
 std::vector<float> SeenShare(const ViewFan& fan, const DisparityMap& disparity,
                              const std::vector<unsigned char>& known, int threads);
 

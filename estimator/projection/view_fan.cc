@@ -16,8 +16,8 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 double Offset(int position, int count) { return position - (count - 1) / 2.0; }
 
-// A view's ways to its sources along one axis, NaN where it is hidden; from the fan if it is one of
-// its views.
+// Returns a view's displacements to its sources along one axis, NaN where it is hidden. They come
+// from the fan if it contains the view.
 std::vector<float> SourcesOf(const ViewFan& fan, const DisparityMap& disparity, double a, double b,
                              bool across) {
   const auto ways_of = [across](const CompactView& view) {
@@ -30,8 +30,8 @@ std::vector<float> SourcesOf(const ViewFan& fan, const DisparityMap& disparity, 
   return ways_of(DisparityRenderer(disparity).RenderCompact(a, b));
 }
 
-// The same for a position on an axis of the aperture; of an even count of views, the mean of the
-// two beside the axis.
+// Returns the displacements for a position on an axis of the aperture. For an even count of views
+// they are the mean of the two views beside the axis.
 std::vector<float> SourcesOnAxis(const ViewFan& fan, const DisparityMap& disparity, double offset,
                                  int other_count, bool across) {
   const auto of = [&](double other) {

@@ -19,21 +19,21 @@ struct FanView {
 // All rays of the aperture through the pixels of a photograph.
 struct ViewFan {
   int width_px = 0, height_px = 0;
-  std::vector<FanView> views;  // those with a weight, row by row
+  std::vector<FanView> views;  // the views with a weight > 0, row by row
 };
 double BytesOf(const ViewFan& fan);
-// The view that is so many steps from the centre; null if it has no weight.
+// Returns the view that is so many steps from the centre; null if it has no weight.
 const CompactView* ViewAt(const ViewFan& fan, double a, double b);
 ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights, int threads,
                   const std::function<void()>& progress);
 
-// Where the rays of a column or a row of the aperture come from, if the fan is a product: px to the
-// source, along one axis, for each of `count` positions on it. NaN, at all positions: at one of
-// them it is not on the pixel's surface.
+// The origin of the rays of a column or a row of the aperture if the fan is a product: px to the
+// source, along one axis, for each of `count` positions on it. NaN at all positions: at one of them
+// the source is not on the pixel's surface.
 struct FanAxis {
   int count = 0;
   std::vector<std::vector<float>> source_px;  // [position][pixel]
-  std::vector<unsigned char> usable;          // per pixel: at all positions
+  std::vector<unsigned char> usable;          // per pixel: usable at all positions
 };
 struct FanAxes {
   FanAxis across, down;
@@ -41,30 +41,30 @@ struct FanAxes {
 FanAxes AxesOf(const ViewFan& fan, const DisparityMap& disparity, int u_count, int v_count,
                int threads);
 
-// For each pixel whether the product of the axes puts every ray of the fan where it belongs, to a
-// tolerance, on taps of one surface inside the picture. Those that are known to be are not looked
-// at.
+// Returns for each pixel whether the product of the axes places every ray of the fan correctly, to
+// a tolerance, on taps of one surface inside the image. Pixels with `known` set are not examined.
 std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
                                      const DisparityMap& disparity, double tolerance_px,
                                      const std::vector<unsigned char>& known, int threads);
 
-// How a picture is read between its pixels.
+// Interpolation of an image between its pixels.
 enum class Between {
   kLinear,
-  kCubic,  // where the pixels that it takes are of one surface; linear elsewhere
+  kCubic,  // cubic where the pixels read are of one surface; linear elsewhere
 };
 
-// The filter of one axis: pixel p gets sum_i weights_i x(p + source_i). kCubic asks for four pixels
-// of p's surface in the line of the axis. Pixels without an axis get sum_i weights_i x(p).
+// Returns the filter of one axis: pixel p gets sum_i weights_i x(p + source_i). kCubic requires
+// four pixels of p's surface in the line of the axis. Pixels without an axis get sum_i weights_i
+// x(p).
 template <typename Real>
 kernels::PixelFilter<Real> FilterOf(const FanAxis& axis, kernels::Axis direction,
                                     const DisparityMap& disparity, const Eigen::VectorXd& weights,
                                     Between between, int threads);
 
-// The rows of the pixels that are no product, linear between the pixels of a ray's surface. They
-// are made in parts of whole rows of the picture, which are then put together, each by one thread:
-// a part has an eighth of a thread's share of these pixels, and what more the last of its rows has.
-// `freed` (may be empty) is called, from any thread, whenever one of them is no longer.
+// Returns the rows of the pixels that are no product, linear between the pixels of a ray's surface.
+// The rows are made in parts of whole image rows, each by one thread, and are then joined. A part
+// has an eighth of a thread's share of these pixels, plus the excess of the last of its rows.
+// `freed` (may be empty) is called, from any thread, whenever a part has been freed.
 constexpr int kPartsOfAThread = 8;
 template <typename Real>
 kernels::PixelRuns<Real> RunsOf(const ViewFan& fan, const DisparityMap& disparity,

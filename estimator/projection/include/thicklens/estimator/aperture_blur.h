@@ -8,19 +8,20 @@
 
 namespace thicklens::estimator {
 
-// The blur that the samples of an aperture carry [D30]: the standard deviation, mm on the aperture,
-// of where the rays of a point in focus cross it, about their centroid, by the weights of the views
-// times the fall-off [S12] relative to the principal point.
+// The blur that the samples of an aperture contain [D30]: the standard deviation, in mm on the
+// aperture, of the positions where the rays of a point in focus cross it, about their centroid. The
+// rays are weighted by the weights of the views times the fall-off [S12] relative to the principal
+// point.
 struct ApertureBlur {
   double calibrated_sigma_mm = 0;  // kappa r
-  Eigen::Vector2d sigma_mm{0, 0};  // of the point on the axis, along u and v; 0: one view
-  Eigen::Vector2d corner_change{0,
-                                0};  // relative change of that, at the corner where it is largest
+  Eigen::Vector2d sigma_mm{
+      0, 0};  // sigma of the point on the axis, along u and v; 0 for a single view
+  Eigen::Vector2d corner_change{0, 0};  // largest relative change of sigma_mm over the corners
 };
 
-// `weights`: V x U, >= 0, any positive sum. `falloff`: the camera whose irradiance rays carry;
-// null: none. Throws Error for weights of another size than the grid's views, or without a positive
-// sum.
+// Measures the blur of an aperture. `weights`: V x U, >= 0, any positive sum. `falloff`: the camera
+// whose irradiance the rays have; null: none. Throws Error if the weights differ in size from the
+// grid's views, if one is below 0, or if their sum is not positive.
 ApertureBlur MeasureApertureBlur(const model::LightFieldGrid& grid, const model::Camera& camera,
                                  const Eigen::ArrayXXd& weights, const model::Camera* falloff);
 
