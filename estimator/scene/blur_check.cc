@@ -20,25 +20,25 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of the blocks; fewer are more likely a fault of the depth.
+// Minimum share of unexplained blocks; fewer are more probably a fault of the depth.
 constexpr double kLeastShare = 0.04;
 constexpr int kLeastBlocks = 4;
-// What a blur that is proposed may leave of what the given one does not explain; and beside one of
-// the two proposals, the other.
+// Maximum share of the unexplained misfit that a proposed blur may leave, and the maximum for the
+// other of the two proposals.
 constexpr double kMostLeft = 0.25;
 double MostLeftBeside(double left) { return std::max(kMostLeft, 2 * left); }
-// Left of it by a blur that does about as well as one that leaves so much.
+// Maximum share left by a blur that does about as well as one that leaves `left`.
 double AboutAsMuch(double left) { return 1.1 * left + 0.03; }
 constexpr double kAboutTheScore = 1.3;
 
 constexpr int kMostNarrower = 8;  // steps of 2^(-1/4): to a quarter
-// Steps of the offset move the standard deviation of the blur by so much, and so many are tried on
-// either side.
+// A step of the offset changes the standard deviation of the blur by this; the maximum number of
+// steps is that on either side.
 constexpr double kOffsetSigmaPx = 0.3;
 constexpr int kMostOffsets = 4;
 constexpr int kMostTrials = 1 + kMostNarrower + 2 * kMostOffsets;
 
-// Standard deviation of the places of the views, in view steps, of the wider axis.
+// Returns the standard deviation of the positions of the views, in view steps, on the wider axis.
 double SpreadOf(const Eigen::ArrayXXd& weights) {
   const auto of_axis = [](const Eigen::ArrayXd& axis) {
     const Eigen::ArrayXd places =
@@ -49,8 +49,8 @@ double SpreadOf(const Eigen::ArrayXXd& weights) {
   return std::max(of_axis(weights.colwise().sum().transpose()), of_axis(weights.rowwise().sum()));
 }
 
-// Ever farther from the given blur, until it gets no better; where something better must be there,
-// not before that was found.
+// Tries blurs ever farther from the given one until they improve no more. If `must_be_there` is
+// set, it does not stop before a sufficient blur was found.
 template <typename Next>
 void TryOn(int most, bool must_be_there, const Next& next, BlurTrials* trials, BlurCheck* check,
            IterationProgress* progress) {
@@ -63,7 +63,7 @@ void TryOn(int most, bool must_be_there, const Next& next, BlurTrials* trials, B
     progress->Count();
     const double left = check->trials.back().unexplained;
     const double score = check->trials.back().score;
-    // Where all is explained, the score alone tells one from the other.
+    // Where all is explained, only the score distinguishes the trials.
     const bool better = left < best || (left == best && score < best_score);
     const bool waits = must_be_there && !(std::min(best, left) < kMostLeft);
     worse = better || waits ? 0 : worse + 1;
@@ -72,8 +72,8 @@ void TryOn(int most, bool must_be_there, const Next& next, BlurTrials* trials, B
   }
 }
 
-// Of the trials from `first` on the first that does about as well as the best of them, in what it
-// explains and then in its score.
+// Returns the first of the trials from `first` on that does about as well as the best of them, in
+// the share that it explains and then in its score.
 std::optional<BlurTrial> BestOf(const std::vector<BlurTrial>& trials, std::size_t first) {
   double left = 1, score = 0;
   for (std::size_t i = first; i < trials.size(); ++i) left = std::min(left, trials[i].unexplained);
@@ -92,7 +92,7 @@ std::optional<BlurTrial> BestOf(const std::vector<BlurTrial>& trials, std::size_
   return widest == trials.end() ? std::nullopt : std::optional(*widest);
 }
 
-// Of the best of either kind, what explains enough.
+// Keeps those of the two best trials that explain enough.
 void KeepProposals(BlurCheck* check) {
   const auto left = [](const std::optional<BlurTrial>& best) {
     return best ? best->unexplained : 1;
@@ -126,7 +126,7 @@ void Search(double spread, BlurTrials* trials, BlurCheck* check, IterationProgre
   KeepProposals(check);
 }
 
-// From px of the picture that was looked at to those of the photograph.
+// Converts px of the checked image to px of the photograph.
 void ToPhotographPx(BlurCheck* check) {
   const double px = std::exp2(check->halvings);
   for (BlurTrial& trial : check->trials) trial.focus_offset_px *= px;

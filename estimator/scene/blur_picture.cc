@@ -15,7 +15,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Half the size costs a quarter, and its noise is half.
+// Halving the size leaves a quarter of the cost and half of the noise.
 constexpr int kLeastHalvedPx = 256;
 constexpr double kMostPixels = 1 << 20;
 constexpr int kLeastRows = 64;
@@ -85,7 +85,7 @@ SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
     return ProjectionBytes{all.held / rows, all.fan / rows};
   };
   ProjectionBytes per_row = of_row(bytes_of(make(sample)), sample.picture.height_px);
-  // Of few rows most rays pass the upper or the lower border, where they are hidden.
+  // Where rows are few, most rays pass the upper or the lower border, where they are hidden.
   per_row.fan = static_cast<double>((weights > 0).count()) * width_px * sizeof(float);
   for (int rows = height_px; rows >= std::min(kLeastRows, height_px); rows = rows * 7 / 8) {
     if (!fits(rows, {rows * per_row.held, rows * per_row.fan})) continue;

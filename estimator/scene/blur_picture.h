@@ -8,8 +8,8 @@
 
 namespace thicklens::estimator {
 
-// A photograph as its blur is looked at: without fall-off, with the disparity of its pixels, at
-// half its size unless it is small, and again where it is large.
+// The image on which the blur is checked: a photograph without fall-off, with the disparity of its
+// pixels, at half its size unless it is small, and halved again where it is large.
 struct BlurPicture {
   model::LinearPicture picture;
   DisparityMap disparity;
@@ -17,8 +17,8 @@ struct BlurPicture {
 };
 BlurPicture BlurPictureOf(const EstimateInput& input, bool falloff, int threads);
 
-// H of as many rows in the middle as the whole process may hold beside what solves for them; the
-// picture keeps these. Throws Error if they are but a few.
+// Returns H of as many rows in the middle as the memory limit of the whole process permits beside
+// the solver's memory; `picture` is cut to these rows. Throws Error if there are too few.
 SceneProjection<float> ProjectionWithin(const Eigen::ArrayXXd& weights,
                                         std::optional<double> memory_limit_mib,
                                         const ProjectionOptions& options, BlurPicture* picture);

@@ -14,16 +14,16 @@ namespace thicklens::estimator {
 namespace {
 
 constexpr int kBlockPx = 32;
-// A block counts with at least this share of its pixels, and unless the prior has to make up for so
-// much that the score hangs on the trace alone.
+// A block counts if it has at least this share of its pixels and its trace is not too large: with a
+// larger trace the prior replaces so much of the data that the score depends on the trace alone.
 constexpr double kLeastPixels = kBlockPx * kBlockPx / 4;
 constexpr double kMostTrace = 0.5;
-// What noise may leave of itself in a block, in variances: of the right blur it is less than 1, and
-// of 768 or more numbers the mean square is uncertain by 5 %.
+// Maximum misfit of a block that noise explains, in variances. For the right blur it is less than
+// 1, and the mean square of 768 or more numbers is uncertain by 5 %.
 constexpr double kMostOfNoise = 1.2;
 constexpr float kMostHidden = 0.01F;
 constexpr double kSlopeSmoothingPx = 2;
-// Of the iterations: what it leaves of the misfit is far below the noise.
+// Tolerance of the iterations: the misfit that it leaves is far below the noise.
 constexpr double kTolerance = 3e-4;
 constexpr int kMaxIterations = 200;
 

@@ -12,33 +12,33 @@
 
 namespace thicklens::estimator {
 
-// One photograph, explained with one blur after the other.
+// Explains one photograph with one blur after the other.
 class BlurTrials {
  public:
   struct Photograph {
     model::LinearPicture picture;  // without fall-off
-    DisparityMap disparity;        // of its pixels, 0 in the plane of focus
+    DisparityMap disparity;        // disparity of its pixels, 0 in the plane of focus
     Eigen::ArrayXXd weights;
     model::TransferCurve transfer;
     double noise_sigma = 0;  // of stored values
   };
-  // Solves with the given blur, whose H is handed over. Of the options for others `progress` is
-  // called now and then, from any thread, and may throw to stop.
+  // Solves with the given blur, whose H is `given`. `options` apply to the other blurs; their
+  // `progress` is called repeatedly, from any thread, and may throw to stop.
   BlurTrials(Photograph photograph, const SceneProjection<float>& given, ProjectionOptions options);
 
-  // Of the given blur, as BlurCheck has them.
+  // Results of the given blur, as defined in BlurCheck.
   int blocks() const { return blocks_; }
   int unexplained_blocks() const { return unexplained_blocks_; }
   BlurTrial given() const;
   int iterations() const { return iterations_; }
 
-  // With another blur, from where the last one ended.
+  // Solves with another blur, starting from the last solution.
   BlurTrial Try(double blur_scale, double focus_offset_px);
 
  private:
   struct Block {
-    double pixels = 0;  // that the whole aperture sees as the centre does
-    double misfit = 0;  // mean of their W (H r - I)^2, over that of the noise
+    double pixels = 0;  // count of pixels that the whole aperture sees as the centre does
+    double misfit = 0;  // mean of their W (H r - I)^2, relative to that of the noise
     double trace = 0;   // mean of their part of the trace
   };
 

@@ -6,16 +6,17 @@
 
 namespace thicklens::estimator {
 
-// A picture at half its size is blurred by half as many pixels and costs a quarter: what it shows
-// of the sharp scene is where the iteration at full size starts.
+// At half its size, an image is blurred by half as many pixels and costs a quarter. The sharp scene
+// that it shows is the start of the iteration at full size.
 
-// Each pixel the mean of four; a last row or column without a partner stands for both.
+// Averages each four pixels; a last row or column without a partner is used twice.
 model::LinearPicture HalfSize(const model::LinearPicture& picture);
-// The same pixels: the first of the four, whose surface it stays on; half the step.
+// Halves a map like the image. The disparity is that of the first of the four pixels, so that it
+// stays on one surface; the step is halved.
 DisparityMap HalfSize(const DisparityMap& map);
 
-// `picture` with what `sharp` has more than `blurred`, both of half its size, cubic between their
-// pixels.
+// Returns `picture` plus the difference of `sharp` and `blurred`, both of half its size,
+// interpolated cubically.
 model::LinearPicture WithDetail(const model::LinearPicture& picture,
                                 const model::LinearPicture& blurred,
                                 const model::LinearPicture& sharp);

@@ -20,7 +20,7 @@ namespace thicklens::estimator {
 namespace {
 
 constexpr Confidence kLeastUnresolved = 1, kLeastResolved = 129;
-constexpr int kShares = 126;  // steps from the least to the most of either kind
+constexpr int kShares = 126;  // steps from the minimum to the maximum of either kind
 
 }  // namespace
 
@@ -90,7 +90,8 @@ std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
     const std::size_t row = static_cast<std::size_t>(y) * width;
     for (int x = 0; x < view.width_px; ++x) {
       const std::size_t i = row + static_cast<std::size_t>(x);
-      // Of a library, lround would take as long as all the rest. NaN goes to the first.
+      // A library call of lround would take as long as the rest of the loop. NaN becomes the first
+      // sample.
       const auto nearest = [](int sample, float way, int count) {
         const float at = static_cast<float>(sample) + way + 0.5F;
         const auto last = static_cast<float>(count - 1);

@@ -16,14 +16,14 @@
 namespace thicklens::estimator {
 namespace {
 
-// Lower bands would be little but margin.
+// Lower bands would consist mainly of margin.
 constexpr int kLeastRows = 16;
-// Of a large photograph, bands of so many pixels in all tell what the whole is like; of at least so
-// many rows, and of no more margin than that.
+// For a large photograph, sampled bands with so many pixels in all represent the whole. A band has
+// at least so many rows and not more rows of margin than that.
 constexpr int kSampleRows = 16;
 constexpr double kSamplePixels = 1 << 18;
 
-// What bands found, each on its own, as that of one picture.
+// Combines the results of the bands into those of one image.
 class JoinedSummary {
  public:
   void Add(const SceneSummary& of_band, int rows) {
@@ -38,7 +38,7 @@ class JoinedSummary {
     strength_ = of_band.strength;
   }
 
-  // Throws Error if iterations led nowhere.
+  // Throws Error if the iterations made no progress.
   void Fill(const SceneOptions& options, SceneSummary* summary) const {
     RequireProgress(
         "scene", relative_residual_, iterations_,
@@ -62,7 +62,7 @@ class JoinedSummary {
   double row_share_ = 0, hidden_share_ = 0, squares_ = 0;
 };
 
-// The rows of a band's result, to the end of those above.
+// Appends the rows of a band's result to those of the bands above.
 void AddRows(const model::LinearPicture& solved, const SceneBand& band,
              model::LinearPicture* picture) {
   const auto in_row =
@@ -201,7 +201,8 @@ const typename SceneBandRun<Real>::Sample& SceneBandRun<Real>::TakenSample(
   return *sample_;
 }
 
-// One for all bands, so that they fit together. Cross-validation looks at the band in the middle.
+// Returns one strength for all bands, so that they fit together. Cross-validation uses the band in
+// the middle.
 template <typename Real>
 double SceneBandRun<Real>::StrengthFor(const model::LinearPicture& photograph,
                                        const std::vector<SceneBand>& bands) {
@@ -280,7 +281,7 @@ std::optional<SolvedScene> SceneBandRun<Real>::SolveIn(int count,
   if (wants_confidence) whole.of_points.reserve(input_.disparity.disparity.size());
   for (std::size_t i = 0; i < bands.size(); ++i) {
     const SceneBand& band = bands[i];
-    ReturnFreedMemory(options_.memory_limit_mib);  // of the band above
+    ReturnFreedMemory(options_.memory_limit_mib);  // memory of the band above
     typename Radiance::Run run = RunFor(options);
     run.confidence = wants_confidence;
     run.fan = MayKeepFan(count);

@@ -14,22 +14,22 @@ namespace thicklens::estimator {
 
 struct SolvedScene {
   model::LinearPicture radiance;
-  std::vector<Confidence> of_points;  // of the centre view, if it is wanted
-  ViewFan fan;                        // views that were rendered already; perhaps none
+  std::vector<Confidence> of_points;  // confidence of the points of the centre view, if requested
+  ViewFan fan;                        // views that were already rendered; may be empty
 };
 
-// The radiance of a photograph, solved for in as few bands as the memory allows, one after the
+// Solves for the radiance of a photograph in as few bands as the memory allows, one after the
 // other.
 template <typename Real>
 class SceneBandRun {
  public:
-  // All is kept by reference. `iterations` of the progress are for the bands.
+  // All arguments are kept by reference. `iterations` is the part of the progress for the bands.
   SceneBandRun(const EstimateInput& input, const SceneOptions& options, kernels::Backend* backend,
                const SceneMemory& memory, int reach_px, int iterations, IterationProgress* progress,
                SceneSummary* summary);
 
-  // Of the input's photograph without its fall-off. Sets of the summary what the solution tells,
-  // and adds the times. Throws Error if the memory limit is too low for the lowest bands.
+  // Solves for `photograph`, the input's without its fall-off. Sets the solution's members of the
+  // summary and adds the times. Throws Error if the memory limit is too low for the lowest bands.
   SolvedScene Solve(const model::LinearPicture& photograph, bool wants_confidence, SceneMaps* maps);
 
  private:
@@ -45,19 +45,21 @@ class SceneBandRun {
   double StrengthFor(const model::LinearPicture& photograph, const std::vector<SceneBand>& bands);
   typename Radiance::Run RunFor(const SceneOptions& options) const;
   enum class Start { kNone, kFound };
-  // Returns the seconds of the iterations at half the size, where they are asked for. One radiance
-  // at a time: it reads the band's disparity from here.
+  // Returns the seconds of the iterations at half the size, if they are requested. Only one
+  // radiance may be in use at a time, because it reads the band's disparity from this object.
   double Prepare(const model::LinearPicture& photograph, const SceneBand& band, Start start,
                  Radiance* radiance);
-  // Absent if one of them takes more memory than it may.
+  // Absent if one of the bands exceeds the memory limit.
   std::optional<SolvedScene> SolveIn(int count, const model::LinearPicture& photograph,
                                      bool wants_confidence, SceneMaps* maps);
   bool Fits(const SceneBand& band, const Radiance& radiance);
   bool IsWithinLimit(double bytes) const;
-  // Of what is needed, `bytes`, and more that it leaves with the process if it may.
+  // Returns the predicted memory: the needed `bytes`, or more if freed memory may stay with the
+  // process.
   double PredictedMib(double bytes, int rows, const ProjectionBytes& projection,
                       double kept_fan_bytes) const;
-  // Whether the views of the photograph's rays are those of the light field.
+  // Returns whether the views of the photograph's rays are those of the light field, in a single
+  // band.
   bool MayKeepFan(int bands) const;
 
   const EstimateInput& input_;
@@ -67,10 +69,10 @@ class SceneBandRun {
   const int reach_px_, iterations_;
   IterationProgress* progress_;
   SceneSummary* summary_;
-  DisparityMap band_disparity_;  // unless it is the input's
-  double relief_slope_ = 0;      // of patches
+  DisparityMap band_disparity_;  // unused if the band is the whole input
+  double relief_slope_ = 0;      // for patches
   double mean_slope_ = 0;
-  ProjectionBytes per_pixel_;  // the most that is known
+  ProjectionBytes per_pixel_;  // largest known value
   std::optional<Sample> sample_;
   int search_iterations_ = 0;
 };

@@ -8,7 +8,7 @@ namespace thicklens::estimator {
 namespace {
 
 constexpr int kSlopeMarginPx = 8;
-// Of the slopes' smoothing and of the prior, whatever the blur.
+// Margin for the smoothing of the slopes and for the prior, whatever the blur.
 constexpr int kLeastMarginPx = 16;
 constexpr int kReaches = 4;
 
@@ -16,7 +16,7 @@ SceneBand WithMargin(int first, int last, int height_px, int margin_px) {
   return {first, last, std::max(0, first - margin_px), std::min(height_px, last + margin_px)};
 }
 
-// The values of the rows [from, to) of a picture with that many in a row.
+// Returns the values of the rows [from, to) of an image with `in_row` values in a row.
 std::vector<float> RowsOf(const std::vector<float>& values, std::size_t in_row, int from, int to) {
   const auto row = [&](int y) {
     return values.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(y) * in_row);

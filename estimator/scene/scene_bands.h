@@ -8,8 +8,8 @@
 
 namespace thicklens::estimator {
 
-// A part of a picture that is solved for by itself: the rows [first, last), with the rows [from,
-// to) around them, which have part in what they show.
+// A part of an image that is solved for by itself: the rows [first, last), with the rows [from, to)
+// around them, which contribute to the result.
 struct SceneBand {
   int first = 0, last = 0;
   int from = 0, to = 0;
@@ -17,20 +17,21 @@ struct SceneBand {
   int rows() const { return to - from; }
 };
 
-// So many bands of nearly the same height, with `margin_px` rows more above and below as far as the
-// picture has them.
+// Returns `count` bands of nearly the same height, with `margin_px` more rows above and below as
+// far as the image has them.
 std::vector<SceneBand> BandsOf(int height_px, int count, int margin_px);
-// Every `stride`-th of the bands of `rows` rows.
+// Returns every `stride`-th of the bands of `rows` rows.
 std::vector<SceneBand> SampleBands(int height_px, int rows, int stride, int margin_px);
 
-// Rows from a pixel of the photograph to the farthest pixel that it is a mean of. `disparity` of
-// the samples of a grid, for which a ray of the next view down lands so many px beside its sample.
+// Returns the number of rows from a pixel of the photograph to the farthest pixel that it is a mean
+// of. `disparity` is that of the samples of a grid, on which a ray of the next view down lands
+// `landing_step_px` px beside its sample.
 int ReachPx(const DisparityMap& disparity, double landing_step_px, int v_count);
-// Rows around a band of which the radiance still matters to it. A row of H sees as far as the fan
-// reaches, and where views see past an edge twice as far; what the border of the rows that are
-// solved for does wrong dies out in steps of that reach.
+// Returns the number of rows around a band whose radiance still affects it. A row of H extends as
+// far as the fan reaches, and twice as far where views see past an edge. The errors at the border
+// of the rows that are solved for decay in steps of that reach.
 int BandMarginPx(int reach_px);
-// The same for H and the slopes alone.
+// Returns the margin that H and the slopes alone need.
 int SampleMarginPx(int reach_px);
 
 model::LinearPicture CutRows(const model::LinearPicture& picture, int from, int to);

@@ -13,8 +13,8 @@ constexpr double kHiddenWeight = 20;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Sum of the squares of what the rays of one axis put on the pixels of a line, linear between
-// pixels, for neighbours `step_px` apart.
+// Returns the sum of the squares of the weights that the rays of one axis put on the pixels of a
+// line, linear between pixels, for neighbours `step_px` apart.
 double SquaredAxis(const Eigen::ArrayXd& weights, double step_px) {
   const auto count = static_cast<int>(weights.size());
   const double half_px = (count - 1) / 2.0 * step_px;
@@ -32,7 +32,7 @@ double SquaredAxis(const Eigen::ArrayXd& weights, double step_px) {
   return sum;
 }
 
-// Variance of the places of an axis, in view steps.
+// Returns the variance of the positions on an axis, in view steps.
 double SpreadOf(const Eigen::ArrayXd& weights) {
   double sum = 0;
   for (Eigen::Index k = 0; k < weights.size(); ++k) {
@@ -91,9 +91,9 @@ model::LinearPicture Interleaved(const std::vector<Real>& planes, int width_px, 
 
 template <typename Real>
 std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayXXd& weights) {
-  constexpr double kPerUnit = 32;  // of a table, per px of the larger step
+  constexpr double kPerUnit = 32;  // table entries per px of the larger step
   const double largest_step = disparity.step.cwiseAbs().maxCoeff();
-  // An aperture without blur has no steps: all views are one.
+  // An aperture without blur has no steps: all views are the same.
   const Eigen::Vector2d share = largest_step > 0
                                     ? Eigen::Vector2d(disparity.step.cwiseAbs() / largest_step)
                                     : Eigen::Vector2d::Zero();

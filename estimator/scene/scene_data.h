@@ -11,31 +11,33 @@
 
 namespace thicklens::estimator {
 
-// H and I of a photograph; weights and squared rows are still to be set. `projection` is kept by
-// reference.
+// Returns H and I of a photograph; weights and squared rows must still be set. `projection` is kept
+// by reference.
 template <typename Real>
 DataTerm<Real> DataTermOf(const SceneProjection<Real>& projection,
                           const model::LinearPicture& photograph, int threads);
 
-// Channel after channel, from interleaved pixels, and back.
+// Planar converts interleaved pixels to one plane per channel; Interleaved converts them back.
 template <typename Real>
 std::vector<Real> Planar(const model::LinearPicture& picture);
 template <typename Real>
 model::LinearPicture Interleaved(const std::vector<Real>& planes, int width_px, int height_px,
                                  int channels);
 
-// sum_j H_ij^2 of each pixel i, within a tenth: that of the fan of its own disparity on one
-// surface, linear between pixels, with the products of the sums of the weights over rows and over
-// columns for weights.
+// Returns sum_j H_ij^2 of each pixel i, within a tenth. It is the value for the fan of the pixel's
+// own disparity on one surface, linear between pixels, with the products of the sums of the weights
+// over rows and over columns as weights.
 template <typename Real>
 std::vector<Real> SquaredRows(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
 
-// W of each pixel [D102]: s^2/(1 + (20 h)^2), h the share of the aperture that sees past an edge.
+// Returns W of each pixel [D102]: s^2/(1 + (20 h)^2), h the share of the aperture that sees past an
+// edge. Without `hidden_weights` h is 0.
 template <typename Real>
 std::vector<Real> DataWeights(const std::vector<Real>& slope_squared,
                               const std::vector<float>& hidden_share, bool hidden_weights);
 
-// Standard deviation of the blur of each pixel, px: the root mean square of that of both axes.
+// Returns the standard deviation of the blur of each pixel, px: the root mean square over both
+// axes.
 std::vector<float> BlurSigmaPx(const DisparityMap& disparity, const Eigen::ArrayXXd& weights);
 
 // H r - I in stored values in some rows: the mean of the channels at each pixel (0 in other rows),

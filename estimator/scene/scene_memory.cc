@@ -16,24 +16,26 @@ namespace {
 
 constexpr double kFloat = sizeof(float);
 
-// Of a view in the making, for each pixel: its disparity and confidence; and what is hidden, where
-// a third is.
+// Memory per pixel of a view in the making: its disparity and confidence, and its hidden samples if
+// they are a third.
 constexpr double kRenderedBytes = kFloat + 1 + 8;
-// Code that is read in when it runs first, stacks, and all that is not as large as the picture.
+// Code that is loaded when it runs first, stacks, and all objects smaller than the image.
 constexpr double kSmallBytes = 8 << 20;
 
-// Of a sample of a view of the fan: what it sees, and where that is hidden or mixed.
+// Memory of a sample of a view of the fan: its disparity, and its entry where it is hidden or
+// mixed.
 constexpr double kSeenBytes = kFloat, kHiddenBytes = sizeof(CompactView::Hidden),
                  kMixedBytes = sizeof(CompactView::Mixed);
 
-// While systems are solved: which share of the rays is hidden, and which share sees what.
+// Shares that are kept while systems are solved: the hidden share of the rays, and the share that
+// sees each point.
 constexpr double kSharesBytes = 2 * kFloat;
 
-// Of a system: the data, H^T W I, the radiance, what CG holds and what H holds inside; and planes:
-// weights, slopes, diagonals, the prior. Of those with patches more planes.
+// Memory of a system. Images: the data, H^T W I, the radiance, and the vectors of CG and H. Planes:
+// weights, slopes, diagonals, the prior. Patches need more planes.
 constexpr double kSolvePictures = 12, kSolvePlanes = 7, kMorePlanes = 6;
 
-// Of all views in the making: the surfaces of the disparity.
+// Memory shared by all views in the making: the surfaces of the disparity.
 constexpr double kRendererBytes = 3;
 
 }  // namespace
@@ -59,7 +61,7 @@ double SceneMemory::MostBytes(int rows, const ProjectionBytes& projection, doubl
   double kept = all;  // the confidence of its points
   if (keeps_.photograph) kept += kFloat * all * channels_;
   if (keeps_.maps) kept += 3 * kFloat * all;
-  // Of a band: copies of its part of the input; and the rows that are done.
+  // Bands need copies of their part of the input, and the finished rows are kept.
   const double pixels = static_cast<double>(width_px_) * rows;
   double band = kFloat * pixels;
   if (rows < height_px_) {
@@ -74,8 +76,8 @@ double SceneMemory::MostBytes(int rows, const ProjectionBytes& projection, doubl
 }
 
 double SceneMemory::RowBytes() const {
-  // A ray reads two pixels of each of two rows; what the pixel's rays read in a row of the picture
-  // is held in runs.
+  // A ray reads two pixels of each of two rows. The pixels that the pixel's rays read in a row of
+  // the image are stored in runs.
   constexpr double kRun = kernels::kPixelsOfRun;
   const double around = 2.0 * reach_px_ + 1;
   const double runs = std::min(2.0 * seen_views_, around * std::ceil(around / kRun));
@@ -97,9 +99,9 @@ ProjectionBytes SceneMemory::OfRows(int rows, const ProjectionBytes& per_pixel) 
           width * (rows * per_pixel.fan + kHiddenShare * at_borders * seen_views_ * kHiddenBytes)};
 }
 
-// Beside H: the fan of all views, and of it the axes, or the places where rows are gathered and
-// the parts of H that are on their way to the others, one for each thread; the sums of each
-// thread; and which share of the aperture sees what.
+// Memory in addition to H: the fan of all views; either its axes, or each thread's place where rows
+// are gathered and the parts of H that are not joined yet; the sums of each thread; and the shares
+// of the aperture that see each point.
 double SceneMemory::SetupBytes(double pixels, const ProjectionBytes& projection,
                                Freed freed) const {
   constexpr double kShareBytes = sizeof(double) + kFloat;
@@ -111,22 +113,23 @@ double SceneMemory::SetupBytes(double pixels, const ProjectionBytes& projection,
          pixels * (kShareBytes + kFloat + kRendererBytes + std::max(axes, threads_ * real_));
 }
 
-// Beside H, while systems are solved. A device has the same again, and its programs.
+// Memory in addition to H while systems are solved. A device needs the same again, and its
+// programs.
 double SceneMemory::SolveBytes(double pixels) const {
   if (patches_) return std::max(PatchesBytes(pixels), ReliefBytes(pixels));
   return PlaneBytes(pixels, kSolvePictures * channels_ + kSolvePlanes);
 }
 
-// The last of the systems: in addition the target, here and in the system, the shading of the
-// relief, and the photograph without it; and the strengths, weights in double, and what of the data
-// goes with that photograph.
+// The last system needs in addition the target, here and in the system, the shading of the relief,
+// and the photograph without it. It also needs the strengths, weights in double, and the part of
+// the data that belongs to that photograph.
 double SceneMemory::PatchesBytes(double pixels) const {
   return PlaneBytes(pixels, (kSolvePictures + 4) * channels_ + kSolvePlanes + kMorePlanes);
 }
 
-// The system of the relief's normals: these in place of colours, and as they are; photograph and
-// radiance; what is smooth, and the prior and weights, which are here twice. Then, without it, the
-// fit of the shading.
+// The system of the relief's normals has them in place of colours, and as they are. It also has
+// photograph and radiance, the smooth pixels, and the prior and weights, which exist twice here.
+// Afterwards, without the system, the shading is fitted.
 double SceneMemory::ReliefBytes(double pixels) const {
   const double system = PlaneBytes(
       pixels, (kSolvePictures + 1) * kNormals + 2 * channels_ + kSolvePlanes + kMorePlanes);
@@ -152,8 +155,8 @@ double SceneMemory::ViewsBytes() const {
   const int at_once = std::min(threads_, u_count_ * v_count_);
   double bytes = all * (view + all_views + at_once * (view + kRenderedBytes));
   bytes += at_once * keeps_.sink_bytes;
-  // On the device: the picture, its disparity and ranges; and of each view in the making the
-  // values, the disparity and what is hidden, where a third is.
+  // A device holds the image, its disparity and ranges, and for each view in the making the values,
+  // the disparity and the hidden samples if they are a third.
   if (keeps_.device) bytes += all * (view + 3 * kFloat + at_once * (view + 3 * kFloat));
   if (keeps_.light_field) {
     const double ray = view + (keeps_.maps ? 1 : 0);

@@ -5,42 +5,45 @@
 
 namespace thicklens::estimator {
 
-// Bytes of H; and of the rays of the aperture from which it is made, which are then no longer.
+// Bytes of H, and of the aperture's rays from which H is made, which are freed afterwards.
 struct ProjectionBytes {
   double held = 0;
   double fan = 0;
 };
 
-// The most that the whole process is expected to hold while a scene is estimated, bytes: what it
-// holds already, and what the estimate keeps from its beginning to its end, and the largest of what
-// it needs to set a band of the picture up, to solve it, and to make the views.
+// Predicts the maximum memory of the whole process while a scene is estimated, bytes. It is the sum
+// of the memory in use before, the memory that the estimate keeps from its beginning to its end,
+// and the largest of the needs of three steps: setting up a band of the image, solving it, and
+// making the views.
 class SceneMemory {
  public:
   struct Keeps {
-    bool photograph = false;   // one without fall-off, beside the input's
+    bool photograph = false;   // one without fall-off, in addition to the input's
     bool maps = false;         // SceneMaps
     bool light_field = false;  // all views
-    double sink_bytes = 0;     // that a sink holds for each view it is given
+    double sink_bytes = 0;     // memory that a sink holds for each view that it receives
     bool device = false;       // OpenCL, whose memory may be the machine's
   };
-  // To be made before the estimate begins. `reach_px`: how many rows the fan of a pixel reaches up
-  // and down.
+  // Must be constructed before the estimate begins. `reach_px`: number of rows that the fan of a
+  // pixel reaches up and down.
   SceneMemory(const EstimateInput& input, const SceneOptions& options, const Keeps& keeps,
               int reach_px);
 
-  // In bands of at most so many rows, of which H takes so much; and views of the fan are kept, from
-  // when H is made to when they are shown, that take so much. What is freed while H is made goes
-  // back to the system, or stays for what is asked for next (ReturnFreedMemory).
+  // Returns the maximum for bands of at most `rows` rows, with `projection` as the memory of H.
+  // `kept_fan_bytes` are the views of the fan that are kept from the making of H until they are
+  // shown. Memory that is freed while H is made is returned to the system or stays for later
+  // requests (ReturnFreedMemory).
   enum class Freed { kReturned, kStays };
   double MostBytes(int rows, const ProjectionBytes& projection, double kept_fan_bytes = 0,
                    Freed freed = Freed::kReturned) const;
-  // What H of a band takes if each pixel takes so much where the picture does not end.
+  // Returns the memory of H of a band if `per_pixel` is the memory per pixel far from the image's
+  // borders.
   ProjectionBytes OfRows(int rows, const ProjectionBytes& per_pixel) const;
-  // More than any pixel takes.
+  // Returns an upper bound for any pixel.
   ProjectionBytes LargestPerPixel() const;
 
  private:
-  double RowBytes() const;  // of a pixel that has a row of its own
+  double RowBytes() const;  // memory of a pixel that has a row of its own
   double SetupBytes(double pixels, const ProjectionBytes& projection, Freed freed) const;
   double SolveBytes(double pixels) const;
   double PatchesBytes(double pixels) const;

@@ -14,17 +14,17 @@
 namespace thicklens::estimator {
 namespace {
 
-// Chosen on rendered and simulated scenes with noise of .3 to 3 grey levels.
+// These values were chosen on rendered and simulated scenes with noise of 0.3 to 3 grey levels.
 constexpr double kLeastVariation = 0.5;
 constexpr double kExplained = 0.7;  // sigma_p/sigma of a photograph that H explains
 constexpr int kAroundPx = 4;
-// Of a noise of one grey level; both grow with the noise.
+// Values for a noise of one grey level; both grow with the noise.
 constexpr double kThreshold = 8.1;  // grey levels
 constexpr double kPull = 0.15;
 constexpr double kThresholdPower = 0.6;
 constexpr double kPullPower = 2 * (1 - kThresholdPower);  // as (noise/threshold)^2
 
-// s G, the shading in stored values; 0 where there is none.
+// s G, the shading in stored values; 0 where there is no shading.
 template <typename Real>
 class StoredShading {
  public:
@@ -40,7 +40,7 @@ class StoredShading {
   const std::vector<Real>& slope_squared_;
 };
 
-// v of a radiance.
+// Returns v of a radiance.
 template <typename Real>
 std::vector<Real> Filtered(const PatchPrior& prior, const DataTerm<Real>& data,
                            const std::vector<Real>& radiance, const StoredShading<Real>& shading) {
@@ -95,7 +95,7 @@ std::vector<Real> LocalVariation(const DataTerm<Real>& data, const std::vector<R
 
 namespace {
 
-// The steps of one solution, those of the radiance with what iterations are left.
+// The steps of one solution. The systems of the radiance share one limit of iterations.
 template <typename Real>
 class PatchRun {
  public:
@@ -117,8 +117,9 @@ class PatchRun {
     Count(outcome.iterations);
   }
 
-  // G, and r becomes r - G as the photograph has it: where u starts. Empty, and r as it was, if
-  // what the photograph has of the relief is not found within the limit of iterations.
+  // Returns G and subtracts from r the part of it that the photograph contains; this is the start
+  // of u. Returns an empty vector and leaves r unchanged if that part is not found within the limit
+  // of iterations.
   std::vector<Real> TakeShading(std::vector<Real>* radiance) {
     const Relief<Real> relief = ReliefOf<Real>(*prior_.disparity, prior_.relief_slope);
     std::vector<Real> estimated = relief.normals;
@@ -129,7 +130,7 @@ class PatchRun {
     return std::move(shading.sharp);
   }
 
-  // The last: r near v. `radiance` and the data are without the shading.
+  // The last step: r near v. `radiance` and the data are without the shading.
   void SolveNearFiltered(const DataTerm<Real>& data, const std::vector<Real>& shading,
                          SceneSystem<Real>* system, std::vector<Real>* radiance) {
     QuadraticPrior<Real> near_filtered;
@@ -155,9 +156,9 @@ class PatchRun {
   }
 
  private:
-  // Of sharp planes, which become what the quadratic that touches the total variation at `radiance`
-  // makes of a photograph of them. Not of what iterations are left to r: it must not end early
-  // because of these. False: not converged.
+  // Replaces sharp planes by the estimate from a photograph of them, made with the quadratic that
+  // touches the total variation at `radiance`. Its iterations do not count against the limit of r,
+  // which must not end early because of them. Returns false if it does not converge.
   bool Estimate(const std::vector<Real>& radiance, std::vector<Real>* planes) {
     DataTerm<Real> of_planes = data_;
     of_planes.channels = static_cast<int>(planes->size() / data_.pixels());
@@ -212,7 +213,7 @@ RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& 
   }
   const DataTerm<Real>& rest = without_shading ? *without_shading : data;
   if (!system) system = std::make_unique<SceneSystem<Real>>(rest, backend);
-  // Of the slopes the square: f s |dr| for s |dr|.
+  // The factor applies to the square of the slopes: f s |dr| replaces s |dr|.
   std::vector<Real> slopes = LocalVariation(rest, slope_squared, *radiance, prior.noise_sigma);
   for (std::size_t i = 0; i < slopes.size(); ++i) slopes[i] *= slopes[i] * slope_squared[i];
   run.SolveVariation(rest, slopes, system.get(), radiance);

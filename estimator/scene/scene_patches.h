@@ -15,24 +15,26 @@ struct PatchPrior {
   double noise_sigma = 0;  // of the photograph's stored values
   model::TransferCurve transfer;
   const DisparityMap* disparity = nullptr;  // of the data's pixels
-  double relief_slope = 0;                  // c of ReliefOf; the relief counts for nothing below
-                                            // kLeastReliefSlope
+  double relief_slope = 0;  // c of ReliefOf; below kLeastReliefSlope the relief is ignored
 };
 
-// From `radiance` to that of Prior::kPatches [D107]:
-//   1. r of total variation of strength lambda;
-//   2. G, the shading of the relief (see FitShading), from r and from what the quadratic that
-//      touches that prior at r makes of a photograph of the relief's normals. From here on u = r -
-//      G is solved for, of which I - H G is the photograph. Where that estimate is not done within
-//      the limit of iterations, which it has for itself, there is no G;
-//   3. u of total variation of strength f lambda, f = (sigma_p/(.7 sigma))^1.5/2, but between 1/2
-//      and 1: sigma_p is the rms of s (H r - I) within 4 px of p. Where H explains the photograph
-//      less of it is needed, as the patches do the rest; where it does not, at hidden things, all;
-//   4. v, of which stored values are s G + FilterPatches of those of r less s G, its threshold
-//      8.1/255 (255 sigma)^.6, and r that minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
-//      rho = .15 (255 sigma)^.8: half-quadratic splitting (Zoran and Weiss 2011) [L14] cut short.
-// `system`: of the data, whose backend is `backend`; is used up. The iterations are those of all
-// systems together, the residual is that of the last, in u.
+// Solves, from `radiance` on, for the radiance of Prior::kPatches [D107]:
+//
+//   1. r is solved for with total variation of strength lambda.
+//   2. G is the shading of the relief (see FitShading), from r and from the estimate of the
+//      relief's normals from a photograph of them, made with the quadratic that touches that prior
+//      at r. From here on u = r - G is solved for, whose photograph is I - H G. If that estimate
+//      does not converge within the limit of iterations, which it has for itself, there is no G.
+//   3. u is solved for with total variation of strength f lambda, where
+//      f = (sigma_p/(0.7 sigma))^1.5/2, but between 1/2 and 1, and sigma_p is the rms of
+//      s (H r - I) within 4 px of p. Where H explains the photograph, less variation is needed,
+//      because the patches do the rest; where it does not, at hidden points, all is needed.
+//   4. v has the stored values s G + FilterPatches of (those of r less s G), with the threshold
+//      8.1/255 (255 sigma)^0.6. r then minimises sum_x W |H r - I|^2 + rho sum s^2 |r - v|^2,
+//      rho = 0.15 (255 sigma)^0.8: half-quadratic splitting (Zoran and Weiss 2011) [L14] cut short.
+//
+// `system`, which belongs to the data and uses `backend`, is consumed. The iterations of the
+// outcome are those of all systems together; the residual is that of the last, in u.
 template <typename Real>
 RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& data,
                                  const std::vector<Real>& slope_squared,
@@ -40,7 +42,7 @@ RadianceOutcome SolveWithPatches(const PatchPrior& prior, const DataTerm<Real>& 
                                  std::unique_ptr<SceneSystem<Real>> system,
                                  kernels::Backend* backend, std::vector<Real>* radiance);
 
-// f of each pixel for a radiance.
+// Returns f of each pixel for a radiance.
 template <typename Real>
 std::vector<Real> LocalVariation(const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
                                  const std::vector<Real>& radiance, double noise_sigma);

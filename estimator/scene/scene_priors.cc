@@ -9,7 +9,7 @@ namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Sum over the channels of the squared forward differences at each pixel of a row.
+// Sets the sum over the channels of the squared forward differences at each pixel of a row.
 template <typename Real>
 void SquaredDifferences(const DataTerm<Real>& data, const std::vector<Real>& picture, int y,
                         std::vector<Real>* squares) {
@@ -30,8 +30,8 @@ void SquaredDifferences(const DataTerm<Real>& data, const std::vector<Real>& pic
   }
 }
 
-// Sum over the pixels of the rows [first, last) of s^2 |grad I|^2, channels and both differences
-// added.
+// Returns the sum over the pixels of the rows [first, last) of s^2 |grad I|^2, channels and both
+// differences added.
 template <typename Real>
 double SumSquaredGradient(const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
                           int first, int last) {
@@ -50,14 +50,14 @@ double SumSquaredGradient(const DataTerm<Real>& data, const std::vector<Real>& s
   return sums[0];
 }
 
-// The mean over all pixels.
+// Returns the mean over all pixels.
 template <typename Real>
 double MeanSquaredGradient(const DataTerm<Real>& data, const std::vector<Real>& slope_squared) {
   return SumSquaredGradient(data, slope_squared, 0, data.height_px) /
          static_cast<double>(data.pixels());
 }
 
-// Sum over the pixels of the rows and channels of s^2 |I - H I|^2.
+// Returns the sum over the pixels of the rows and channels of s^2 |I - H I|^2.
 template <typename Real>
 double SumSquaredBlurLoss(const DataTerm<Real>& data, const std::vector<Real>& slope_squared,
                           int first, int last) {
@@ -76,11 +76,11 @@ double SumSquaredBlurLoss(const DataTerm<Real>& data, const std::vector<Real>& s
   return sum;
 }
 
-// How much larger the sharp scene's variance is than what the photograph shows of it, inverted:
-// within 2 of the best on rendered and simulated scenes with noise of .3/255 to 4/255.
+// The inverse of the ratio of the sharp scene's variance to the variance that the photograph shows:
+// within a factor of 2 of the best on rendered and simulated scenes with noise of 0.3/255 to 4/255.
 constexpr double kRidgeShare = 0.2;
 constexpr double kGradientShare = 0.125;
-// Of the noise: less than that of signal is not told from it.
+// Minimum signal relative to the noise: a smaller signal cannot be distinguished from noise.
 constexpr double kLeastSignal = 0.25;
 
 }  // namespace
@@ -166,8 +166,8 @@ QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
 
 namespace {
 
-// Of total variation: with weights that are the same everywhere, which bring the blurred parts of
-// the photograph near to what they will be.
+// First iterations of total variation with equal weights everywhere, which bring the blurred parts
+// of the photograph close to their final values.
 constexpr int kStartIterations = 4;
 
 }  // namespace
@@ -182,7 +182,7 @@ RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>
   cg.max_iterations = limits.max_iterations;
   cg.on_iteration = limits.on_iteration;
   if (prior == Prior::kTotalVariation) {
-    // One weight everywhere: that of the photograph's own variation.
+    // The weight that is used everywhere is that of the photograph's own variation.
     const double eta =
         strength /
         (2 * std::sqrt(MeanSquaredGradient(data, slope_squared) + kVariationEps * kVariationEps));

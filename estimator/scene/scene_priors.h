@@ -9,26 +9,30 @@
 
 namespace thicklens::estimator {
 
-// The smallest pull toward 0, which leaves no direction undetermined where nothing is known.
+// The smallest pull toward 0; it leaves no direction undetermined where the data contain no
+// information.
 constexpr double kLeastPull = 1e-6;
-// Of total variation, in stored values: below it differences count as squares.
+// Parameter of total variation, in stored values: differences below it count as squares.
 constexpr double kVariationEps = 0.004;
 
-// The strength of a prior for a photograph with noise of that standard deviation in stored values.
-// A quadratic prior is to the data term as the variance of the noise is to that of what the prior
-// speaks of (derived here, [D104], from the most probable r of normal noise and a normal prior):
+// Returns the strength of a prior for a photograph with noise of standard deviation `sigma` in
+// stored values. The ratio of a quadratic prior to the data term is that of the variance of the
+// noise to the variance of the quantity in the prior (derived here, [D104], from the most probable
+// r of normal noise and a normal prior):
+//
 //   mu = sigma^2/var(s (r - I)), eta = sigma^2/var(s grad r),
-// where the variances come from those of s (I - H I) and s grad I, less their noise. So a picture
-// with little blur gets a strong ridge. That of total variation is an empirical law,
-// 1e-3 (255 sigma)^1.5: twice as much or half of it costs .2 dB. That of patches is that of their
-// total variation.
+//
+// where the variances come from those of s (I - H I) and s grad I, less their noise. So an image
+// with little blur gets a strong ridge. The strength of total variation is an empirical law, 1e-3
+// (255 sigma)^1.5: twice or half of it costs 0.2 dB. The strength of patches is that of their total
+// variation.
 template <typename Real>
 double StrengthForNoise(Prior prior, double sigma, const DataTerm<Real>& data,
                         const std::vector<Real>& slope_squared);
 
-// The same in two steps, for a photograph of which only parts are looked at: squares of what the
-// prior speaks of, s (I - H I) or s grad I, in some of the photograph's rows, and how many they
-// are; total variation needs none.
+// Splits StrengthForNoise in two steps, for a photograph of which only parts are read. SignalSum
+// holds the sum of squares of the quantity in the prior, s (I - H I) or s grad I, over some of the
+// photograph's rows, and their count; total variation needs none.
 struct SignalSum {
   double squares = 0, count = 0;
 };
@@ -42,10 +46,11 @@ template <typename Real>
 QuadraticPrior<Real> RidgePrior(const std::vector<Real>& slope_squared, double mu);
 template <typename Real>
 QuadraticPrior<Real> GradientPrior(const std::vector<Real>& slope_squared, double eta);
-// [D103] lambda sum (g + eps^2)^(1/2) + kLeastPull |r|^2, g = sum s^2 |dr|^2. Refers to the slopes.
+// [D103] Returns lambda sum (g + eps^2)^(1/2) + kLeastPull |r|^2, g = sum s^2 |dr|^2. The slopes
+// are kept by reference.
 template <typename Real>
 kernels::TotalVariation<Real> VariationPrior(const std::vector<Real>& slope_squared, double lambda);
-// The quadratic that touches it at a radiance, all channels of the data.
+// Returns the quadratic that touches VariationPrior at a radiance of all channels of the data.
 template <typename Real>
 QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
                                    const std::vector<Real>& slope_squared, double lambda,
@@ -59,11 +64,11 @@ struct RadianceLimits {
 struct RadianceOutcome {
   int iterations = 0;
   int reweightings = 0;
-  bool converged = false;  // of the last system, by its residual computed anew
+  bool converged = false;  // whether the last system converged, by its residual recomputed
   double relative_residual = 0;
 };
-// From `radiance` to the minimiser of data term and prior; not for patches (scene_patches.h). The
-// system keeps the last quadratic.
+// Solves, from `radiance` on, for the minimiser of data term and prior; not for patches
+// (scene_patches.h). The system keeps the last quadratic.
 template <typename Real>
 RadianceOutcome SolveRadiance(Prior prior, double strength, const DataTerm<Real>& data,
                               const std::vector<Real>& slope_squared, const RadianceLimits& limits,

@@ -16,15 +16,15 @@
 namespace thicklens::estimator {
 namespace {
 
-// A picture starts from the estimate at half its size, unless that is smaller than this.
+// An image starts from the estimate at half its size unless it is smaller than this.
 constexpr int kLeastCoarsePx = 128;
-// Of that estimate, the tolerance over that at full size: what is left to the full size costs four
-// times as much there.
+// Tolerance of that estimate relative to that at full size: work that is left to the full size
+// costs four times as much there.
 constexpr double kCoarseTolerance = 0.3;
 constexpr int kCoarseIterations = 80;
 
-// The strength that stands for the same at half the size, where the data have a quarter of the
-// pixels and differences are twice as large.
+// Returns the equivalent strength at half the size, where the data have a quarter of the pixels and
+// differences are twice as large.
 double CoarseStrength(Prior prior, double strength) {
   switch (prior) {
     case Prior::kRidge:
@@ -41,7 +41,8 @@ double CoarseStrength(Prior prior, double strength) {
 // Patches begin with total variation.
 Prior SolvedFirst(Prior prior) { return prior == Prior::kPatches ? Prior::kTotalVariation : prior; }
 
-// Of the Gaussian over which the intensity is smoothed that says the slope of the transfer curve.
+// Standard deviation of the Gaussian that smooths the intensity for the slope of the transfer
+// curve.
 constexpr double kSlopeSmoothingPx = 2;
 
 }  // namespace
@@ -161,7 +162,7 @@ model::LinearPicture SceneRadiance<Real>::Solve(SceneSummary* summary) {
   summary->reweightings = outcome.reweightings;
   summary->converged = outcome.converged;
   summary->relative_residual = outcome.relative_residual;
-  system.reset();  // makes room
+  system.reset();  // frees its memory
   residual_ = StoredResidualOf(data_, radiance, run_.input.transfer, first_row(), last_row());
   summary->residual_rms = residual_.rms;
   FillShares(summary);
@@ -195,7 +196,8 @@ void SceneRadiance<Real>::AddRows(const std::vector<float>& plane, std::vector<f
              plane.begin() + static_cast<std::ptrdiff_t>(PixelOfRow(last_row())));
 }
 
-// s^2. Without slope weights that of the whole picture, so that strengths keep their unit.
+// Returns s^2. Without slope weights it is that of the whole image, so that strengths keep their
+// unit.
 template <typename Real>
 std::vector<Real> SceneRadiance<Real>::SlopeSquared(const model::LinearPicture& photograph) const {
   if (!run_.options.slope_weights) {

@@ -16,12 +16,13 @@
 
 namespace thicklens::estimator {
 
-// What is assumed of the noise where the photograph does not tell it, in stored values.
+// Noise that is assumed where it cannot be measured in the photograph, in stored values.
 constexpr double kUsualNoise = 1.0 / 255;
-// Of a noiseless photograph: no model of its rays is better than the rounding of 8 bits.
+// Minimum noise, used for a noiseless photograph: no model of its rays is better than the rounding
+// of 8 bits.
 constexpr double kLeastNoise = 0.29 / 255;
 
-// Of the transfer curve at the smoothed intensity.
+// Returns the mean slope of the transfer curve at the smoothed intensity.
 double MeanSlope(const model::LinearPicture& photograph, const model::TransferCurve& transfer,
                  const std::vector<SceneBand>& bands);
 
@@ -29,7 +30,7 @@ double MeanSlope(const model::LinearPicture& photograph, const model::TransferCu
 template <typename Real>
 class SceneRadiance {
  public:
-  // What all bands have in common, kept by reference.
+  // Data that all bands share, kept by reference.
   struct Run {
     const EstimateInput& input;
     const SceneOptions& options;
@@ -38,37 +39,37 @@ class SceneRadiance {
     double noise_sigma = 0;   // of stored values
     double relief_slope = 0;  // of the whole depth; for patches
     double mean_slope = 0;    // over the whole photograph; for options without slope weights
-    int last_iteration = 0;   // for the progress: of this band and those before it
+    int last_iteration = 0;   // value of the progress after this band
     IterationProgress* progress = nullptr;
-    bool confidence = false;  // is asked for
-    bool fan = false;         // is to be kept
+    bool confidence = false;  // true: AddConfidence is used
+    bool fan = false;         // true: the fan is kept
   };
   explicit SceneRadiance(const Run& run) : run_(run) {}
 
-  // Where the iteration starts: the estimate at half the size, but of small pictures. Before
-  // Prepare, so that H of both sizes is never held at once; without it the photograph is the start.
-  // Returns the seconds that it took without those for H.
+  // Finds the start of the iteration: the estimate at half the size, unless the image is small. It
+  // must be called before Prepare, so that H of both sizes is never held at once; if it is not
+  // called, the photograph is the start. Returns the seconds that it took without those for H.
   double FindStart(const model::LinearPicture& photograph, const DisparityMap& disparity);
-  // H, I and the weights, from the rows of the band: the photograph without fall-off, and the
-  // disparity of its pixels, which must live as long.
+  // Makes H, I and the weights from the rows of the band: the photograph without fall-off, and the
+  // disparity of its pixels, which must outlive this object.
   void Prepare(const model::LinearPicture& photograph, const DisparityMap& disparity,
                const SceneBand& band);
-  // Of all rows that are solved for; and about those of the band's result alone.
+  // Memory of H for all rows that are solved for, and approximately for the band's result alone.
   ProjectionBytes projection_bytes() const { return BytesOfRows(0, projection_.height_px); }
   ProjectionBytes result_projection_bytes() const { return BytesOfRows(first_row(), last_row()); }
   SignalSum Signal() const;
 
-  // The views of the photograph's rays, if they were to be kept; they are no longer after it.
+  // Returns the views of the photograph's rays, if they were kept, and removes them here.
   ViewFan TakeFan() { return std::exchange(projection_.fan, {}); }
 
-  // Sets what the summary tells of the solution, and of the band's result.
+  // Sets the members of the summary that describe the solution and the band's result.
   model::LinearPicture Solve(SceneSummary* summary);
-  // Adds the rows of the band's result to those of the bands above.
+  // Appends the rows of the band's result to those of the bands above.
   void AddMaps(SceneMaps* maps) const;
-  void AddConfidence(std::vector<Confidence>* of_points) const;  // where it was asked for
+  void AddConfidence(std::vector<Confidence>* of_points) const;  // only if requested
 
  private:
-  // The band's result in the rows that are solved for.
+  // Position of the band's result in the rows that are solved for.
   int first_row() const { return band_.first - band_.from; }
   int last_row() const { return band_.last - band_.from; }
   ProjectionBytes BytesOfRows(int first, int last) const;

@@ -14,14 +14,14 @@
 namespace thicklens::estimator {
 namespace {
 
-// Chosen on one rendered scene, and held by others (tests).
-constexpr double kSteepest = 0.15;  // px per view step and px: more is a jump
+// These values were chosen on one rendered scene and are confirmed by others (tests).
+constexpr double kSteepest = 0.15;  // px per view step and px: a larger slope is a jump
 constexpr double kShallow = 0.02;
 constexpr double kSlopeSmoothingPx = 0.5, kNormalSmoothingPx = 0.7;
 constexpr int kWindowReachPx = 10;
 constexpr double kFinestPx = 2;
 constexpr double kRegularisation = 2.5e-4;
-constexpr double kDoubt = 4;  // of what is not explained
+constexpr double kDoubt = 4;  // factor of the unexplained share
 
 constexpr int kStripRows = 64;
 
@@ -39,7 +39,7 @@ cv::Mat Blurred(const cv::Mat& from, double sigma_px) {
   return to;
 }
 
-// The slopes at a pixel; beside the border that to the only neighbour.
+// The slopes at a pixel; at the border the slope is the difference to the only neighbour.
 struct Slope {
   float x = 0, y = 0;
   bool is_jump = false;
@@ -76,7 +76,7 @@ class Slopes {
   const float step_;
 };
 
-// Means over windows of what is smooth, of a strip.
+// Means over windows of the smooth pixels of a strip.
 class WindowMeans {
  public:
   explicit WindowMeans(const cv::Mat& is_smooth) : is_smooth_(is_smooth) {
@@ -92,7 +92,7 @@ class WindowMeans {
   cv::Mat Covariance(const cv::Mat& a, const cv::Mat& b) const {
     return Of(a.mul(b)) - Of(a).mul(Of(b));
   }
-  // Without all that is coarser than the finest.
+  // Removes all detail that is coarser than the finest.
   cv::Mat Finest(const cv::Mat& values) const {
     cv::Mat coarse = Blurred(values.mul(is_smooth_), kFinestPx);
     cv::divide(coarse, near_, coarse);
@@ -102,7 +102,7 @@ class WindowMeans {
   static constexpr int ReachPx() { return 2 * kWindowReachPx + static_cast<int>(3 * kFinestPx); }
 
  private:
-  static constexpr double kNone = 1e-4;  // of a window without anything smooth
+  static constexpr double kNone = 1e-4;  // for a window without smooth pixels
 
   static cv::Mat Box(const cv::Mat& values) {
     constexpr int kSize = 2 * kWindowReachPx + 1;
@@ -117,7 +117,7 @@ class WindowMeans {
 
 using PerNormal = std::array<cv::Mat, kNormals>;
 
-// a of one colour after the other, of a strip.
+// Returns a of one colour after the other, for a strip.
 template <typename Real>
 std::vector<PerNormal> Coefficients(const WindowMeans& means, const PerNormal& estimated,
                                     const std::vector<cv::Mat>& colours) {
@@ -144,7 +144,7 @@ std::vector<PerNormal> Coefficients(const WindowMeans& means, const PerNormal& e
   for (int y = 0; y < first.rows; ++y) {
     ThrowIfCancelled();
     for (int x = 0; x < first.cols; ++x) {
-      Eigen::Matrix3d normal;  // of which the Cholesky factor reads the lower half
+      Eigen::Matrix3d normal;  // the Cholesky factor reads its lower half
       for (std::size_t k = 0; k < kNormals; ++k) {
         const auto row = static_cast<Eigen::Index>(k);
         for (std::size_t l = 0; l <= k; ++l) {
@@ -295,9 +295,9 @@ THICKLENS_RELIEF(double)
 #undef THICKLENS_RELIEF
 
 double ShadingBytes(int width_px, int rows, int channels, int threads, double real_bytes) {
-  // The normals, as they are and as estimated, and the finest of these; their covariances, and with
-  // colours, which become the coefficients; the colours, and the finest of them; what is smooth,
-  // near and around; and means in the making.
+  // The sum covers the normals, as they are and as estimated, and the finest detail of the
+  // estimated ones; their covariances, and those with colours, which become the coefficients; the
+  // colours and their finest detail; the smooth pixels, near and around; and means in the making.
   const double planes = 3.0 * kNormals + 6 + channels * (kNormals + 2.0) + 3 + 6;
   const int strips = (rows + kStripRows - 1) / kStripRows;
   const int rows_of_strip = std::min(rows, kStripRows + 2 * WindowMeans::ReachPx());

@@ -21,7 +21,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of conjugate gradients, for the progress only.
+// Number of conjugate-gradient iterations, for the progress only.
 int UsualIterations(Prior prior) { return prior == Prior::kPatches ? 120 : 60; }
 
 std::string MessageOf(const SceneOptions& options, const SceneSummary& summary, bool noise_known) {
@@ -52,7 +52,7 @@ void FillOrigin(const SceneOptions& options, const SceneSummary& summary, bool f
   if (falloff) origin->effects.emplace_back("falloff");
 }
 
-// Without a sink the light field has its views, else not.
+// The returned light field has its views only without a sink.
 template <typename Real>
 model::LightField EstimateIn(const EstimateInput& input, const SceneOptions& options,
                              const SceneViewSink* sink, kernels::Backend* backend,

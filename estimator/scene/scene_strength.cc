@@ -13,10 +13,10 @@ namespace {
 
 constexpr unsigned kProbeSeed = 1;
 constexpr double kProbeTolerance = 1e-2;  // its error is far below that of one probe
-// Against too weak a prior, which plain cross-validation (a factor of 1) is prone to: Kim and Gu
-// 2004.
+// This factor counters too weak a prior, to which plain cross-validation (a factor of 1) is prone:
+// Kim and Gu 2004.
 constexpr double kTraceFactor = 1.4;
-constexpr int kFarthestStep = 6;  // of factors of 2 from the start
+constexpr int kFarthestStep = 6;  // in factors of 2 from the start
 
 template <typename Real>
 std::vector<Real> Probe(std::size_t count) {

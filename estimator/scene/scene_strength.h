@@ -7,31 +7,34 @@
 
 namespace thicklens::estimator {
 
-// Generalised cross-validation (Golub, Heath, Wahba 1979) [L12]:
+// Returns the score V of generalised cross-validation (Golub, Heath, Wahba 1979) [L12]:
+//
 //   V = (|W^(1/2) (H r - I)|^2/n) / (1 - 1.4 tr(B)/n)^2,
-// B the matrix from W^(1/2) I to W^(1/2) H r. The factor 1.4 (Kim and Gu 2004) keeps it from too
-// weak a prior; where it leaves less than nothing, V is infinite. Up to a constant V estimates the
-// error of H r, noise left out. Of the mean misfit and the mean of the trace:
+//
+// where B is the matrix from W^(1/2) I to W^(1/2) H r. The factor 1.4 (Kim and Gu 2004) prevents
+// too weak a prior; where the bracket of the denominator is not positive, V is infinite. Up to a
+// constant V estimates the error of H r without the noise. `misfit` and `trace` are means per
+// value.
 double ValidationScore(double misfit, double trace);
 
-// The trace of that B by one seeded probe of +-1 (Hutchinson), on one channel for all: what each
-// pixel has in it. Of the system whose prior is set.
+// Estimates the trace of that B by one seeded probe of +-1 (Hutchinson), on one channel for all.
+// Returns the part of each pixel. The prior of the system must be set.
 template <typename Real>
 std::vector<Real> ProbedTrace(const DataTerm<Real>& data, const RadianceLimits& limits,
                               SceneSystem<Real>* system, int* iterations);
 
-// V of a radiance that solves the system.
+// Returns V of a radiance that solves the system.
 template <typename Real>
 double CrossValidation(const DataTerm<Real>& data, const std::vector<Real>& radiance,
                        const RadianceLimits& limits, SceneSystem<Real>* system, int* iterations);
 
 struct StrengthSearch {
   double strength = 0;
-  int iterations = 0;  // of all systems
+  int iterations = 0;  // iterations of all systems
 };
-// The strength of the smallest V: from `start` down the slope by factors of 2, then the vertex of
-// the parabola (in the logarithm) of the three lowest. `radiance` is where the solves start and is
-// left at one of them.
+// Returns the strength of the smallest V: it descends from `start` by factors of 2 and takes the
+// vertex of the parabola (in the logarithm) of the three lowest. `radiance` is the start of the
+// solves and receives one of their solutions.
 template <typename Real>
 StrengthSearch SearchStrength(Prior prior, double start, const DataTerm<Real>& data,
                               const std::vector<Real>& slope_squared, const RadianceLimits& limits,

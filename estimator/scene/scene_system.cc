@@ -68,7 +68,7 @@ CgOutcome SceneSystem<Real>::Iterate(const CgLimits& limits, const Renew& renew)
     before = sums.preconditioned;
     const double steepness = steps_->Turn(beta);
     const double curvature = steps_->Curvature();
-    if (!(curvature > 0)) {  // rounding has eaten the direction: this system is solved
+    if (!(curvature > 0)) {  // rounding has removed the direction: this system is solved
       if (may_converge) break;
       continue;
     }
@@ -88,7 +88,7 @@ template <typename Real>
 CgOutcome SceneSystem<Real>::SolveRenewed(const CgLimits& limits, const Renew& renew,
                                           std::vector<Real>* x) {
   steps_->Start(*x);
-  *x = {};  // which the steps have now
+  *x = {};  // the steps hold the values now
   const CgOutcome outcome = Iterate(limits, renew);
   *x = steps_->Radiance();
   return outcome;

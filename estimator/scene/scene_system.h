@@ -25,38 +25,38 @@ struct CgOutcome {
   bool converged = false;  // by the recurrence
 };
 
-// [D106] (H^T W H + P) r = b, P the matrix of the prior: the normal equations of data term and
-// prior, with b = H^T W I + pull target. Solved by conjugate gradients with the diagonal as
-// preconditioner, vectors in Real, sums in double; all channels together (one polynomial of A for
-// all). The steps are done where the backend is. The result does not depend on the number of
-// threads.
+// [D106] (H^T W H + P) r = b, where P is the matrix of the prior: the normal equations of data term
+// and prior, with b = H^T W I + pull target. They are solved by conjugate gradients with the
+// diagonal as preconditioner, vectors in Real, sums in double, all channels together (one
+// polynomial of A for all). The steps are computed on the backend. The result does not depend on
+// the number of threads.
 template <typename Real>
 class SceneSystem {
  public:
-  // `data` is kept by reference. No backend: C++ on the processor.
+  // `data` is kept by reference. Without a backend the steps run in C++ on the processor.
   explicit SceneSystem(const DataTerm<Real>& data, kernels::Backend* backend = nullptr);
 
   void SetPrior(const QuadraticPrior<Real>& prior);
-  // Of a prior that is not quadratic, which TouchVariation needs.
+  // Sets the prior that is not quadratic, which TouchVariation needs.
   void SetVariation(const kernels::TotalVariation<Real>& variation);
-  // The prior is from now on the quadratic that touches that one from above, at the radiance to
-  // which the last iteration led.
+  // Replaces the prior by the quadratic that touches the variation from above, at the radiance of
+  // the last iteration.
   void TouchVariation();
 
-  // From x to the solution.
+  // Solves the system, starting from x.
   CgOutcome Solve(const CgLimits& limits, std::vector<Real>* x);
-  // The same where the prior is one that touches another: `renew` sets it before every iteration
-  // and says whether it is the one to converge with; and the directions are those of nonlinear
-  // conjugate gradients (Polak and Ribiere's, not below 0).
+  // Solves with a prior that touches another: `renew` sets it before every iteration and returns
+  // whether it is the one to converge with. The directions are those of nonlinear conjugate
+  // gradients (Polak and Ribiere's, not below 0).
   using Renew = std::function<bool()>;
   CgOutcome SolveRenewed(const CgLimits& limits, const Renew& renew, std::vector<Real>* x);
-  // The same for a photograph of which W^(1/2) I is `whitened`, one plane, from 0.
+  // Solves, from 0, for a photograph whose W^(1/2) I is `whitened`, one plane.
   CgOutcome SolveWhitened(const std::vector<Real>& whitened, const CgLimits& limits,
                           std::vector<Real>* x);
-  // |A x - b|/|b| of Solve's system, computed anew.
+  // Returns |A x - b|/|b| of Solve's system, recomputed.
   double RelativeResidual(const std::vector<Real>& x);
 
-  // sum W |H x - I|^2.
+  // Returns sum W |H x - I|^2.
   double DataMisfit(const std::vector<Real>& x);
 
  private:
@@ -66,9 +66,9 @@ class SceneSystem {
   std::unique_ptr<kernels::RadianceSteps<Real>> steps_;
 };
 
-// Calls rows(y0, y1) for bands of a picture's rows that do not depend on the number of threads.
+// Calls rows(y0, y1) for bands of an image's rows that do not depend on the number of threads.
 void ForBands(int height_px, int threads, const std::function<void(int y0, int y1)>& rows);
-// The same, and sums what they return in their order.
+// Calls rows like ForBands and sums its results in the order of the bands.
 using Sums = std::array<double, 3>;
 Sums SumOverBands(int height_px, int threads, const std::function<Sums(int y0, int y1)>& rows);
 

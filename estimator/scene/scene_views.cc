@@ -12,7 +12,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Objects whose memory can be taken again, by many threads: what is new to the process costs more
+// Objects whose memory is reused, by many threads: memory that is new to the process costs more
 // than a view.
 template <typename T>
 class Spare {
@@ -38,7 +38,7 @@ kernels::ViewSources SourcesOf(const CompactView& view) {
   return {&view.disparity, view.shift.x(), view.shift.y(), &view.hidden, &view.mixed};
 }
 
-// Views of one picture, on a device or on the processor; by many threads.
+// Makes views of one image, on a device or on the processor; for use by many threads.
 class ViewMaker {
  public:
   ViewMaker(const model::LinearPicture& picture, const DisparityMap& map, kernels::Backend* backend)

@@ -8,8 +8,8 @@
 
 namespace thicklens::estimator {
 
-// All views of one radiance, each given to the sink as it is made. Their disparity is rendered on
-// the processor; the radiance is read where the backend is (null: on the processor).
+// Makes all views of one radiance and passes each to the sink. Their disparity is rendered on the
+// processor; the radiance is read on the backend (null: on the processor).
 void ShowInAllViews(const EstimateInput& input, const SolvedScene& solved, int threads,
                     kernels::Backend* backend, IterationProgress* progress,
                     const SceneViewSink& sink);

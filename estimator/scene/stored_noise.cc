@@ -17,10 +17,10 @@ constexpr double kPercentile = 0.25;
 
 struct BlockNoise {
   double mean = 0;
-  double rms = 0;  // of (p00 - p10 - p01 + p11)/2: of white noise its standard deviation
+  double rms = 0;  // rms of (p00 - p10 - p01 + p11)/2: the standard deviation of white noise
 };
 
-// Of one channel, its values `stride` apart.
+// Returns the noise of one channel of a block.
 BlockNoise NoiseOf(const model::LinearPicture& picture, const StoredValueTable& table, int x0,
                    int y0, int channel) {
   float stored[kBlockPx][kBlockPx];

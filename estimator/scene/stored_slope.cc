@@ -16,7 +16,7 @@ StoredValueTable::StoredValueTable(const model::TransferCurve& transfer) : trans
 
 namespace {
 
-// Of bands that are no colours, the mean.
+// Returns the grey of an image; for channels that are no colours, their mean.
 model::LinearPicture GreyOf(const model::LinearPicture& picture) {
   if (picture.channels == 1 || picture.channels == 3) return model::ToGrey(picture);
   const auto channels = static_cast<std::size_t>(picture.channels);
@@ -37,9 +37,9 @@ std::vector<double> StoredSlopes(const model::LinearPicture& picture,
   if (smoothing_px > 0) {
     cv::GaussianBlur(smooth, smooth, {}, smoothing_px, smoothing_px, cv::BORDER_REPLICATE);
   }
-  // [D110] By a central difference of the curve: it has no formula for every kind. In the straight
-  // piece of sRGB and beyond it the step stays on one side of the bend but for a hundredth of the
-  // light.
+  // [D110] The slope is a central difference of the curve, because not every kind has a formula. In
+  // the straight piece of sRGB and beyond it, the step stays on one side of the bend except for a
+  // hundredth of the light.
   const double darkest = transfer.Decode(kDarkest);
   const auto slope = [&](double light) {
     const double at = std::clamp(light, darkest, 1.0);

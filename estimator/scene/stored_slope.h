@@ -10,7 +10,7 @@
 
 namespace thicklens::estimator {
 
-// TransferCurve::Encode by a table, for many values: within 2e-5 of it in [0, 1], exact outside.
+// A table of TransferCurve::Encode for many values: within 2e-5 of it in [0, 1], exact outside.
 class StoredValueTable {
  public:
   explicit StoredValueTable(const model::TransferCurve& transfer);
@@ -29,10 +29,10 @@ class StoredValueTable {
   std::vector<float> stored_;
 };
 
-// s of each pixel: the slope of the transfer curve, d stored/d light, at the grey of the picture
-// smoothed by a Gaussian of `smoothing_px`. Light is taken to be at least what is stored as
-// kDarkest, where gamma curves become infinitely steep and noise has more to say than light, and
-// at most 1.
+// Returns s of each pixel: the slope of the transfer curve, d stored/d light, at the grey of the
+// image smoothed by a Gaussian of `smoothing_px`. The light is limited to 1 and to at least the
+// light stored as kDarkest; below it gamma curves become infinitely steep and noise dominates the
+// light.
 constexpr double kDarkest = 0.04;
 std::vector<double> StoredSlopes(const model::LinearPicture& picture,
                                  const model::TransferCurve& transfer, double smoothing_px);

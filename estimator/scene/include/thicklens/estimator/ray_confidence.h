@@ -12,37 +12,43 @@
 namespace thicklens::estimator {
 
 // How well a photograph shows one ray of its light field, as one byte:
-//   0           filled in with the background beside it: no point of the centre view is there;
+//
+//   0           filled in with the background beside it: the ray shows no point of the centre view;
 //   1 .. 127    a point whose blur is too strong for details (kUnresolvedBlurSigmaPx);
 //   129 .. 255  a point whose blur can be undone.
-// Of the last two the distance from the lower end, over 126, is the share of the aperture that sees
-// the point: 127 and 255 are seen whole, the others in part, past an edge or the picture's border.
+//
+// In the last two ranges the distance from the lower end, divided by 126, is the share of the
+// aperture that sees the point: points with 127 and 255 are seen by the whole aperture, and the
+// others in part, past an edge or the image's border.
 using Confidence = std::uint8_t;
 constexpr Confidence kFilledIn = 0;
 
-// `seen_share` from 0 to 1, of the aperture by its weights.
+// Returns the confidence of a point. `seen_share` is the share of the aperture by its weights, 0 to
+// 1; `blur_sigma_px` is the standard deviation of its blur.
 Confidence ConfidenceOfPoint(double seen_share, double blur_sigma_px);
-// To half a 126th; 0 for what is filled in.
+// Returns the share to half a 126th; 0 for a ray that is filled in.
 double SeenShareOf(Confidence confidence);
 bool IsResolved(Confidence confidence);
 
 // Shares of many rays, sum 1.
 struct ConfidenceShares {
-  double seen = 0;         // by more than 99 % of the aperture, and resolved
-  double partly_seen = 0;  // by less, and resolved
-  double blurred = 0;      // too strongly for details
+  double seen = 0;         // seen by more than 99 % of the aperture, and resolved
+  double partly_seen = 0;  // seen by less, and resolved
+  double blurred = 0;      // blurred too strongly for details
   double filled_in = 0;
 };
-// `counts`: how many rays have each confidence. All 0 if there are none.
+// Converts counts to shares. `counts`: the number of rays with each confidence. All shares are 0 if
+// there are no rays.
 ConfidenceShares SharesOf(const std::array<std::size_t, 256>& counts);
 
-// Of each point of the centre view, by the depth alone; solvers have no part in it. A ray sees the
-// point if the disparity rendered into its view agrees, to .3 px per view step, at a pixel around
-// the place where it meets the photograph. Throws Error for inputs that do not fit.
+// Returns the confidence of each point of the centre view from the depth alone, without a solver. A
+// ray sees the point if the disparity rendered into its view agrees, to 0.3 px per view step, at a
+// pixel around the place where the ray meets the photograph. Throws Error for inputs that do not
+// fit.
 std::vector<Confidence> PointConfidence(const EstimateInput& input, int threads);
 
-// Of the rays of one view, whose disparity was rendered, from that of the points; of a mixed sample
-// that of what its middle shows.
+// Returns the confidence of the rays of one rendered view from that of the points. A mixed sample
+// has the confidence of the point at its middle.
 std::vector<Confidence> RayConfidence(const std::vector<Confidence>& of_points,
                                       const CompactView& view);
 
