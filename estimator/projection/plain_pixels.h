@@ -21,8 +21,8 @@ struct PlainPixels {
 // disparity.
 //
 // D is the largest disparity that can reach the pixel, and G, H are the largest differences of
-// neighbours across and down there. Neighbouring points keep their order in all views where A G + B
-// H < 1, because their images move by less than the points are apart. The product reads the
+// neighbours across and down there. Neighbouring points keep their order in all views where
+// A G + B H < 1, because their images move by less than the points are apart. The product reads the
 // disparity of a point that is A D beside that of the ray; this disparity is hence wrong by at most
 //
 //   e = A G D/(1 - B H)  (down),  then  f = H (1 + B e + C D)/(1 - A G)  (across, a row beside it),

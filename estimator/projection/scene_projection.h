@@ -17,11 +17,11 @@ namespace thicklens::estimator {
 // that the centre view shows to the photograph; each pixel is a mean of the points that the views
 // see through it:
 //
-//   (H r)(x) = sum_k w_k r(x + s_k(x)) [D100], s_k the displacement from the view's sample to its
-//   source
+//   (H r)(x) = sum_k w_k r(x + s_k(x)) [D100],
 //
-// (ViewDisparity). The bilinear taps of the source that are on its surface are used, and for mixed
-// samples the taps of both surfaces. Rows sum to 1.
+// where s_k is the displacement from the view's sample to its source (ViewDisparity). A source is
+// read by those of its bilinear taps that are on its surface, and a mixed sample by the taps of
+// both surfaces. Rows sum to 1.
 //
 // A pixel whose fan meets only one surface is computed by filters down and across the image. They
 // treat the fan as a product of its axes (weights that are no product are a sum of products, by

@@ -29,7 +29,7 @@ ViewFan RenderFan(const DisparityMap& disparity, const Eigen::ArrayXXd& weights,
 
 // The origin of the rays of a column or a row of the aperture if the fan is a product: px to the
 // source, along one axis, for each of `count` positions on it. NaN at all positions: at one of them
-// the source is not on the pixel's surface.
+// that point is not on the pixel's surface.
 struct FanAxis {
   int count = 0;
   std::vector<std::vector<float>> source_px;  // [position][pixel]

@@ -16,14 +16,14 @@ namespace thicklens::estimator {
 // farther surface, because depth sensors lose values beside near objects.
 //
 // Inside one surface, the plane through it, fitted with allowance for its noise, is bent to meet
-// the rims. The more and the larger the holes are, the closer to the rims the bending ends.
+// the rims. The more and the larger the holes are, the closer to the rims the bending is confined.
 // Neighbours belong to two surfaces where their disparities differ by more than six times the map's
 // noise, but at least 0.2 and at most 1 px per view step.
 //
-// `picture` shows the scene of the map and has its size. `filled` (may be null) receives the number
-// of filled pixels. No filled value is below `at_infinity`, the disparity of an infinitely far
-// point, where that is known. Throws Error if all values are holes, the sizes differ, or a value of
-// the image is not finite.
+// The image `picture` must have the size of the map. `filled` (may be null) receives the number of
+// filled pixels. No filled value is below both the smallest known value and `at_infinity`, the
+// disparity of an infinitely far point, where that is known. Throws Error if all values are holes,
+// the sizes differ, or a value of the image is not finite.
 DisparityMap FillHoles(const DisparityMap& map, const model::LinearPicture& picture,
                        std::size_t* filled,
                        double at_infinity = -std::numeric_limits<double>::infinity());
