@@ -17,209 +17,223 @@
 
 namespace thicklens::model {
 
-// What is painted on a layer. Every kind but kUniform, kSine and kEdge is a periodic tile that
-// holds nothing above half a cycle per px of the picture, measured where the layer's pixels are
-// largest: what every view can show without aliasing. A sine finer than that is refused; an edge,
-// at its sharpest, has 0.7 % there of the amplitude of one that is infinitely sharp, and less
-// beyond.
+// The texture of a layer. All kinds except kUniform, kSine and kEdge are periodic tiles without
+// frequencies above half a cycle per px of the image, measured where the layer's pixels are
+// largest, so that no view aliases. A sine with a higher frequency throws Error. The sharpest edge
+// has at half a cycle per px 0.7 % of the amplitude of an infinitely sharp edge, and less at higher
+// frequencies.
 enum class TextureKind {
   kUniform,
   kSine,  // colour (1 + contrast cos(2 pi (X cos(angle) + Y sin(angle))/period)), (X, Y) as below
-  // colour (1 + contrast erf(d/(sqrt(2) sigma))), d the distance behind a straight line through
-  // the middle (TextureOptions)
+  // colour (1 + contrast erf(d/(sqrt(2) sigma))), where d is the distance behind a straight line
+  // through the middle (TextureOptions)
   kEdge,
-  kCheckerboard,  // a corner of four squares at X = Y = 0, lower right and upper left bright
-  kSiemensStar,   // bright and dark sectors around the middle, the first below the right is bright
-  kDeadLeaves,    // discs of many sizes that hide each other, each of a colour of its own
-  kNoise,         // amplitude falls as 1/frequency
-  kPicture,       // the user's own
+  kCheckerboard,  // a corner of four squares is at X = Y = 0; lower right and upper left are bright
+  kSiemensStar,   // bright and dark sectors around the middle; the first sector below the right is
+                  // bright
+  kDeadLeaves,    // discs of many sizes that occlude each other, each with its own colour
+  kNoise,         // the amplitude decreases as 1/frequency
+  kPicture,       // an image of the user
 };
 std::string TextureKindName(TextureKind kind);  // "uniform", "sine", "checkerboard", ...
 
 struct TextureOptions {
   TextureKind kind = TextureKind::kDeadLeaves;
-  // Mean radiance, RGB in linear light, 1 at full scale. A picture keeps its own colours.
+  // Mean radiance, RGB in linear light, 1 at full scale. An image (kPicture) keeps its own colours.
   Eigen::Vector3d colour{0.5, 0.5, 0.5};
-  // (bright - dark)/(bright + dark) of sine and squares; leaves have every light between the two;
-  // noise has the relative standard deviation contrast/2.
+  // Value of (bright - dark)/(bright + dark) for a sine, an edge, squares and sectors. Leaves have
+  // every radiance between the two. Noise has the relative standard deviation contrast/2.
   double contrast = 0.6;
-  // Of leaves and noise: 0 all channels alike, 1 each on its own.
+  // Colour variation of leaves and noise: at 0 all channels are equal, at 1 each channel is
+  // independent.
   double saturation = 0.5;
-  // Radius of the smallest leaf, shortest period of noise, period of a sine, sigma of an edge, side
-  // of a square, width of a star's sector half the shorter side of what is seen away from its
-  // middle, width of the whole picture; px of the simulated picture at the layer's depth on the
-  // axis. 0: chosen (2, 4, 8 px, as sharp as may be, 12 px, 36 bright sectors, as wide as can be
-  // seen).
+  // Size of the detail, in px of the simulated image at the layer's depth on the axis: radius of
+  // the smallest leaf, shortest period of noise, period of a sine, sigma of an edge, side of a
+  // square, width of a star's sector (at half the shorter side of the visible part from its middle)
+  // or width of the whole image (kPicture). The value 0 selects 2 px (leaf), 4 px (noise), 8 px
+  // (sine), the sharpest possible edge, 12 px (square), 36 bright sectors, or the width that covers
+  // the visible part.
   double feature_size_px = 0;
-  // Of a sine: its direction; of an edge: toward its bright side. From the right, positive
-  // downward. Edge, star and picture have their middle in that of the outline, or of what is seen.
+  // Direction of a sine, or direction toward the bright side of an edge, measured from the right,
+  // positive downward. The middle of an edge, a star or an image is that of the outline or, without
+  // an outline, of the visible part.
   double angle_deg = 0;
-  std::string picture_path;  // kPicture, for messages
+  std::string picture_path;  // path of the image (kPicture), for messages
 };
 
-// A plane, z = depth_mm + slope . (X, Y): positions from the optical axis in mm, X right, Y down.
-// Its 1/z is linear in the picture: (1 - slope . tan(angle of the chief ray))/depth_mm.
+// A plane z = depth_mm + slope . (X, Y), where X (right) and Y (down) are positions from the
+// optical axis in mm. Its 1/z is linear in the image: (1 - slope . tan(angle of the chief
+// ray))/depth_mm.
 struct PlaneOptions {
   double depth_mm = 0;
-  Eigen::Vector2d slope{0, 0};  // mm deeper per mm to the right and down
+  Eigen::Vector2d slope{0, 0};  // mm of depth per mm to the right and down
 };
 
-// A surface of any shape in place of a plane: 1/z = W(x') at the position x' of the picture at
-// which the chief ray shows it, W from a depth map of the scene's size, bilinear between pixel
-// centres and beyond the outermost as there. Its texture is painted on x': a picture of the
-// map's shape, if nothing else is said, has its pixels where the map has them. Across an edge of
-// depth the surface is stretched from one pixel to the next like a sheet of rubber, with what is
-// painted between them.
+// A surface of any shape instead of a plane: 1/z = W(x'), where x' is the image position at which
+// the chief ray shows it. W comes from a depth map of the scene's size; it is bilinear between
+// pixel centres and constant beyond the outermost ones. The texture is painted on x': by default an
+// image (kPicture) with the map's aspect ratio has its pixels at those of the map. Across a depth
+// edge the surface and its texture are stretched from one pixel to the next.
 struct DepthMapOptions {
   std::string map_path;        // for messages
   DepthConvention convention;  // kZ or kRange
 };
 
-// Which part of its plane a layer fills. In px it is the part that chief rays meet inside these
-// positions of the picture; in mm, inside these (X, Y). A mask is a grey picture of the scene's
-// size: inside is where its values, bilinear between pixel centres and beyond the outermost as
-// there, are at least half of full scale.
+// The part of its plane that a layer fills. In px it is the part that chief rays meet inside these
+// image positions; in mm it is the part inside these (X, Y). A mask is a grey image of the scene's
+// size. Its values are bilinear between pixel centres and constant beyond the outermost ones; a
+// position is inside where the value is at least half of full scale.
 struct OutlineOptions {
   enum class Shape { kWhole, kRectangle, kDisc, kMask };
   enum class Unit { kPx, kMm };
   Shape shape = Shape::kWhole;
   Unit unit = Unit::kPx;
-  Eigen::Vector2d centre{0, 0};  // in `unit`, as the two below
-  Eigen::Vector2d size{0, 0};    // kRectangle
-  double radius = 0;             // kDisc
-  std::string mask_path;         // kMask, in px; for messages
+  Eigen::Vector2d centre{0, 0};  // in `unit`, like `size` and `radius`
+  Eigen::Vector2d size{0, 0};    // kRectangle only
+  double radius = 0;             // kDisc only
+  std::string mask_path;         // kMask only, in px; for messages
 };
 
-// The mirror image of a lamp in the gloss of a layer: light added to the layer's own, which differs
-// from view to view, since the image lies behind the layer. Its radiance is
-// strength exp(-|x - centre|^2/(2 sigma^2)) at the position x where chief rays show the point in
-// which a ray meets the plane of the image.
+// The mirror image of a lamp in the gloss of a layer. Its light is added to that of the layer. It
+// differs from view to view because the mirror image is behind the layer. Its radiance is strength
+// exp(-|x - centre|^2/(2 sigma^2)), where x is the position at which chief rays show the point in
+// which a ray meets the plane of the mirror image.
 struct GlossOptions {
-  double depth_mm = 0;              // of the image, > 0; a flat mirror has it behind itself
-  Eigen::Vector2d centre_px{0, 0};  // in the picture
-  double sigma_px = 0;              // > 0
-  double strength = 0;              // radiance of its middle, the same in all channels; >= 0
+  double depth_mm = 0;  // depth of the mirror image, > 0; for a flat mirror it is behind the mirror
+  Eigen::Vector2d centre_px{0, 0};  // centre in the image
+  double sigma_px = 0;              // standard deviation, > 0
+  double strength = 0;              // radiance at the centre, the same in all channels; >= 0
 };
 
 struct SceneLayer {
   std::string name;  // for messages; may be empty
   PlaneOptions plane;
-  std::optional<DepthMapOptions> depth;  // the plane is left out then, and the outline is whole
+  std::optional<DepthMapOptions> depth;  // replaces the plane; the outline must then be whole
   OutlineOptions outline;
   TextureOptions texture;
   std::vector<GlossOptions> gloss;
 };
 
-// What the files that a layer names hold; empty for those that it does not.
+// Contents of the files that a layer names. A field is empty if the layer names no such file.
 struct LayerPixels {
   LinearPicture texture;  // kPicture, in linear light
-  LinearPicture mask;     // kMask: one channel, stored values, 1 at full scale
-  RawDepthMap depth;      // of SceneLayer::depth
+  LinearPicture mask;     // kMask: one channel of stored values, 1 at full scale
+  RawDepthMap depth;      // depth map of SceneLayer::depth
 };
 
-// What a picture of a scene can have.
+// Returns the effects that an image of a scene can have.
 EffectSet PictureEffects();
 
 struct SceneSimulationOptions {
-  // Size, pitch, lens; its calibration gives d1, kappa and the lens floor (absent: 0).
+  // Image size, pitch and lens. The calibration gives d1, kappa and the lens floor (0 if absent).
   Camera camera;
-  std::vector<SceneLayer> layers;  // in any order: along each ray the nearest one is seen
-  EffectChoice effects;            // of PictureEffects()
-  // Rms error that a finite number of rays may leave in stored values, in 1/255 of full scale; 0:
-  // all pixels get as many as may be.
+  std::vector<SceneLayer> layers;  // in any order: each ray shows the nearest layer
+  EffectChoice effects;            // a choice of the effects PictureEffects()
+  // Allowed rms error of the stored values because of the finite number of rays, in 1/255 of full
+  // scale. 0: all pixels get rays_per_pixel rays.
   double sampling_error_grey_levels = 0.2;
-  int rays_per_pixel = 600;  // at most
+  int rays_per_pixel = 600;  // maximum number
   double wavelength_mm = 550e-6;
-  // Noise of the sensor: electrons at full scale (0: no shot noise), and sd of what is read.
+  // Sensor noise: electrons at full scale (0: no shot noise) and standard deviation of the read
+  // noise.
   double full_well_electrons = 0, read_noise_electrons = 0;
-  // Standard deviation of noise of the stored values, in 1/255 of full scale at 8 and 16 bits.
+  // Standard deviation of the noise of the stored values, in 1/255 of full scale at 8 and 16 bits.
   double noise_sigma_grey_levels = 0;
   int bits = 8;                  // 8 or 16
-  int u_count = 5, v_count = 5;  // views of the true light field
-  double uv_depth_mm = 0;        // where its UV plane lies; ST lies in the plane of focus
+  int u_count = 5, v_count = 5;  // numbers of views of the true light field
+  double uv_depth_mm = 0;        // depth of its UV plane; ST is in the plane of focus
   std::uint64_t seed = 1;
 
   bool IsValid(std::string* why) const;
 };
 
-// Reads schema thicklens/simulate-scene/1 (docs/file-formats.md).
+// Reads a file of the schema thicklens/simulate-scene/1 (docs/file-formats.md). Throws Error if it
+// is not valid.
 SceneSimulationOptions ReadSceneSimulation(const std::string& path);
 
-// What a simulated picture was made with.
+// The parameters of a simulated image.
 struct SceneTruth {
   double image_distance_mm = 0;
   double focus_depth_mm = 0;
   double blur_ratio = 0;
   double blur_floor_px = 0;
-  double nearest_depth_mm = 0, farthest_depth_mm = 0;  // of the depth map
-  double largest_blur_sigma_px = 0;                    // of defocus alone, over the depth map
+  double nearest_depth_mm = 0, farthest_depth_mm = 0;  // minimum and maximum of the depth map
+  double largest_blur_sigma_px = 0;  // maximum of defocus alone, over the depth map
   EffectRecord effects;
   double sampling_error_grey_levels = 0;  // rms, of the pixels where it is largest
   std::uint64_t seed = 0;
 };
 std::string SceneTruthToYaml(const SceneTruth& truth);  // schema thicklens/scene-truth/1
 
-// How a long computation runs. `progress` is called from any thread, one call at a time; what it
-// throws ends the computation and passes to the caller.
+// Control of a long computation. `progress` is called from any thread, one call at a time. An
+// exception that it throws ends the computation and propagates to the caller.
 struct SceneRun {
   int threads = 0;  // 0: one per core
   std::function<void(int done, int total)> progress;
 };
 
-// Image formation from a scene of textured surfaces to a photograph and its true light field, by
-// the geometric optics of the thick lens. It knows no light-field samples: the ray of picture
-// position x through aperture position A meets depth z at
-//   X(z) = (x - cx) z p/K + A (1 - z/zf),
-// the line that lands A c(z)/p to the left of the chief ray of what it meets there ([D37], derived
-// here from [S16] with UV on the aperture). A plane is met in closed form, a depth map by a search
-// from pixel to pixel and in closed form between four of them.
+// Image formation from a scene of textured surfaces to a photograph and its true light field by the
+// geometric optics of the thick lens. The simulator does not use light-field samples: the ray of
+// image position x through aperture position A is at depth z at
+//   X(z) = (x - cx) z p/K + A (1 - z/zf).
+// This line lands A c(z)/p to the left of the chief ray of the point that it meets there ([D37],
+// derived here from [S16] with UV on the aperture). The intersection with a plane has a closed
+// form. For a depth map, a search goes from pixel to pixel, and the intersection between four
+// pixels has a closed form.
 //
-// A pixel of the photograph is the mean over a set of rays (Hammersley points), as many as its blur
-// and its surroundings ask for (see sampling_plan.h); pixels with as many have the same set. It
-// spreads over the aperture by the camera's PSF (Gaussian of standard deviation kappa r, or disc of
-// radius 2 kappa r; the set's second moment is exactly (kappa r)^2) and over the pixel box widened
-// by the lens floor; each effect that is off takes its part of the set with it. With 600 rays the
-// transfer function is off by 0.01 at the highest frequencies and the share of a pixel that an edge
-// hides by 0.005, rms.
+// A pixel of the photograph is the mean over a set of rays (Hammersley points). Their number
+// depends on the blur and the surroundings of the pixel (sampling_plan.h); pixels with equal
+// numbers use the same set. The set spreads over the aperture by the camera's PSF (a Gaussian of
+// standard deviation kappa r, or a disc of radius 2 kappa r; the second moment of the set is
+// exactly (kappa r)^2) and over the pixel box widened by the lens floor. Each effect that is off
+// removes its part of the spread. With 600 rays the rms error of the transfer function is 0.01 at
+// the highest frequencies, and that of the share of a pixel that an edge occludes is 0.005.
 //
-// Everything is RGB. The same options give the same bits on any number of threads.
+// All images are RGB. The same options give the same bits for any number of threads.
 class SceneSimulator {
  public:
-  // `pixels`: one entry a layer; missing ones are empty. Throws Error if the options are not valid,
-  // a file's picture is not what its layer needs, a ray can miss or meet behind the front focal
-  // point one of the planes, a depth map has holes, no layer is whole, a texture cannot be drawn,
-  // or an effect is named that a picture of a scene cannot have. `threads` (0: one per core) draw
-  // the layers.
+  // `pixels` has one entry per layer; missing entries are empty. The layers are drawn by `threads`
+  // threads (0: one per core). The constructor throws Error if the options are not valid, an image
+  // from a file does not fit its layer, a ray misses a plane or meets it in front of the front
+  // focal point, a depth map has holes, no layer is whole, a texture cannot be drawn, or an effect
+  // is named that an image of a scene cannot have.
   SceneSimulator(const SceneSimulationOptions& options, const std::vector<LayerPixels>& pixels,
                  int threads = 0);
   ~SceneSimulator();
   SceneSimulator(const SceneSimulator&) = delete;
   SceneSimulator& operator=(const SceneSimulator&) = delete;
 
-  const EffectDecision& effects() const;      // of the photograph
-  const EffectSet& effects_of_views() const;  // pixel box, lens floor, diffraction, as chosen
-  // Rms of the photograph's pixels where it is largest, of stored values, in 1/255.
+  const EffectDecision& effects() const;      // effects of the photograph
+  const EffectSet& effects_of_views() const;  // the chosen ones of pixel box, lens floor and
+                                              // diffraction
+  // Rms error of the stored values of the photograph because of the finite number of rays, where it
+  // is largest, in 1/255 of full scale.
   double sampling_error_grey_levels() const;
-  // Of the photograph: what it costs.
+  // Mean number of rays per pixel of the photograph, which determines the cost.
   double mean_rays_per_pixel() const;
-  // As what Store writes is to be understood: linear if its transfer curve was left out.
+  // The camera with which the output of Store must be interpreted. Its transfer curve is linear if
+  // that effect is off.
   const Camera& camera() const;
 
-  // Linear light before noise and quantisation: 1 for the radiance 1 at the principal point.
+  // Returns linear light before noise and quantisation. The radiance 1 gives 1 at the principal
+  // point.
   LinearPicture RenderNoiseless(const SceneRun& run) const;
-  // What the camera stores of it: noise, transfer curve, rounding, clipping.
+  // Returns the stored values of the camera: noise, transfer curve, rounding and clipping are
+  // applied.
   StoredPicture Store(const LinearPicture& noiseless) const;
 
-  // z in mm of what the chief ray of each pixel's centre meets.
+  // Returns the depth z, in mm, of the point that the chief ray of each pixel's centre meets.
   RawDepthMap RenderDepth() const;
   SceneTruth Truth(const RawDepthMap& depth) const;
 
-  // Radiance as seen from one aperture position, mm: with effects_of_views(), neither defocus nor
-  // fall-off.
+  // Returns the radiance seen from one aperture position, mm, with effects_of_views() and with
+  // neither defocus nor fall-off. Throws Error if the position is on either axis more than 6
+  // standard deviations (kappa r) from the middle.
   LinearPicture RenderView(const Eigen::Vector2d& aperture_mm, const SceneRun& run) const;
-  // Such views on GridOnPlanes, UV as the options say. Off the aperture a view is seen from a point
-  // of UV, and its rays cross the aperture in different places. Throws Error if one of them crosses
-  // farther than 4 standard deviations (kappa r per axis) from the middle: textures end there.
+  // Returns such views on GridOnPlanes, with the UV plane of the options. If UV is not the
+  // aperture, a view is seen from a point of UV, and its rays cross the aperture at different
+  // places. Throws Error if one of them crosses farther than 4 standard deviations (kappa r per
+  // axis) from the middle, because textures are drawn only up to there.
   LightField RenderLightField(int u_count, int v_count, const SceneRun& run) const;
 
  private:
