@@ -8,15 +8,15 @@
 
 namespace thicklens::model {
 
-// Of a sensor that counts electrons.
+// Noise parameters of a sensor that counts electrons.
 struct SensorNoise {
-  double full_well_electrons = 0;  // at full scale; 0: it is not known, and there is none
+  double full_well_electrons = 0;  // at full scale; 0: unknown, no noise is added
   double read_noise_electrons = 0;
 };
 
-// Poisson of the mean light times full well, plus the reading's Gaussian: those of shot-noise and
-// read-noise that are on. The draws of each are those of seed and item (a frame's index) alone,
-// whether the other is on or not.
+// Adds the Poisson noise of the mean light times full well and the Gaussian read noise, each if its
+// effect (shot-noise, read-noise) is on. The random draws of each depend only on `seed` and `item`
+// (a frame's index), whether or not the other is on.
 void AddSensorNoise(const SensorNoise& noise, const EffectSet& on, std::uint64_t seed,
                     std::uint32_t item, LinearPicture* picture);
 

@@ -7,9 +7,9 @@
 
 namespace thicklens::model {
 
-// Whether a simulation can take a camera for the truth: one with image distance and blur ratio
-// that is focused at a finite depth, where views have their samples and a bench its scale and
-// light.
+// Returns true if a simulation can use a camera as the truth. The camera must have an image
+// distance and a blur ratio, and its focus must be at a finite depth, at which views have their
+// samples and a bench its scale and light. Otherwise sets `why` (may be null) and returns false.
 bool IsSimulatable(const Camera& camera, std::string* why);
 
 }  // namespace thicklens::model

@@ -10,7 +10,7 @@ constexpr double kPi = 3.14159265358979323846;
 
 }  // namespace
 
-// The difference of the antiderivative, a triangle wave.
+// The mean is the difference of the antiderivative, which is a triangle wave.
 double SquareWaveMean(double x, double period, double width) {
   const auto triangle = [period](double at) {
     const double phase = at - period * std::floor(at / period);

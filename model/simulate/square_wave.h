@@ -3,12 +3,12 @@
 
 namespace thicklens::model {
 
-// The mean over [x - width/2, x + width/2], width > 0, of a wave that is +1 on the first half of
-// each period and -1 on the second.
+// Mean over [x - width/2, x + width/2], width > 0, of a wave that is +1 on the first half of each
+// period and -1 on the second.
 double SquareWaveMean(double x, double period, double width);
 
-// A star of `cycles` pairs of sectors, +1 and -1, around (0, 0): the mean over a cell of side
-// `cell` around (x, y), along the circle through it alone.
+// Mean of a star of `cycles` pairs of sectors, +1 and -1, around (0, 0), over a cell of side `cell`
+// around (x, y). The mean is taken only along the circle through (x, y).
 double StarMean(double x, double y, double cycles, double cell);
 
 }  // namespace thicklens::model

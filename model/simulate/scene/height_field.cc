@@ -7,7 +7,7 @@
 namespace thicklens::model {
 namespace {
 
-// Of narrowing: what is left to gain after them is less than the blocks of the bounds are wide.
+// Number of narrowings; more would gain less than the width of the blocks of the bounds.
 constexpr int kNarrowings = 3;
 
 std::vector<double> ShiftsOf(const std::vector<float>& depth_mm, double scale_px,
@@ -20,8 +20,8 @@ std::vector<double> ShiftsOf(const std::vector<float>& depth_mm, double scale_px
   return shifts;
 }
 
-// The sheet between four pixels, over the place in between: V = corner + right fx + down fy +
-// twist fx fy.
+// The surface between four pixels, as a function of the position between them: V = corner + right
+// fx + down fy + twist fx fy.
 struct Cell {
   double corner, right, down, twist;
 
@@ -46,8 +46,8 @@ struct CellSteps {
 
   int cell;
   const int direction;
-  const double between;  // way from border to border
-  double next;           // way to the next border
+  const double between;  // distance from border to border along the ray
+  double next;           // distance from the start to the next border
 };
 
 }  // namespace
@@ -113,17 +113,17 @@ PictureRegion HeightField::Reached(const PictureRegion& region, const ApertureBo
   return {region.low_px + low_px.matrix(), region.high_px + high_px.matrix()};
 }
 
-// Whatever is met lies within bounds of the sheet over all that is passed at shifts within bounds
-// that hold already.
+// If bounds of the shifts are known, they also bound the positions that the rays pass. Bounds of V
+// over these positions are then narrower bounds of the shifts.
 ValueRange HeightField::MetFrom(const PictureRegion& region, const ApertureBox& aperture) const {
   ValueRange met = all_;
   for (int i = 0; i < kNarrowings; ++i) met = ShiftsOver(Reached(region, aperture, met));
   return met;
 }
 
-// With t the way from the start, h(t) = +-(V(x + A V(t)) - V(t)) >= 0 there, and on a cell
-// h = q0 + q1 t + q2 t^2 from its entry: the first zero is 2 q0/(-q1 + sqrt(q1^2 - 4 q2 q0)), or
-// lies behind the ray where that is not positive.
+// Let t be the distance from the start. Then h(t) = +-(V(x + A V(t)) - V(t)) >= 0 at the start. On
+// a cell h = q0 + q1 t + q2 t^2 from its entry. The first zero is 2 q0/(-q1 + sqrt(q1^2 - 4 q2
+// q0)); where that is not positive, it is behind the ray.
 double HeightField::FirstMet(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm,
                              double from, double to) const {
   const double sign = to < from ? -1 : 1;
@@ -137,7 +137,7 @@ double HeightField::FirstMet(const Eigen::Vector2d& position_px, const Eigen::Ve
     const auto [corner, right, down, across] = CornersOf(columns.cell, rows.cell);
     const double extreme = sign < 0 ? std::max(std::max(corner, right), std::max(down, across))
                                     : std::min(std::min(corner, right), std::min(down, across));
-    // Else all of the cell lies beyond where the ray leaves it.
+    // Otherwise the whole cell is beyond the shift at which the ray leaves it.
     if (!(sign * (extreme - from) > exit)) {
       const Cell cell{corner, right - corner, down - corner, across - right - down + corner};
       const double fx = start_px.x() + entry * dx - columns.cell;

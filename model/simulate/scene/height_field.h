@@ -10,23 +10,23 @@
 
 namespace thicklens::model {
 
-// Rays through what part of the aperture.
+// The part of the aperture through which rays pass.
 struct ApertureBox {
   Eigen::Vector2d low_mm{0, 0}, high_mm{0, 0};
 };
 
-// A surface that every chief ray meets once, in the coordinates of the picture: 1/z = W(x') at the
-// chief position x', px, bilinear between pixel centres and beyond the outermost as there. A sheet
-// of rubber: across an edge of depth it is stretched from one pixel to the next.
+// A surface that every chief ray meets once, in the coordinates of the image: 1/z = W(x') at the
+// chief position x', px. W is bilinear between pixel centres and constant beyond the outermost
+// ones. Across a depth edge the surface is stretched from one pixel to the next.
 //
-// Depth is given as a shift V = K/p (1/z - 1/zf) [D41], px per mm of aperture: what lies at x' is
-// shown at x' - A V by rays through aperture position A (from X(z) of SceneSimulator, whose chief
-// position is cx + K/p X(z)/z). The ray (x, A) passes the chief position x + A V at the shift V,
-// and meets the sheet where V = V(x + A V): on each cell between four pixels the root of a
+// Depth is given as a shift V = K/p (1/z - 1/zf) [D41], px per mm of aperture: rays through
+// aperture position A show the point of x' at x' - A V (from X(z) of SceneSimulator, whose chief
+// position is cx + K/p X(z)/z). The ray (x, A) passes the chief position x + A V at the shift V and
+// meets the surface where V = V(x + A V). On each cell between four pixels this is the root of a
 // quadratic equation.
 class HeightField {
  public:
-  // Depths in mm, > 0, rows top to bottom; K/p in px.
+  // Depths in mm, > 0, rows top to bottom; `scale_px` is K/p.
   HeightField(int width_px, int height_px, const std::vector<float>& depth_mm, double scale_px,
               double focus_depth_mm);
 
@@ -34,24 +34,27 @@ class HeightField {
   double DepthMm(double shift) const { return 1 / (inverse_focus_per_mm_ + shift / scale_px_); }
   // Bounds of V over a region.
   ValueRange ShiftsOver(const PictureRegion& region) const { return shifts_.Over(region); }
-  // No less than |grad V| anywhere in the region, and than the jumps of its components between
-  // cells, px per mm per px.
+  // Upper bounds over the region, px per mm per px: SteepestOver of |grad V|, SharpestOver of the
+  // jumps of its components between cells.
   double SteepestOver(const PictureRegion& region) const;
   double SharpestOver(const PictureRegion& region) const { return bends_.Over(region).high; }
 
-  // Bounds of the shifts at which rays of positions in the region meet the sheet. All positions
-  // that such rays pass at these shifts lie in what Reached gives.
+  // MetFrom returns bounds of the shifts at which rays of positions in the region meet the surface.
+  // Reached returns a region that contains all positions that such rays pass at these shifts.
   ValueRange MetFrom(const PictureRegion& region, const ApertureBox& aperture) const;
   static PictureRegion Reached(const PictureRegion& region, const ApertureBox& aperture,
                                const ValueRange& shifts);
 
-  // Along the ray (x, A) from one shift toward another, the first at which it meets the sheet; `to`
-  // where it does not. From the upper end of MetFrom to the lower: what is seen.
+  // Returns the first shift at which the ray (x, A) meets the surface on its way from one shift to
+  // another, or `to` if it does not meet the surface. From the upper end of MetFrom to the lower
+  // end, the result is the visible point.
   double FirstMet(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm,
                   double from, double to) const;
-  // What is met first from a shift on, to nearer or farther, whichever is the side on which the ray
-  // crosses the sheet within `bounds`. From the shift that the middle of the aperture sees: what is
-  // seen if no part of the sheet hides another. Where a ray meets the sheet but once, the same.
+  // Returns the shift at which the ray first meets the surface from `shift` on. The search goes to
+  // nearer or farther points, depending on the side on which the ray crosses the surface within
+  // `bounds`. From the shift at the middle of the aperture, the result is the visible point if no
+  // part of the surface occludes another. Where a ray meets the surface only once, it equals that
+  // of FirstMet.
   double MetNearShift(const Eigen::Vector2d& position_px, const Eigen::Vector2d& aperture_mm,
                       double shift, const ValueRange& bounds) const;
 
@@ -61,14 +64,14 @@ class HeightField {
   };
 
   double At(int x, int y) const;
-  // Of the cell right of and below a pixel.
+  // Corners of the cell to the right of and below a pixel.
   Corners CornersOf(int x, int y) const;
 
   const int width_px_, height_px_;
   const double scale_px_, inverse_focus_per_mm_;
   const std::vector<double> shift_;
   const PictureBounds shifts_, slopes_, bends_;
-  const ValueRange all_;  // of the shifts
+  const ValueRange all_;  // bounds of all shifts
 };
 
 }  // namespace thicklens::model

@@ -11,8 +11,8 @@
 namespace thicklens::model {
 namespace {
 
-constexpr int kFinestBits = 2;  // of 4 px, see the header
-constexpr int kMostBlocks = 3;  // on each axis of a look-up
+constexpr int kFinestBits = 2;  // log2 of the finest block size, 4 px
+constexpr int kMostBlocks = 3;  // maximum number on each axis of a look-up
 
 void Include(const ValueRange& other, ValueRange* range) {
   range->low = std::min(range->low, other.low);
@@ -32,7 +32,8 @@ PictureBounds::PictureBounds(int width_px, int height_px,
   finest.rows = ((height_px - 1) >> kFinestBits) + 1;
   finest.blocks.assign(
       static_cast<std::size_t>(finest.columns) * static_cast<std::size_t>(finest.rows), kNothing);
-  // A block holds the cells between its pixels and their next: its neighbours' first pixels too.
+  // A block contains the cells between its pixels and the next ones, so that it includes the first
+  // pixels of its neighbours.
   for (int y = 0; y < height_px; ++y) {
     ThrowIfCancelled();
     for (int x = 0; x < width_px; ++x) {

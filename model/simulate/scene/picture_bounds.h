@@ -12,15 +12,16 @@ struct ValueRange {
   double low = 0, high = 0;
 };
 
-// Bounds of the numbers of a picture over any region of it: of what is bilinear between them and
-// beyond the outermost as there. A region is looked up in at most nine blocks, whatever its size:
-// of 4 x 4 px and of twice as much on each further level.
+// Bounds of the numbers of an image over any region. The numbers are bilinear between pixel centres
+// and constant beyond the outermost ones. A look-up reads at most nine blocks, regardless of the
+// size of the region. The blocks of the finest level have 4 x 4 px, those of each further level
+// twice the side.
 class PictureBounds {
  public:
   PictureBounds(int width_px, int height_px, const std::function<double(int x, int y)>& value);
 
-  // No less and no more than what any position of the region has. Wider than need be where the
-  // region ends within a block.
+  // Returns a lower and an upper bound of the numbers at all positions of the region. They are
+  // wider than necessary where the region ends inside a block.
   ValueRange Over(const PictureRegion& region) const;
 
  private:

@@ -6,7 +6,7 @@
 
 namespace thicklens::model {
 
-// An upright rectangle of the picture, px.
+// An upright rectangle of the image, px.
 struct PictureRegion {
   Eigen::Vector2d low_px, high_px;
 

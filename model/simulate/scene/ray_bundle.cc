@@ -15,14 +15,15 @@ Flags Inside(const SceneMask& mask, const Eigen::Vector2d& centre_px, const RayN
   return inside;
 }
 
-// Of positions (x, y) from a point that lies at `from_centre` from the outline's centre, in its
-// unit. However large the outline is, its border is compared near the point, in double: float has
-// not the digits. Of a disc, |c + d|^2 <= R^2 is |d|^2 + 2 c.d <= (R - |c|)(R + |c|).
+// Tests positions (x, y) relative to a point at `from_centre` from the outline's centre, in the
+// outline's unit. The border of the outline is subtracted from the point in double because float
+// has too few digits for a large outline. For a disc, |c + d|^2 <= R^2 is |d|^2 + 2 c.d <= (R -
+// |c|)(R + |c|).
 Flags Inside(const OutlineOptions& outline, const Eigen::Vector2d& from_centre, const RayNumbers& x,
              const RayNumbers& y) {
   if (outline.shape == OutlineOptions::Shape::kDisc) {
     const double c = from_centre.norm();
-    // By 2R, so that nothing overflows where R is large.
+    // Both sides are divided by 2R, so that nothing overflows where R is large.
     const double scale = 1 / (2 * outline.radius);
     const Eigen::Vector2f direction = (2 * scale * from_centre).cast<float>();
     return static_cast<float>(scale) * (x.square() + y.square()) + direction.x() * x +
@@ -35,7 +36,7 @@ Flags Inside(const OutlineOptions& outline, const Eigen::Vector2d& from_centre, 
   return x >= low.x() && x <= high.x() && y >= low.y() && y <= high.y();
 }
 
-// Keeps, for each ray, the nearest of what is offered.
+// Keeps the nearest of the offered layers for each ray.
 class Nearest {
  public:
   explicit Nearest(Eigen::Index count) : count_(static_cast<std::size_t>(count)) {
@@ -43,7 +44,7 @@ class Nearest {
     shown_.fill(0);
   }
 
-  // `inside`, `depth_mm`: of each ray.
+  // `inside` and `depth_mm` have one value per ray.
   template <typename Depth>
   void Offer(std::size_t which, const Depth& depth_mm, const Flags* inside) {
     for (std::size_t i = 0; i < count_; ++i) {
@@ -120,7 +121,7 @@ ChiefHit RayBundle::ChiefAt(const Eigen::Vector2d& centre_px, std::size_t layer)
     const PictureRegion landing = {centre_px + farthest_landing_.low_px,
                                    centre_px + farthest_landing_.high_px};
     chief.shifts = field->MetFrom(landing, aperture_);
-    // Where V grows by less along x + A V than V itself does.
+    // The rays meet the field once if V grows more slowly along x + A V than V itself.
     const double farthest_mm =
         aperture_.low_mm.cwiseAbs().cwiseMax(aperture_.high_mm.cwiseAbs()).norm();
     chief.is_met_once =
@@ -184,7 +185,7 @@ RayBundle::Meeting RayBundle::MeetHeights(const HeightField& field, const ChiefH
   return meeting;
 }
 
-// K/p (X/z - t) = K/p ((X - Xc) - (z - zc) t)/z.
+// Formula: K/p (X/z - t) = K/p ((X - Xc) - (z - zc) t)/z.
 std::array<RayNumbers, 2> RayBundle::ChiefOffsetsPx(std::size_t layer, const ChiefHit& chief,
                                                     const Meeting& meeting) const {
   if (geometry_.height_field(layer) != nullptr) return {{meeting.x, meeting.y}};

@@ -12,16 +12,17 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// How far rays spread over the Gaussian by which they miss a pixel, and over the Airy pattern.
+// Maximum distance of the landing points for the Gaussian, in sigmas, and for the Airy pattern, in
+// radii.
 constexpr double kFloorDeviations = 5;
 constexpr double kAiryRadii = 50;
 
-// Share of a standard normal distribution below x.
+// The standard normal distribution function.
 double NormalBelow(double x) { return std::erfc(-x / std::sqrt(2.0)) / 2; }
 
-// [D35] Share below x of a box of width 1 around 0 convolved with a Gaussian: the difference, over
-// the box, of the Gaussian's twice integrated density, sigma^2 g(x) + x Phi(x/sigma). Without the
-// Gaussian the box itself.
+// [D35] Distribution function at x of a box of width 1 around 0 convolved with a Gaussian: the
+// difference, over the box, of the twice integrated density of the Gaussian, sigma^2 g(x) + x
+// Phi(x/sigma). Without the Gaussian it is that of the box.
 double PixelBelow(double x, double sigma) {
   const auto integral = [sigma](double at) {
     if (sigma == 0) return std::max(at, 0.0);
@@ -32,7 +33,8 @@ double PixelBelow(double x, double sigma) {
   return integral(x + 0.5) - integral(x - 0.5);
 }
 
-// Where a distribution function that grows from -reach to reach takes the value `share`.
+// Returns the x at which a distribution function that increases from -reach to reach has the value
+// `share`.
 template <typename Distribution>
 double Quantile(const Distribution& below, double reach, double share) {
   double low = -reach;
@@ -51,7 +53,7 @@ double PixelQuantile(bool box, double sigma, double share) {
   return Quantile([sigma](double x) { return PixelBelow(x, sigma); }, 0.5 + 9 * sigma, share);
 }
 
-// The digits of i in a base, mirrored behind the point; in [0, 1).
+// The digits of i in a base, mirrored at the point; in [0, 1).
 double RadicalInverse(int i, int base) {
   double digit = 1;
   double value = 0;
@@ -62,8 +64,8 @@ double RadicalInverse(int i, int base) {
   return value;
 }
 
-// The radical inverses of 0 to count - 1, each replaced by its rank among them: on its own, every
-// coordinate is then perfectly even, (k + 1/2)/count, whatever the count.
+// The radical inverses of 0 to count - 1, each replaced by its rank among them. Each coordinate
+// alone is then exactly uniform, (k + 1/2)/count, for every count.
 std::vector<double> EvenShares(int base, int count) {
   std::vector<std::pair<double, std::size_t>> inverses;
   for (int i = 0; i < count; ++i) inverses.emplace_back(RadicalInverse(i, base), inverses.size());
@@ -75,12 +77,13 @@ std::vector<double> EvenShares(int base, int count) {
   return shares;
 }
 
-// Uniform in a disc whose second moment is 1 per axis: its radius is 2.
+// Maps to a uniform distribution in a disc with the second moment 1 per axis; its radius is 2.
 Eigen::Vector2d InDisc(double u, double v) {
   return 2 * std::sqrt(u) * Eigen::Vector2d(std::cos(2 * kPi * v), std::sin(2 * kPi * v));
 }
 
-// A finite set misses mean and variance by a little, which would move and widen every blur.
+// Sets the mean to 0 and the variance to 1. The small errors of a finite set would displace and
+// widen every blur.
 void StandardiseAperture(std::vector<PixelRay>* rays) {
   const double count = static_cast<double>(rays->size());
   Eigen::Vector2d mean(0, 0);
@@ -134,7 +137,7 @@ std::vector<PixelRay> PhotographRays(const RaySpread& spread, int count) {
 }
 
 std::vector<PixelRay> ViewRays(bool box, double gaussian_px) {
-  constexpr int kCount = 89;  // two neighbours of the Fibonacci series
+  constexpr int kCount = 89;  // two consecutive Fibonacci numbers
   constexpr int kBefore = 55;
   if (!box && gaussian_px == 0) return {PixelRay()};
   std::vector<PixelRay> rays;

@@ -9,35 +9,36 @@
 
 namespace thicklens::model {
 
-// One ray of a pixel: where it goes through the aperture, and where it lands.
+// One ray of a pixel: its position on the aperture and its landing point.
 struct PixelRay {
   Eigen::Vector2d aperture{0, 0};   // in standard deviations, per axis, of the aperture's weight
-  Eigen::Vector2d offset_px{0, 0};  // from the pixel's centre
+  Eigen::Vector2d offset_px{0, 0};  // relative to the pixel's centre
 };
 
-// Over what the rays of a pixel spread.
+// The distributions over which the rays of a pixel spread.
 struct RaySpread {
   std::optional<Psf> aperture;  // absent: a pinhole in its middle
-  bool box = true;              // the pixel's own, of one px
-  double gaussian_px = 0;       // sigma per axis of a Gaussian by which they miss it
-  double airy_px = 0;           // radius of an Airy pattern by which they miss it, too
+  bool box = true;              // the box of the pixel, one px wide
+  double gaussian_px = 0;       // sigma per axis of a Gaussian spread of the landing points
+  double airy_px = 0;           // radius of an additional Airy pattern of the landing points
 };
 
-// No ray goes farther than this from the middle of the aperture, in standard deviations. A disc's
-// radius is two of them, a little more where the second moment of few rays is made 1.
+// Maximum distance of a ray from the middle of the aperture, in standard deviations. The radius of
+// a disc is two of them; it is a little larger where the second moment of few rays is scaled to 1.
 constexpr double kGaussianDeviations = 5;
 constexpr double kDiscDeviations = 2.2;
 double FarthestDeviations(const RaySpread& spread);  // 0 without aperture
-// Nor than this from where it would land, px.
+// Maximum distance of a ray from its nominal landing point, px.
 double FarthestLandingPx(const RaySpread& spread);
 
-// `count` rays of equal weight: over the aperture by the PSF's shape, with mean 0 and second moment
-// 1 per axis, and over the box convolved with the Gaussian and the pattern. Hammersley points in
-// as many dimensions as it takes, mapped by the inverse distribution functions.
+// Returns `count` rays of equal weight. They are distributed over the aperture by the PSF's shape,
+// with mean 0 and second moment 1 per axis, and over the box convolved with the Gaussian and the
+// Airy pattern. They are Hammersley points of the necessary number of dimensions, mapped by the
+// inverse distribution functions.
 std::vector<PixelRay> PhotographRays(const RaySpread& spread, int count);
 
-// The same over the pixel alone, all through the middle of the aperture: 89 points of a Fibonacci
-// lattice, or one where nothing spreads.
+// Returns rays that spread over the pixel only and pass through the middle of the aperture: 89
+// points of a Fibonacci lattice, or one ray without any spread.
 std::vector<PixelRay> ViewRays(bool box, double gaussian_px);
 
 }  // namespace thicklens::model

@@ -10,12 +10,12 @@
 namespace thicklens::model {
 namespace {
 
-// No ray of a picture or a view goes farther from the middle of the aperture or of its pixel, in
-// standard deviations: what a plane must stand.
+// Maximum distance of a ray of an image or a view from the middle of the aperture and of its pixel,
+// in standard deviations. CheckPlane tests all rays within it.
 constexpr double kFarthestDeviations = 6;
-// What a texture's tile must hold; beyond it repeats itself.
+// A texture's tile covers the rays within this distance and repeats itself beyond it.
 constexpr double kTextureDeviations = 4;
-// Smallest side of a texture's tile: below it nothing could be drawn.
+// Smallest side of a texture's tile; a smaller tile could show nothing.
 constexpr double kSmallestTilePx = 16;
 
 }  // namespace
@@ -93,7 +93,7 @@ SceneHit SceneGeometry::HitOn(std::size_t layer, const SceneRay& ray) const {
   }
   const HeightField& field = *heights_[layer];
   const Eigen::Vector2d position_px = PositionOf(ray);
-  // A chief ray meets what is at its own position.
+  // A chief ray meets the point at its own position.
   if (ray.aperture_mm == Eigen::Vector2d(0, 0)) {
     return {layer, field.DepthMm(field.ShiftAt(position_px)), position_px};
   }
@@ -129,7 +129,8 @@ SceneHit SceneGeometry::Trace(const SceneRay& ray, const std::vector<std::size_t
   return nearest;
 }
 
-// What chief rays meet is convex where their corners' is, as are outlines but for masks.
+// The points that chief rays meet of a convex region form a convex set, and so do outlines except
+// masks. Corners therefore suffice.
 bool SceneGeometry::Covers(std::size_t index, const PictureRegion& region) const {
   const SceneLayer& layer = layers_[index];
   if (layer.outline.shape == OutlineOptions::Shape::kWhole) return true;
@@ -165,8 +166,8 @@ PictureRegion SceneGeometry::WholePicture() const {
   return {{-0.5, -0.5}, {sensor_.width_px - 0.5, sensor_.height_px - 0.5}};
 }
 
-// The rays through the picture's corners and the corners of a square of the aperture: where the
-// slopes and crossings of all rays between them have their bounds.
+// The rays through the corners of the image and the corners of a square of the aperture. The slopes
+// and crossings of all rays between them have their extremes there.
 std::vector<SceneRay> SceneGeometry::OutermostRays(double deviations) const {
   std::vector<SceneRay> rays;
   const double reach_mm = deviations * aperture_sigma_mm_;
@@ -179,7 +180,7 @@ std::vector<SceneRay> SceneGeometry::OutermostRays(double deviations) const {
   return rays;
 }
 
-// Where chief rays show what rays meet of the plane.
+// The image positions at which chief rays show the points of the plane that rays meet.
 PictureRegion SceneGeometry::ChiefRegion(const PlaneOptions& plane) const {
   PictureRegion region = WholePicture();
   for (const SceneRay& ray : OutermostRays(kTextureDeviations)) {
@@ -191,8 +192,8 @@ PictureRegion SceneGeometry::ChiefRegion(const PlaneOptions& plane) const {
   return region;
 }
 
-// z > f1 as z0 + g . A > f1 (1 - g . slope) > 0, which is linear in the ray, so that corners
-// suffice.
+// The condition z > f1 is z0 + g . A > f1 (1 - g . slope) > 0, which is linear in the ray. Corners
+// therefore suffice.
 void SceneGeometry::CheckPlane(const std::string& place, const PlaneOptions& plane) const {
   for (const SceneRay& ray : OutermostRays(kFarthestDeviations)) {
     const double below = 1 - plane.slope.dot(ray.slope);
@@ -205,7 +206,7 @@ void SceneGeometry::CheckPlane(const std::string& place, const PlaneOptions& pla
   }
 }
 
-// [D40] The largest px on the plane, mm: with X = z t along the chief ray of slope t, the step per
+// [D40] The largest px on the plane, mm. With X = z t along the chief ray of slope t, the step per
 // px is p/K times dX/dt = z 1 + z^2/z0 t g^T, whose norm is at most z + z^2/z0 |t| |g|.
 double SceneGeometry::CoarsestPixelMm(const PlaneOptions& plane) const {
   double largest_mm = 0;
@@ -218,7 +219,8 @@ double SceneGeometry::CoarsestPixelMm(const PlaneOptions& plane) const {
   return largest_mm;
 }
 
-// Of what chief rays through the region meet; nothing if one of its corners meets nothing.
+// Bounding box of the points that chief rays through the region meet; nothing if the ray of a
+// corner misses the plane.
 std::optional<SceneGeometry::BoxMm> SceneGeometry::BoxOf(const PlaneOptions& plane,
                                                          const PictureRegion& region) const {
   BoxMm box;
@@ -234,8 +236,8 @@ std::optional<SceneGeometry::BoxMm> SceneGeometry::BoxOf(const PlaneOptions& pla
   return box;
 }
 
-// The outline's bounding box on the plane; nothing if it is whole, or reaches so far beside the
-// picture that no chief ray meets the plane there.
+// The outline's bounding box on the plane. The result is nothing if the outline is whole, or
+// extends so far beside the image that no chief ray meets the plane there.
 std::optional<SceneGeometry::BoxMm> SceneGeometry::OutlineBox(std::size_t index) const {
   const SceneLayer& layer = layers_[index];
   const OutlineOptions& outline = layer.outline;

@@ -27,7 +27,7 @@ const LinearPicture& Checked(const LinearPicture& picture, int width_px, int hei
   return picture;
 }
 
-// Where a line from the first value to the second, one px away, reaches `level` between them.
+// Position at which a line from the first value to the second, one px away, has the value `level`.
 double CrossingPx(double first, double second, double level) {
   return (level - first) / (second - first);
 }
@@ -76,12 +76,13 @@ void SceneMask::AreInside(const Eigen::Vector2d& centre_px, const float* x_px, c
   }
 }
 
-// Between two rows of pixels the values are linear on every column: what is inside reaches as far
-// to the sides on one of the rows as anywhere, where the values are linear, too.
+// Between two rows of pixels the values of each column are linear. The inside therefore extends as
+// far to the sides on one of the rows, where the values are linear too, as anywhere between them.
 void SceneMask::FindExtent() {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   extent_ = {{kInfinity, kInfinity}, {-kInfinity, -kInfinity}};
-  // A pixel that is inside, at `at` of a line; `before` and `after` are its neighbours'.
+  // Includes a pixel that is inside and has the index `at` on a line; `before` and `after` are the
+  // values of its neighbours.
   const auto include = [&](int axis, int at, int size, double before, double here, double after) {
     double low = at, high = at;
     if (before < kHalf) low = at - 1 + CrossingPx(before, here, kHalf);

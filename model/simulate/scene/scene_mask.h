@@ -10,25 +10,25 @@
 
 namespace thicklens::model {
 
-// An outline drawn as a picture: inside is where its values, bilinear between pixel centres and
-// beyond the outermost as there, are at least half of full scale.
+// An outline that is drawn as an image. Its values are bilinear between pixel centres and constant
+// beyond the outermost ones; a position is inside where the value is at least half of full scale.
 class SceneMask {
  public:
-  // Grey, 1 at full scale. Throws Error if it has other channels, another size than the picture's,
-  // or nothing inside; the message goes on after what `name` says.
+  // `picture` is grey, 1 at full scale. Throws Error if it has several channels, a size other than
+  // the scene's or nothing inside; the message begins with `name`.
   SceneMask(const LinearPicture& picture, int width_px, int height_px, const std::string& name);
 
   bool IsInside(const Eigen::Vector2d& position_px) const;
-  // Of centre + (x_i, y_i), i < count.
+  // Tests the positions centre + (x_i, y_i), i < count.
   void AreInside(const Eigen::Vector2d& centre_px, const float* x_px, const float* y_px, int count,
                  bool* inside) const;
-  // Whether all of the region is inside, and whether any of it may be; never true and never false,
-  // respectively, where that is not so.
+  // Covers is true only if the whole region is inside. MayTouch is false only if no position of the
+  // region is inside.
   bool Covers(const PictureRegion& region) const { return !(bounds_.Over(region).low < kHalf); }
   bool MayTouch(const PictureRegion& region) const { return bounds_.Over(region).high >= kHalf; }
 
-  // The least region that holds what is inside. A side at which the mask's outermost pixels are
-  // inside lies at infinity.
+  // The smallest region that contains all inside positions. A side is at infinity if the outermost
+  // pixels of the mask on that side are inside.
   const PictureRegion& extent() const { return extent_; }
 
  private:

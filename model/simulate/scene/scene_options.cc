@@ -1,4 +1,4 @@
-// What a simulated scene may be.
+// Valid options of a simulated scene.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -25,7 +25,7 @@ RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on) {
   if (on.Has(Effect::kLensFloor) && camera.calibration->blur_floor_px) {
     spread.gaussian_px = camera.calibration->blur_floor_px->value;
   }
-  // A floor that was measured holds the diffraction.
+  // A measured floor includes the diffraction.
   if (on.Has(Effect::kDiffraction) && !(spread.gaussian_px > 0)) {
     const double radius_px = AiryRadiusPx(camera, options.wavelength_mm);
     if (camera.psf == Psf::kDisc) {
@@ -43,15 +43,16 @@ ScenePhotograph::ScenePhotograph(const SceneSimulationOptions& options,
                                  const SceneSurvey& survey, const EffectSet& on,
                                  const TransferCurve& stored)
     : geometry_(geometry), textures_(textures), survey_(survey), blocks_(survey.blocks()), on_(on) {
-  // The thin lens of the same focus has K for its image distance.
+  // The image distance of the thin lens of the same focus is K.
   irradiance_distance_mm_ = on.Has(Effect::kThickness) ? options.camera.image_distance_mm()
                                                        : options.camera.focal_scale_px() *
                                                              geometry.sensor().pixel_pitch_mm;
   MakeSets(options, stored);
 }
 
-// The survey knows no effects. Without occlusion the middle of the aperture says what is seen where
-// rays meet the surface that a pixel shows, whatever else there is: as far away as those go.
+// The survey ignores the choice of effects. Without occlusion the middle of the aperture determines
+// which layer is visible at the points where rays meet the surface that a pixel shows. The search
+// therefore covers all positions that these rays reach.
 std::vector<std::size_t> ScenePhotograph::LayersFor(const PictureRegion& region,
                                                     const RaySpread& spread) const {
   const double landing_px = FarthestLandingPx(spread), deviations = FarthestDeviations(spread);
@@ -111,7 +112,7 @@ double ScenePhotograph::mean_rays_per_pixel() const {
   return rays / (static_cast<double>(geometry_.sensor().width_px) * geometry_.sensor().height_px);
 }
 
-// Relative, over the aperture: of points at +-1 standard deviation on both axes.
+// Relative sd over the aperture, from points at +-1 standard deviation on both axes.
 double ScenePhotograph::IrradianceSd(const SceneBlock& block) const {
   const Eigen::Vector2d& position_px = block.places.front().position_px;
   const double reach_mm = geometry_.aperture_sigma_mm();
@@ -139,9 +140,9 @@ ScenePhotograph::RaySet ScenePhotograph::Prepared(const std::vector<PixelRay>& r
     const Eigen::Vector2d behind_mm = sensor.pixel_pitch_mm * ray.offset_px + aperture_mm;
     behind_x(i) = static_cast<float>(behind_mm.x());
     behind_y(i) = static_cast<float>(behind_mm.y());
-    // The blur of a point on the axis is that of the calibration, fall-off included: [S12] counts
-    // relative to what the same part of the aperture brings to the principal point. A uniform
-    // radiance 1 gives 1 there.
+    // The blur of a point on the axis is that of the calibration, including fall-off. [S12] is
+    // therefore relative to the irradiance of the same part of the aperture at the principal point,
+    // where a uniform radiance 1 gives 1.
     exposure(i) =
         static_cast<float>(1 / Irradiance(axis_px, geometry_.RayAt(axis_px, aperture_mm)));
   }
@@ -155,7 +156,7 @@ double ScenePhotograph::Irradiance(const Eigen::Vector2d& position_px, const Sce
                        ray.aperture_mm, irradiance_distance_mm_);
 }
 
-// RayIrradiance of all of them at once.
+// Computes RayIrradiance for all rays of a part at once.
 RayNumbers ScenePhotograph::Weights(const RaySet& set, const Eigen::Vector2d& centre_px,
                                     const RayPart& part) const {
   if (!on_.Has(Effect::kFalloff)) return RayNumbers::Ones(part.count);
@@ -237,7 +238,7 @@ Eigen::Array3d ScenePhotograph::PixelAt(int x, int y) const {
     pixel.chiefs.push_back(pixel.set.rays.ChiefAt(pixel.centre_px, layer));
   }
   const Eigen::Index rays = pixel.set.rays.size();
-  // In parts: many numbers are not added up in float.
+  // Only the numbers of one part are added in float; the parts are added in double.
   Eigen::Array4d sum(0, 0, 0, 0);
   for (Eigen::Index first = 0; first < rays; first += kRaysAtOnce) {
     const RayPart part{first, std::min<Eigen::Index>(kRaysAtOnce, rays - first)};

@@ -14,50 +14,51 @@
 
 namespace thicklens::model {
 
-// By what the rays of a pixel miss it, with some effects on.
+// Returns the spread of the rays of a pixel with the given effects on.
 RaySpread SpreadOf(const SceneSimulationOptions& options, const EffectSet& on);
 
-// The pixels of a photograph, each the mean of as many rays as its block needs.
+// The pixels of a photograph. Each is the mean of the number of rays that its block needs.
 class ScenePhotograph {
  public:
-  // All but the options is kept by reference. `stored`: how light becomes stored values.
+  // All arguments except the options are kept by reference. `stored` converts light to stored
+  // values.
   ScenePhotograph(const SceneSimulationOptions& options, const SceneGeometry& geometry,
                   const std::vector<SceneTexture>& textures, const SceneSurvey& survey,
                   const EffectSet& on, const TransferCurve& stored);
 
   Eigen::Array3d PixelAt(int x, int y) const;
-  // The largest of all blocks, rms, of stored values; 255 at full scale.
+  // Maximum rms error of the stored values over all blocks; 255 is full scale.
   double sampling_error_grey_levels() const { return sampling_error_; }
   double mean_rays_per_pixel() const;
 
  private:
   struct RaySet {
     RayBundle rays;
-    // One over [S12] of each ray's place on the aperture at the principal point.
+    // The inverse of [S12] at the principal point, for each ray's position on the aperture.
     Eigen::ArrayXf exposure;
-    Eigen::ArrayXf behind_x, behind_y;  // of each ray, its slope behind the lens times d1
+    Eigen::ArrayXf behind_x, behind_y;  // slope of each ray behind the lens times d1
   };
 
-  // What rays of a region's pixels can show; in ascending order.
+  // Returns the layers that rays of a region's pixels can show, in ascending order.
   std::vector<std::size_t> LayersFor(const PictureRegion& region, const RaySpread& spread) const;
-  // Takes from the blocks the layers that no ray of these effects meets.
+  // Removes from the blocks the layers that no ray meets with these effects.
   void LookCloser(const RaySpread& spread);
   void MakeSets(const SceneSimulationOptions& options, const TransferCurve& stored);
   RaySet Prepared(const std::vector<PixelRay>& rays) const;
   double IrradianceSd(const SceneBlock& block) const;
   double Irradiance(const Eigen::Vector2d& position_px, const SceneRay& ray) const;
-  // 1 in the mean at the principal point.
+  // The mean of the weights is 1 at the principal point.
   RayNumbers Weights(const RaySet& set, const Eigen::Vector2d& centre_px,
                      const RayPart& part) const;
   struct Pixel {
     const SceneBlock& block;
     const RaySet& set;
     Eigen::Vector2d centre_px;
-    std::vector<ChiefHit> chiefs;  // of the block's layers
+    std::vector<ChiefHit> chiefs;  // one per layer of the block
   };
-  // Which of the block's layers each ray shows.
+  // Returns which of the block's layers each ray shows.
   RayBundle::Shown ShownBy(const Pixel& pixel, const RayPart& part) const;
-  // The weighed sum of the light of the rays that show one of them, block.layers[which].
+  // Returns the weighted sum of the light of the rays that show the layer block.layers[which].
   Eigen::Array4f LayerSum(const Pixel& pixel, std::size_t which, const RayBundle::Shown& shown,
                           const RayPart& part, const RayNumbers& weights) const;
 

@@ -20,7 +20,7 @@ namespace {
 constexpr char kSchema[] = "thicklens/simulate-scene/1";
 constexpr char kTruthSchema[] = "thicklens/scene-truth/1";
 
-// What is missing keeps the default that `field` came with.
+// A missing key keeps the default value of `field`.
 void ReadNumber(const YamlNode& node, const char* key, double* field) {
   if (const auto found = node.Find(key)) *field = found->Number();
 }
@@ -30,8 +30,8 @@ Eigen::Vector2d ReadPair(const YamlNode& node) {
   return {numbers[0].Number(), numbers[1].Number()};
 }
 
-// The truth of the simulation: the camera's calibration, in which `truth` replaces what it names.
-// What the calibration says of its making is no longer so.
+// The truth of the simulation is the camera's calibration with the values of `truth` in place of
+// its own. The evidence of the calibration no longer applies.
 void ReadTruth(const YamlNode& node, Camera* camera) {
   node.RequireKeys({"focus_depth_mm", "blur_ratio", "blur_floor_px"});
   CameraCalibration truth;
@@ -61,8 +61,8 @@ void ReadTruth(const YamlNode& node, Camera* camera) {
   camera->calibration = std::move(truth);
 }
 
-// The middle of the sensor: an odd difference leaves the extra row or column below or on the
-// right.
+// The crop is the middle of the sensor. An odd difference leaves the extra row or column below or
+// on the right.
 Camera Crop(const YamlNode& node, const Camera& camera) {
   const auto sides = node.ElementsExactly(2);
   PixelRect rect;
@@ -90,7 +90,7 @@ DepthMapOptions ReadDepth(const YamlNode& node) {
   return depth;
 }
 
-// Rectangle and disc, each in px of the picture or in mm; the keys say which. A mask is alone.
+// A rectangle or a disc is in px of the image or in mm, as its keys say. A mask has no other keys.
 OutlineOptions ReadOutline(const YamlNode& node) {
   OutlineOptions outline;
   if (const auto mask = node.Find("mask")) {
@@ -143,7 +143,7 @@ TextureKind ReadKind(const YamlNode& node) {
   return kinds[i];
 }
 
-// Each kind has the keys that mean something to it.
+// Each kind accepts only the keys that apply to it.
 std::vector<std::string> TextureKeys(TextureKind kind) {
   switch (kind) {
     case TextureKind::kUniform:
@@ -218,7 +218,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
                     "tolerance", "sampling_error_grey_levels", "rays_per_pixel", "wavelength_nm",
                     "full_well_electrons", "read_noise_electrons", "noise_sigma_grey_levels",
                     "bits", "views", "uv_depth_mm", "seed"});
-  constexpr int kAny = std::numeric_limits<int>::max();  // the options' own check is the bound
+  constexpr int kAny = std::numeric_limits<int>::max();  // IsValid checks the upper bound
   SceneSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);

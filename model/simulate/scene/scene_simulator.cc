@@ -25,10 +25,10 @@
 namespace thicklens::model {
 namespace {
 
-// No view is taken farther from the middle of the aperture, in its standard deviations: what the
-// planes must stand.
+// Maximum distance of a view from the middle of the aperture, in its standard deviations. The
+// planes are checked up to there.
 constexpr double kFarthestDeviations = 6;
-// Textures are drawn for so many: beyond them they repeat themselves.
+// Textures are drawn up to this number of standard deviations and repeat themselves beyond it.
 constexpr double kDrawnDeviations = 4;
 constexpr int kAiryViewRays = 256;
 
@@ -45,8 +45,8 @@ EffectConditions ConditionsOf(const SceneSimulationOptions& options) {
   return conditions;
 }
 
-// Where the rays of a view cross the aperture: those of the principal point, and how much farther
-// with each px beside it.
+// The crossing of the rays of a view with the aperture: that of the ray of the principal point, and
+// its displacement per px from it.
 struct Viewpoint {
   Eigen::Vector2d aperture_mm;
   double wander_mm_per_px = 0;
@@ -69,7 +69,7 @@ struct SceneSimulator::Impl {
     return given;
   }
 
-  // Whatever of box, floor and diffraction will be on.
+  // Upper bound of the spread by box, floor and diffraction, before the effects are decided.
   double LandingPx() const {
     const double floor_px = geometry.floor_px();
     const EffectChoice& choice = options.effects;
@@ -92,7 +92,7 @@ struct SceneSimulator::Impl {
     const double landing_px = LandingPx();
     survey.emplace(options.camera, geometry, textures, landing_px, threads);
     EffectChoice choice = options.effects;
-    // They cost nothing, and make the file that is asked for.
+    // These effects cost nothing and determine the format of the written file.
     choice.kept = choice.kept.With({Effect::kQuantisation, Effect::kTransferCurve});
     decision =
         DecideEffects(choice, ConditionsOf(options), survey->Places(), PictureEffects(), threads);
@@ -100,8 +100,9 @@ struct SceneSimulator::Impl {
     if (!On(Effect::kTransferCurve)) camera.sensor.transfer = TransferCurve::Linear();
   }
 
-  // Views are seen through a point of the aperture: what blurs the photograph does not hide there
-  // what box, floor and diffraction do, which cost nothing.
+  // A view is seen through a point of the aperture, so that the blur of the photograph does not
+  // conceal the effects of box, floor and diffraction. With kAuto they are on because they cost
+  // nothing.
   void MakeViewRays() {
     of_views = decision.on.Both(kOfViews);
     if (options.effects.base == EffectChoice::Base::kAuto) {
@@ -128,8 +129,8 @@ struct SceneSimulator::Impl {
     return sum.head<3>() / static_cast<double>(view_rays.size());
   }
 
-  // With ST in the plane of focus, s = (x - cx) ds whatever the view, and [S10] is
-  // a = ((zl + d0) u - zl s)/d0.
+  // With ST in the plane of focus, s = (x - cx) ds for each view, and [S10] is a = ((zl + d0) u -
+  // zl s)/d0.
   Viewpoint ViewpointOf(const LightFieldGrid& grid, int k, int l) const {
     Ray ray = grid.RayAt(0, 0, k, l);
     ray.s_mm = ray.t_mm = 0;
@@ -137,7 +138,7 @@ struct SceneSimulator::Impl {
             -grid.planes.uv_depth_mm / grid.planes.plane_spacing_mm * grid.s_step_mm};
   }
 
-  // Throws Error if a view looks past what is drawn.
+  // Throws Error if a view sees beyond the drawn textures.
   void CheckReach(const LightFieldGrid& grid) const {
     const double reach_mm = kDrawnDeviations * geometry.aperture_sigma_mm();
     const Viewpoint corner = ViewpointOf(grid, 0, 0);
@@ -157,7 +158,7 @@ struct SceneSimulator::Impl {
         grid.planes.uv_depth_mm, farthest_mm, kDrawnDeviations, geometry.aperture_sigma_mm()));
   }
 
-  // Calls work(row) for every row, on the run's threads.
+  // Calls work(row) for every row, on the threads of the run.
   static void ForRows(int count, const SceneRun& run, const std::function<void(int)>& work) {
     std::mutex mutex;
     int done = 0;
@@ -169,7 +170,7 @@ struct SceneSimulator::Impl {
     });
   }
 
-  // A picture whose pixels are light(x, y).
+  // Returns an image with the pixels light(x, y).
   template <typename Light>
   LinearPicture Render(const SceneRun& run, const Light& light) const {
     const Sensor& sensor = geometry.sensor();
@@ -213,7 +214,7 @@ struct SceneSimulator::Impl {
 
   const SceneSimulationOptions options;
   const SceneGeometry geometry;
-  std::vector<SceneTexture> textures;  // of the layers
+  std::vector<SceneTexture> textures;  // one per layer
   std::optional<SceneSurvey> survey;
   EffectDecision decision;
   Camera camera;
@@ -285,7 +286,8 @@ SceneTruth SceneSimulator::Truth(const RawDepthMap& depth) const {
   const auto [nearest, farthest] = std::minmax_element(depth.values.begin(), depth.values.end());
   truth.nearest_depth_mm = static_cast<double>(*nearest);
   truth.farthest_depth_mm = static_cast<double>(*farthest);
-  // r_defocus has its only minimum in the plane of focus: it is largest at one of the two ends.
+  // The only minimum of r_defocus is in the plane of focus, so that its maximum is at one of the
+  // two ends.
   for (const double depth_mm : {truth.nearest_depth_mm, truth.farthest_depth_mm}) {
     const double radius_mm = BlurRadiusMm(camera.lens, truth.image_distance_mm, depth_mm);
     truth.largest_blur_sigma_px = std::max(
@@ -307,7 +309,7 @@ LinearPicture SceneSimulator::RenderView(const Eigen::Vector2d& aperture_mm,
 LightField SceneSimulator::RenderLightField(int u_count, int v_count, const SceneRun& run) const {
   const Camera& camera = impl_->options.camera;
   const double uv_depth_mm = impl_->options.uv_depth_mm;
-  // Refuses a focus at infinity, where ST would lie.
+  // DefaultGrid throws Error for a focus at infinity, where ST would be.
   LightFieldGrid grid = DefaultGrid(camera, u_count, v_count);
   if (uv_depth_mm != 0) {
     grid = GridOnPlanes(camera, {uv_depth_mm, camera.focus_depth_mm() - uv_depth_mm}, u_count,
@@ -321,7 +323,7 @@ LightField SceneSimulator::RenderLightField(int u_count, int v_count, const Scen
   light_field.camera = impl_->camera;
   light_field.origin.method = "simulated";
   light_field.origin.effects = impl_->of_views.Names();
-  // Sample (i, j) of the plane of focus lies on the ray of pixel (i, j), whatever the view: Q = 0.
+  // Sample (i, j) of the plane of focus is on the ray of pixel (i, j) for every view: Q = 0.
   Impl::ForRows(u_count * v_count * grid.t_count, run, [&](int row) {
     const int y = row % grid.t_count;
     const int view = row / grid.t_count;

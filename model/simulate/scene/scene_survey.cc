@@ -12,21 +12,22 @@
 namespace thicklens::model {
 namespace {
 
-// Of the aperture: no ray of a photograph goes farther from its middle, in standard deviations.
+// Maximum distance of a ray of a photograph from the middle of the aperture, in standard
+// deviations.
 constexpr double kReachDeviations = kGaussianDeviations;
-// What a reach is widened by for depths that change along the way.
+// Factor that widens a reach because the depth changes along the way.
 constexpr double kReachMargin = 1.1;
-// Blocks around the picture that are looked at, too: blur brings in what lies beside it.
+// Maximum number of blocks around the image that are included because blur mixes in their light.
 constexpr int kMostMargin = 16;
-// Samples of a pixel on each axis, and what they can miss of the steepest slope and the sharpest
-// bend between them.
+// Number of samples of a pixel on each axis, and factors that compensate for the missed maxima of
+// slope and bend between them.
 constexpr int kSamples = 2;
 constexpr float kMissedSlope = 1.35F;
 constexpr float kMissedBend = 1.5F;
 
 constexpr int kBlockSamples = SceneSurvey::kBlockPx * kSamples;
 
-// Of one layer in one block.
+// Extremes of one layer in one block.
 struct Detail {
   Eigen::Array4f dark = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array4f bright = -dark;
@@ -41,7 +42,7 @@ struct Detail {
   }
 };
 
-// The blocks of the picture and of a margin around it.
+// The blocks of the image and of a margin around it.
 struct BlockGrid {
   int columns = 0, rows = 0, margin = 0;
 
@@ -60,7 +61,7 @@ struct BlockGrid {
   }
 };
 
-// What the layer, its outline left out, shows to chief rays in each block.
+// The detail that chief rays see of a layer in each block, without its outline.
 class LayerDetail {
  public:
   LayerDetail(const SceneGeometry& geometry, const SceneTexture& texture, std::size_t layer,
@@ -74,8 +75,8 @@ class LayerDetail {
     for (const Detail& detail : details_) anything_.Add(detail);
   }
 
-  // Of all blocks within a distance of one. What lies beyond those that were looked at may be
-  // anything that the texture has, as steep as the steepest seen.
+  // The detail of all blocks within a distance of one block. Beyond the surveyed blocks, any value
+  // of the texture and the steepest surveyed slope are assumed.
   Detail Around(int column, int row, double distance_px) const {
     const int reach = static_cast<int>(std::ceil(distance_px / SceneSurvey::kBlockPx));
     if (reach > kMostMargin) return anything_;
@@ -91,7 +92,7 @@ class LayerDetail {
   }
 
  private:
-  // A sample for each of a row, from one before the first block on. Where nothing is met: NaN.
+  // Samples one row, from one sample before the first block on. A ray that meets nothing gives NaN.
   void Sample(int sample_row, std::vector<Eigen::Array4f>* lights) const {
     const double y_px = (sample_row + 0.5) / kSamples - 0.5;
     const int first = -kBlockSamples * grid_.margin - 1;
@@ -143,7 +144,7 @@ class LayerDetail {
   Detail anything_;
 };
 
-// The most and the least 1/z of the layer over the region; of a plane it is linear there.
+// The minimum and maximum 1/z of the layer over the region. For a plane 1/z is linear there.
 std::pair<double, double> InverseDepths(const SceneGeometry& geometry, std::size_t layer,
                                         const PictureRegion& region) {
   if (const HeightField* field = geometry.height_field(layer)) {
@@ -168,8 +169,8 @@ Eigen::Vector2d FarthestPx(const SceneBlock& block, const Eigen::Vector2d& axis_
       .select(low_px, high_px);
 }
 
-// Of the fall-off at a position, with thickness or without: that of the chief ray, and a little for
-// the others.
+// Minimum of the fall-off at a position, with or without thickness: that of the chief ray, with a
+// margin for the other rays.
 double LeastIrradiance(const Camera& camera, const Eigen::Vector2d& position_px) {
   constexpr double kOfOthers = 0.98;
   const Eigen::Vector2d from_axis_px = position_px - camera.sensor.principal_point_px;
@@ -181,8 +182,9 @@ double LeastIrradiance(const Camera& camera, const Eigen::Vector2d& position_px)
                               at(camera.focal_scale_px() * camera.sensor.pixel_pitch_mm));
 }
 
-// Gloss moves against its layer from ray to ray: wherever it may be seen, all of it is counted, its
-// steepest slope s exp(-1/2)/sigma and its sharpest bend 2 s/sigma^2, in its middle.
+// Gloss moves relative to its layer from ray to ray. Wherever it may be visible, all of it is
+// counted: its steepest slope s exp(-1/2)/sigma, and its sharpest bend 2 s/sigma^2, which is in its
+// middle.
 Detail GlossOf(const SceneLayer& layer) {
   Detail detail;
   detail.dark = detail.bright = Eigen::Array4f::Zero();
@@ -194,10 +196,10 @@ Detail GlossOf(const SceneLayer& layer) {
   return detail;
 }
 
-// What rays through aperture positions of up to so many mm see of a height field in a region is
-// what chief rays see, compressed. Derived here [D42]: x' = x + A V(x'), so that dx'/dx is at most
-// m = 1/(1 - a), a = |A| |grad V|, and jumps by at most m^3 |A| jump(grad V) from pixel to pixel.
-// False where a is too large for these to mean anything: there they may meet it more than once.
+// Rays through aperture positions up to a given distance see a height field in a region like chief
+// rays, but compressed. Derived here [D42]: x' = x + A V(x'), so that dx'/dx is at most m = 1/(1 -
+// a), a = |A| |grad V|, and its jumps from pixel to pixel are at most m^3 |A| jump(grad V). Returns
+// false if a is too large for these bounds; the rays may then meet the field more than once.
 bool Compress(const HeightField& field, const PictureRegion& region, double aperture_mm,
               Detail* detail) {
   constexpr double kSteepest = 0.3;
@@ -216,7 +218,7 @@ class BlurDepths {
   BlurDepths(const SceneGeometry& geometry, double inverse_focus)
       : geometry_(geometry), inverse_focus_(inverse_focus) {}
 
-  // Of one thing, by its least and most 1/z.
+  // Adds one object by its minimum and maximum 1/z.
   void Add(double least, double most) {
     const bool least_is_farther =
         std::abs(least - inverse_focus_) > std::abs(most - inverse_focus_);
@@ -299,7 +301,7 @@ std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureR
                                    double landing_px, double deviations) {
   struct Candidate {
     std::size_t layer;
-    double least, most;  // 1/z
+    double least, most;  // of 1/z
     bool covers;
   };
   std::vector<Candidate> candidates;
@@ -328,7 +330,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
   columns_ = (sensor.width_px + kBlockPx - 1) / kBlockPx;
   rows_ = (sensor.height_px + kBlockPx - 1) / kBlockPx;
   BlockGrid grid{columns_, rows_, 0};
-  std::vector<double> reaches;  // block by block, of each of its layers
+  std::vector<double> reaches;  // block by block, one per layer of the block
   for (int row = 0; row < rows_; ++row) {
     ThrowIfCancelled();
     for (int column = 0; column < columns_; ++column) {
@@ -394,7 +396,7 @@ SceneSurvey::SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
       EffectPlace place;
       place.position_px = FarthestPx(block, sensor.principal_point_px);
       depths.Fill(&place);
-      // Fall-off makes light darker than radiance, never brighter.
+      // Fall-off can only make the light darker than the radiance.
       const double darkening = LeastIrradiance(camera, place.position_px);
       for (int c = 0; c < 3; ++c) {
         place.dark = darkening * static_cast<double>(seen.dark(c));

@@ -12,45 +12,45 @@
 
 namespace thicklens::model {
 
-// Radiance of a ray that meets a layer: its texture and the gloss on it; R, G, B and a number that
-// means nothing.
+// Radiance of a ray that meets a layer, from its texture and its gloss: R, G, B and an unused
+// number.
 Eigen::Array4f LayerLight(const SceneGeometry& geometry, const SceneTexture& texture,
                           std::size_t layer, const SceneRay& ray,
                           const Eigen::Vector2d& on_texture);
 
-// A block of a picture's pixels, [x0, x1) x [y0, y1).
+// A block of an image's pixels, [x0, x1) x [y0, y1).
 struct SceneBlock {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-  std::vector<std::size_t> layers;  // all that its rays can meet
-  double sigma_px = 0;              // the largest defocus of these
-  // One of these is a height field so uneven that rays may meet it more than once.
+  std::vector<std::size_t> layers;  // all layers that its rays can meet
+  double sigma_px = 0;              // maximum defocus of these layers
+  // True if one of these is a height field so uneven that rays may meet it more than once.
   bool has_folds = false;
-  // What is photographed there, of each channel.
+  // The content of the photograph there, one per channel.
   std::array<EffectPlace, 3> places;
 };
 
-// How far from a region of the picture the chief positions of what its rays meet on a layer, or in
-// its gloss, may lie, px, if they land up to `landing_px` from where they would and go through the
-// aperture up to so many of its standard deviations from its middle.
+// Maximum distance, px, from a region of the image to the chief positions of the points that its
+// rays meet on a layer or in its gloss. The rays land up to `landing_px` from their nominal
+// positions and pass the aperture up to `deviations` of its standard deviations from its middle.
 double ReachPx(const SceneGeometry& geometry, std::size_t layer, const PictureRegion& region,
                double landing_px, double deviations);
-// The layers that such rays can meet, in ascending order: not those that lie behind one that fills
-// what they reach.
+// Returns the layers that such rays can meet, in ascending order. Layers behind one that fills the
+// region in reach are left out.
 std::vector<std::size_t> MetLayers(const SceneGeometry& geometry, const PictureRegion& region,
                                    double landing_px, double deviations);
 
-// What a scene holds where, found before any picture is taken: by one ray for each quarter of a
-// pixel, through the middle of the aperture.
+// The content of a scene at each place, determined before any image is computed: one ray for each
+// quarter of a pixel, through the middle of the aperture.
 class SceneSurvey {
  public:
   static constexpr int kBlockPx = 8;
 
-  // `landing_px`: how far from its pixel's centre a ray may land.
+  // `landing_px`: maximum distance of a ray's landing point from its pixel's centre.
   SceneSurvey(const Camera& camera, const SceneGeometry& geometry,
               const std::vector<SceneTexture>& textures, double landing_px, int threads);
 
   const std::vector<SceneBlock>& blocks() const { return blocks_; }
-  // Of the block that holds a pixel.
+  // Index of the block that contains a pixel.
   std::size_t IndexAt(int x, int y) const {
     return static_cast<std::size_t>(y / kBlockPx) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(x / kBlockPx);

@@ -21,13 +21,13 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// The largest leaf, as a part of the shorter side of what is seen.
+// The largest leaf, as a fraction of the shorter side of the visible part.
 constexpr double kLargestLeaf = 1.0 / 6;
-// Of a star whose sectors are not given.
+// Number of cycles of a star without a given sector width.
 constexpr double kStarCycles = 36;
 constexpr double kStarMarginPx = 8;
 
-constexpr int kRowsOfBand = 64;  // that a thread works on
+constexpr int kRowsOfBand = 64;  // rows that a thread processes at once
 
 struct FeatureRange {
   double chosen_px, smallest_px, largest_px;
@@ -38,9 +38,9 @@ FeatureRange FeatureRangeOf(TextureKind kind) {
     case TextureKind::kUniform:
       return {1, 0, 1000};
     case TextureKind::kSine:
-      return {8, 0, 1e6};  // the shortest period is the layer's, see SetWave
+      return {8, 0, 1e6};  // the shortest period depends on the layer, see SetWave
     case TextureKind::kEdge:
-      return {0, 0, 1e6};  // the least is the layer's
+      return {0, 0, 1e6};  // the minimum depends on the layer
     case TextureKind::kCheckerboard:
       return {12, 1, 1000};
     case TextureKind::kSiemensStar:
@@ -67,7 +67,8 @@ double FeaturePx(const TextureOptions& options) {
   return size_px;
 }
 
-// What a leaf or a noise adds to each channel's mean, from -1 to 1: common and own parts.
+// Colour that a leaf or a noise adds to each channel's mean, from -1 to 1: the sum of a common and
+// an independent part.
 std::array<double, 3> DrawnColour(const TextureOptions& options, RandomDraws* draws) {
   const double common = 2 * draws->Uniform() - 1;
   std::array<double, 3> colour;
@@ -77,20 +78,20 @@ std::array<double, 3> DrawnColour(const TextureOptions& options, RandomDraws* dr
   return colour;
 }
 
-// In samples of a canvas.
+// A disc, in samples of a canvas.
 struct Leaf {
   double x = 0, y = 0, radius = 0;
   std::array<float, 3> light{};
 };
 
-// A leaf behind those that are there; `through` is what still shines through them, of each sample.
-// Returns how much of that the leaf hides.
+// Draws a leaf behind the present ones. `through` is the transmitted part of each sample. Returns
+// the sum of the newly hidden parts.
 double PaintBehind(const Leaf& leaf, cv::Mat* through, std::array<cv::Mat, 3>* light) {
   const int columns = through->cols, rows = through->rows;
   const double outer_square = (leaf.radius + 0.5) * (leaf.radius + 0.5);
   const double inner = std::max(leaf.radius - 0.5, 0.0);
   double hidden_all = 0;
-  // A leaf wider than the tile would lie on itself.
+  // A leaf wider than the tile would overlap itself.
   const int reach = std::min(static_cast<int>(std::ceil(leaf.radius + 1)), (rows - 1) / 2);
   const int centre_y = static_cast<int>(leaf.y);
   for (int i = centre_y - reach; i <= centre_y + reach; ++i) {
@@ -103,12 +104,12 @@ double PaintBehind(const Leaf& leaf, cv::Mat* through, std::array<cv::Mat, 3>* l
     const double half_chord = std::min(std::sqrt(outer_square - dy * dy), (columns - 1) / 2.0);
     const int first = static_cast<int>(std::ceil(leaf.x - half_chord));
     const int last = static_cast<int>(std::floor(leaf.x + half_chord));
-    // What reaches over a side comes in at the other.
+    // Parts beyond a side continue at the opposite side.
     for (const int shift : {-columns, 0, columns}) {
       for (int j = std::max(first, shift); j <= std::min(last, shift + columns - 1); ++j) {
         const int column = j - shift;
         if (open[column] == 0) continue;
-        // The part of the sample's cell that the leaf covers, its border taken as straight.
+        // The covered part of the sample's cell, with the leaf's border assumed to be straight.
         const double distance_square = (j - leaf.x) * (j - leaf.x) + dy * dy;
         float hidden = open[column];
         if (distance_square > inner * inner) {
@@ -124,8 +125,9 @@ double PaintBehind(const Leaf& leaf, cv::Mat* through, std::array<cv::Mat, 3>* l
   return hidden_all;
 }
 
-// Discs that hide each other, radii distributed as r^-3 between the smallest and the largest: the
-// statistics of natural pictures. Drawn from the front backward until nothing shines through.
+// Discs that occlude each other, with radii distributed as r^-3 between the smallest and the
+// largest: the statistics of natural images. They are drawn from the front backward until nothing
+// shines through.
 TextureCanvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest& request,
                              RandomDraws* draws) {
   TextureCanvas canvas =
@@ -136,7 +138,8 @@ TextureCanvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest
       std::max(kLargestLeaf * std::min(canvas.width_mm(), canvas.height_mm()), 2 * smallest_mm);
   const double small_term = 1 / (smallest_mm * smallest_mm);
   const double large_term = 1 / (largest_mm * largest_mm);
-  cv::Mat open(canvas.rows, canvas.columns, CV_32F, cv::Scalar(1));  // what still shines through
+  // transmitted part of each sample
+  cv::Mat open(canvas.rows, canvas.columns, CV_32F, cv::Scalar(1));
   const double total = static_cast<double>(open.total());
   double remaining = total;
   while (remaining > 1e-4 * total) {
@@ -155,8 +158,8 @@ TextureCanvas DrawDeadLeaves(const TextureOptions& options, const TextureRequest
   return canvas;
 }
 
-// Gaussian noise whose amplitude falls as 1/f, from one cycle per side of what is seen up to the
-// shortest period. A tanh keeps it between no light and twice the mean.
+// Gaussian noise whose amplitude decreases as 1/f, from one cycle per side of the visible part up
+// to the shortest period. A tanh limits it to the range from 0 to twice the mean.
 TextureCanvas DrawNoise(const TextureOptions& options, const TextureRequest& request,
                         RandomDraws* draws, int threads) {
   TextureCanvas canvas =
@@ -183,7 +186,7 @@ TextureCanvas DrawNoise(const TextureOptions& options, const TextureRequest& req
   const cv::Mat common = draw();
   for (cv::Mat& channel : canvas.light) {
     channel = (1 - options.saturation) * common + options.saturation * draw();
-    // Two independent parts of variance 1.
+    // The two parts are independent and have the variance 1.
     channel /= std::hypot(1 - options.saturation, options.saturation);
     for (int i = 0; i < channel.rows; ++i) {
       ThrowIfCancelled();
@@ -213,9 +216,10 @@ TextureCanvas DrawCheckerboard(const TextureOptions& options, const TextureReque
   return canvas;
 }
 
-// Bright and dark sectors around the middle of what is seen.
+// Bright and dark sectors around the middle of the visible part.
 TextureCanvas DrawSiemensStar(const TextureOptions& options, const TextureRequest& request) {
-  // Where the tile begins anew the sectors do not fit: away from what is seen.
+  // The sectors do not match where the tile repeats; the margin keeps this outside of the visible
+  // part.
   const Eigen::Vector2d margin_mm =
       Eigen::Vector2d::Constant(kStarMarginPx * request.coarsest_pixel_mm);
   TextureCanvas canvas = MakeTextureCanvas(request.low_mm - margin_mm, request.high_mm + margin_mm,
@@ -236,7 +240,7 @@ TextureCanvas DrawSiemensStar(const TextureOptions& options, const TextureReques
   return canvas;
 }
 
-// One channel of a picture of 1 (grey), 3 (RGB) or 4 (RGBA) channels.
+// One channel of an image of 1 (grey), 3 (RGB) or 4 (RGBA) channels.
 cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
   cv::Mat values(picture.height_px, picture.width_px, CV_32F);
   for (int y = 0; y < picture.height_px; ++y) {
@@ -248,7 +252,7 @@ cv::Mat ChannelOf(const LinearPicture& picture, int channel) {
   return values;
 }
 
-// The user's picture, upright and around the centre; beyond its sides it is mirrored, so that its
+// The user's image, upright and around the centre. It is mirrored beyond its sides, so that its
 // tile is twice as large.
 TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& request,
                           const LinearPicture& picture) {
@@ -256,7 +260,7 @@ TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& r
     throw Error(fmt::format("texture.picture '{}' is empty", options.picture_path));
   }
   const double shape = static_cast<double>(picture.height_px) / picture.width_px;
-  // Chosen: all that is seen lies on it.
+  // The default width covers the whole visible part.
   const Eigen::Vector2d reach_mm =
       (request.high_mm - request.centre_mm).cwiseMax(request.centre_mm - request.low_mm);
   const double feature_px = FeaturePx(options);
@@ -275,7 +279,7 @@ TextureCanvas DrawPicture(const TextureOptions& options, const TextureRequest& r
   canvas.columns = 2 * size.width;
   canvas.rows = 2 * size.height;
   canvas.spacing_mm = {size_mm.x() / size.width, size_mm.y() / size.height};
-  // Samples lie in the middle of their cells.
+  // Samples are in the middle of their cells.
   canvas.origin_mm = request.centre_mm - size_mm / 2 + canvas.spacing_mm / 2;
   for (int c = 0; c < 3; ++c) {
     cv::Mat resized;
@@ -303,7 +307,7 @@ TextureCanvas Draw(const TextureOptions& options, const TextureRequest& request,
   }
 }
 
-// Every channel gets its colour for its mean.
+// Scales the mean of each channel to its colour.
 void Paint(const Eigen::Vector3d& colour, TextureCanvas* canvas) {
   for (std::size_t c = 0; c < 3; ++c) {
     cv::Mat& channel = canvas->light[c];
@@ -315,7 +319,7 @@ void Paint(const Eigen::Vector3d& colour, TextureCanvas* canvas) {
 
 SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& request,
                            const LinearPicture& picture, RandomDraws* draws, int threads) {
-  FeaturePx(options);  // throws
+  FeaturePx(options);  // throws Error for a wrong size
   colour_.head<3>() = options.colour.cast<float>().array();
   if (options.kind == TextureKind::kUniform) return;
   if (options.kind == TextureKind::kSine || options.kind == TextureKind::kEdge) {
@@ -344,7 +348,7 @@ SceneTexture::SceneTexture(const TextureOptions& options, const TextureRequest& 
       const float* green = canvas.light[1].ptr<float>(i);
       const float* blue = canvas.light[2].ptr<float>(i);
       for (int j = 0; j < columns_; ++j, ++sample) {
-        // The limited band may overshoot beside a dark edge: there is no negative light.
+        // The limited band may overshoot beside a dark edge, but light is never negative.
         *sample = Eigen::Array4f(red[j], green[j], blue[j], 0).max(0);
         darkest = darkest.min(*sample);
         brightest = brightest.max(*sample);
@@ -361,11 +365,11 @@ void SceneTexture::SetWave(const TextureOptions& options, const TextureRequest& 
   const Eigen::Vector2d direction(std::cos(angle_rad), std::sin(angle_rad));
   is_edge_ = options.kind == TextureKind::kEdge;
   amplitude_ = options.contrast;
-  // A sine's period, an edge's sigma. The latter has exp(-2 pi^2/4) at half a cycle per px.
+  // Period of a sine or sigma of an edge. The latter has exp(-2 pi^2/4) at half a cycle per px.
   const double least_mm = request.coarsest_pixel_mm * (is_edge_ ? 1 : 1 / kHighestFrequency);
   double size_mm = FeaturePx(options) * request.pixel_mm;
   if (is_edge_ && size_mm == 0) size_mm = least_mm;
-  // What is chosen, or stated to the last digit, is not refused for rounding.
+  // A chosen value, or one given to the last digit, must not fail because of rounding.
   if (!(size_mm >= least_mm * (1 - 1e-12))) {
     throw Error(fmt::format(
         "texture.feature_size_px is {}: the {} must be at least {:.4g} here, {} of the layer's "
@@ -388,7 +392,7 @@ Eigen::Array4f SceneTexture::SumAround(const Eigen::Vector2d& centre_mm, const f
   }
   Eigen::Array4f sum = Eigen::Array4f::Zero();
   if (!tile_.empty()) {
-    // In samples, from the one that is the first of all four sides' whole numbers on.
+    // Positions in samples, relative to the first sample at or before all positions on both axes.
     const Eigen::Vector2d centre = (centre_mm - origin_mm_).cwiseProduct(per_mm_);
     const Eigen::Vector2d whole = centre.array().floor();
     const Eigen::Vector2f part = (centre - whole).cast<float>(), per_mm = per_mm_.cast<float>();

@@ -13,27 +13,27 @@
 
 namespace thicklens::model {
 
-// What a layer's texture must do. Positions are (X, Y), mm from the optical axis; of a height field
-// they are those of the picture, and its mm are px.
+// Requirements for a layer's texture. Positions are (X, Y), mm from the optical axis. For a height
+// field they are positions of the image, and px replace mm.
 struct TextureRequest {
-  Eigen::Vector2d low_mm{0, 0}, high_mm{0, 0};  // what can be seen of the layer
-  Eigen::Vector2d centre_mm{0, 0};              // of an edge, a star or a picture
+  Eigen::Vector2d low_mm{0, 0}, high_mm{0, 0};  // the visible part of the layer
+  Eigen::Vector2d centre_mm{0, 0};              // of an edge, a star or an image
   double pixel_mm = 0;                          // one px at the layer's depth on the axis
   double coarsest_pixel_mm = 0;                 // the largest px on the layer
 };
 
-// The painted plane: RGB radiance at every position. Uniform, sine and edge are in closed form; the
-// others are tiles. A tile repeats itself, a picture mirrored;
-// between its samples, four to the coarsest px, it is linear, and the samples are such that what
-// is below half a cycle per px comes out at its full amplitude.
+// The painted plane: RGB radiance at every position. Uniform, sine and edge have a closed form; the
+// other kinds are tiles. A tile repeats itself, an image (kPicture) after mirroring. A tile has
+// four samples per coarsest px and is linear between them. The samples are corrected so that
+// frequencies below half a cycle per px keep their full amplitude.
 class SceneTexture {
  public:
-  // Throws Error for a feature size that the layer cannot show, or an empty picture. `threads` (0:
-  // one per core) do not change it.
+  // Throws Error for a feature size that the layer cannot show, or an empty image. The result does
+  // not depend on `threads` (0: one per core).
   SceneTexture(const TextureOptions& options, const TextureRequest& request,
                const LinearPicture& picture, RandomDraws* draws, int threads = 1);
 
-  // Bounds of R, G and B.
+  // Lower and upper bounds of R, G and B.
   Eigen::Array4f Darkest() const {
     return tile_.empty() ? colour_ * static_cast<float>(1 - amplitude_) : darkest_;
   }
@@ -41,7 +41,7 @@ class SceneTexture {
     return tile_.empty() ? colour_ * static_cast<float>(1 + amplitude_) : brightest_;
   }
 
-  // R, G, B and a 0.
+  // Returns R, G, B and a 0.
   Eigen::Array4f At(double x_mm, double y_mm) const {
     if (!tile_.empty()) return TileAt(x_mm, y_mm);
     if (amplitude_ == 0) return colour_;
@@ -50,13 +50,13 @@ class SceneTexture {
                                                                    : std::cos(phase)));
   }
 
-  // The sum of weight_i At(centre + (x_i, y_i)), i < count <= kMostAtOnce.
+  // Returns the sum of weight_i At(centre + (x_i, y_i)), i < count <= kMostAtOnce.
   static constexpr int kMostAtOnce = 64;
   Eigen::Array4f SumAround(const Eigen::Vector2d& centre_mm, const float* x_mm, const float* y_mm,
                            const float* weight, int count) const;
 
  private:
-  // Of a sine or an edge.
+  // Sets the parameters of a sine or an edge.
   void SetWave(const TextureOptions& options, const TextureRequest& request);
 
   Eigen::Array4f TileAt(double x_mm, double y_mm) const {
@@ -79,13 +79,13 @@ class SceneTexture {
                  static_cast<std::size_t>(column)];
   }
 
-  // As std::floor, which is a call where the processor need not have it.
+  // Equals std::floor, which is a function call if the target processor has no instruction for it.
   static std::int64_t WholeBelow(double x) {
     const auto toward_zero = static_cast<std::int64_t>(x);
     return static_cast<double>(toward_zero) > x ? toward_zero - 1 : toward_zero;
   }
 
-  // A position may be far away where a plane runs to great depths.
+  // A position may be far away where a plane extends to great depths.
   static int Wrapped(std::int64_t index, int count) {
     if (index >= 0 && index < count) return static_cast<int>(index);
     const auto inside = static_cast<int>(index % count);
@@ -95,12 +95,12 @@ class SceneTexture {
   Eigen::Array4f colour_{0, 0, 0, 0};
   double amplitude_ = 0;  // of a sine or an edge
   bool is_edge_ = false;
-  Eigen::Vector2d wave_{0, 0};        // radians per mm; of an edge: direction/(sqrt(2) sigma)
-  double edge_at_ = 0;                // wave_ . middle
+  Eigen::Vector2d wave_{0, 0};        // radians per mm; for an edge direction/(sqrt(2) sigma)
+  double edge_at_ = 0;                // value of wave_ . middle
   std::vector<Eigen::Array4f> tile_;  // empty: closed form
   Eigen::Array4f darkest_{0, 0, 0, 0}, brightest_{0, 0, 0, 0};
   int columns_ = 0, rows_ = 0;
-  Eigen::Vector2d origin_mm_{0, 0};  // of the sample (0, 0)
+  Eigen::Vector2d origin_mm_{0, 0};  // position of the sample (0, 0)
   Eigen::Vector2d per_mm_{0, 0};     // samples per mm
 };
 

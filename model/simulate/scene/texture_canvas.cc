@@ -11,12 +11,12 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Rows transformed together: enough to spread the set-up of the transform, few enough for the
-// cache.
+// Number of rows that are transformed together: enough to share the set-up of the transform, few
+// enough for the cache.
 constexpr int kRowsAtOnce = 32;
 
-// Detail fades towards the limit of the band as behind a Gaussian of this width, so that edges do
-// not ring.
+// Detail decreases towards the limit of the band like that behind a Gaussian of this width, so that
+// edges do not ring.
 constexpr double kSoftnessPx = 0.5;
 
 int QuickCount(double samples) {
@@ -56,7 +56,7 @@ void FilterSamples(const TextureCanvas& canvas, double highest_per_mm,
                    const std::function<double(double fx, double fy)>& gain, int threads,
                    cv::Mat* samples) {
   const int rows = canvas.rows, columns = canvas.columns;
-  // The highest frequency of an even count has no phase of its own, and is left out.
+  // The highest frequency of an even count has no phase of its own and is left out.
   const auto last_below = [&](double length_mm, int count) {
     return static_cast<int>(std::min(std::floor(highest_per_mm * length_mm), (count - 1) / 2.0));
   };
@@ -68,9 +68,10 @@ void FilterSamples(const TextureCanvas& canvas, double highest_per_mm,
     });
   };
 
-  cv::Mat spectrum(last_x + 1, rows, CV_32FC2);  // frequencies fx down, first y, then fy across
+  cv::Mat spectrum(last_x + 1, rows, CV_32FC2);  // a row for each fx; its columns are first y, then
+                                                 // fy
   in_blocks(rows, [&](const cv::Range& range) {
-    cv::Mat packed;  // a row: Re 0, Re 1, Im 1, Re 2, ..
+    cv::Mat packed;  // format of a row: Re 0, Re 1, Im 1, Re 2, ..
     cv::dft(samples->rowRange(range), packed, cv::DFT_ROWS);
     for (int a = 0; a <= last_x; ++a) {
       auto* column = spectrum.ptr<std::complex<float>>(a) + range.start;
@@ -111,7 +112,7 @@ void FilterSamples(const TextureCanvas& canvas, double highest_per_mm,
 }
 
 void LimitBand(double coarsest_pixel_mm, int threads, TextureCanvas* canvas) {
-  // The lines between the samples have the transfer sinc^2(spacing f) on each axis.
+  // Linear interpolation between the samples has the transfer sinc^2(spacing f) on each axis.
   const auto gain = [&](double fx_per_mm, double fy_per_mm) {
     const double f2 =
         (fx_per_mm * fx_per_mm + fy_per_mm * fy_per_mm) * coarsest_pixel_mm * coarsest_pixel_mm;

@@ -11,10 +11,11 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// A box this narrow blurs by less than 1e-11/sigma^2, and dividing by it does not lose the digits.
+// A box this narrow blurs by less than 1e-11/sigma^2, and the division by it does not lose
+// significant digits.
 constexpr double kNarrowestBoxPx = 1e-5;
 
-// Phi(-9) = 1e-19.
+// Reach in sigmas: Phi(-9) = 1e-19.
 constexpr double kGaussianReach = 9;
 
 // [D33] Second antiderivative, px^2, of the normal distribution Phi(x/sigma), 0 at -infinity:
@@ -27,9 +28,9 @@ double GaussianSecondAntiderivative(double x, double sigma) {
   return ((x * x + sigma * sigma) * cumulative + x * sigma * density) / 2;
 }
 
-// The same [D33], px^2, for the step blurred by a disc of radius R, 1/2 + [u s + asin u]/pi, u =
-// x/R, s = sqrt(1 - u^2). Derived by integrating twice: R^2 {u^2/4 + [(u^2/2 + 1/8) asin u + u s
-// (13/24 + u^2/12)]/pi + 1/16}, and x^2/2 + R^2/8 behind.
+// Second antiderivative [D33], px^2, of the step blurred by a disc of radius R, 1/2 + [u s + asin
+// u]/pi, u = x/R, s = sqrt(1 - u^2). Derived by integrating twice: R^2 {u^2/4 + [(u^2/2 + 1/8) asin
+// u + u s (13/24 + u^2/12)]/pi + 1/16}, and x^2/2 + R^2/8 behind the disc.
 double DiscSecondAntiderivative(double x, double radius) {
   if (x <= -radius) return 0;
   if (x >= radius) return x * x / 2 + radius * radius / 8;
@@ -39,9 +40,9 @@ double DiscSecondAntiderivative(double x, double radius) {
   return radius * radius * (u * u / 4 + bracket / kPi + 1.0 / 16);
 }
 
-// The same, px^2, for the step blurred by a ring of radius R, 1/2 + asin(u)/pi: derived by
-// integrating twice, R^2 {u^2/4 + [(u^2/2 + 1/4) asin u + 3/4 u s]/pi + 1/8}, and x^2/2 + R^2/4
-// behind.
+// Second antiderivative [D33], px^2, of the step blurred by a ring of radius R, 1/2 + asin(u)/pi.
+// Derived by integrating twice: R^2 {u^2/4 + [(u^2/2 + 1/4) asin u + 3/4 u s]/pi + 1/8}, and x^2/2
+// + R^2/4 behind the ring.
 double RingSecondAntiderivative(double x, double radius) {
   if (x <= -radius) return 0;
   if (x >= radius) return x * x / 2 + radius * radius / 4;
@@ -78,7 +79,7 @@ EdgeSpread::EdgeSpread(double angle_rad, double gaussian_sigma_px, const PupilPr
   if (sigma_px_ > 0 || profile.psf() == Psf::kGaussian) Tabulate(angle_rad);
 }
 
-// The widths of the pixel box across the edge.
+// Sets the widths of the pixel box across the edge.
 void EdgeSpread::SetBoxes(double angle_rad) {
   const double a = std::abs(std::cos(angle_rad));
   const double b = std::abs(std::sin(angle_rad));
@@ -119,13 +120,13 @@ double EdgeSpread::BlurredStep(double x) const {
   return x == 0 ? 0.5 : x > 0 ? 1 : 0;
 }
 
-// An edge at 0, back at L/2, and so on with period L, behind a real transfer T:
-// 1/2 + sum over odd k of 2/(pi k) T(k/L) sin(2 pi k d/L). The two edges do not meet for L > 4
-// reach.
+// The series is that of an edge at 0, an opposite edge at L/2, and so on with period L, behind a
+// real transfer function T: 1/2 + sum over odd k of 2/(pi k) T(k/L) sin(2 pi k d/L). The two edges
+// do not overlap for L > 4 reach.
 void EdgeSpread::Tabulate(double angle_rad) {
-  // Steps of sigma/40: the cubic between four nodes is then good to 1e-8, and the Gaussian has long
-  // ended the series before its highest term, 20/sigma cycles per px.
-  // So does the light of a Gaussian under a pupil law.
+  // For steps of sigma/40 the cubic between four nodes has an error of 1e-8, and the Gaussian ends
+  // the series long before its highest term, 20/sigma cycles per px. The transfer function of a
+  // Gaussian under a pupil law does so too.
   const double smooth_px = profile_ != nullptr && profile_->psf() == Psf::kGaussian
                                ? std::hypot(sigma_px_, 0.85 * defocus_sigma_px_)
                                : sigma_px_;
@@ -135,7 +136,7 @@ void EdgeSpread::Tabulate(double angle_rad) {
       2 * cv::getOptimalDFTSize(static_cast<int>(std::ceil(period_px / wanted_step_px / 2)));
   table_step_px_ = period_px / nodes;
 
-  // cv::dft's packing of the transform of real numbers: Re 0, Re 1, Im 1, ..., Re nodes/2.
+  // cv::dft packs the transform of real numbers as Re 0, Re 1, Im 1, ..., Re nodes/2.
   cv::Mat packed(1, nodes, CV_64F, cv::Scalar(0));
   double* coefficients = packed.ptr<double>();
   coefficients[0] = 0.5;

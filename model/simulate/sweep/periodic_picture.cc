@@ -11,18 +11,20 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 
 // The evaluation is a non-uniform fast Fourier transform along each axis in turn: an FFT onto a
-// grid kOversampling times finer than the band asks for, then kTaps taps of a Kaiser-Bessel window
-// at each pixel centre, with the window's own transform divided out beforehand. The error is about
-// exp(-pi kTaps sqrt(1 - 1/kOversampling)) = 1e-11.
+// grid that is kOversampling times finer than the band requires, then kTaps taps of a Kaiser-Bessel
+// window at each pixel centre. The transform of the window is divided out beforehand. The error is
+// about exp(-pi kTaps sqrt(1 - 1/kOversampling)) = 1e-11.
 constexpr int kTaps = 14;
 constexpr double kOversampling = 1.5;
 
-// Frequencies whose Gaussian transfer is below this are left out.
+// Frequencies whose Gaussian transfer is below this value are left out.
 constexpr double kNegligibleTransfer = 1e-12;
-// Of its sigma, the Gaussian that falls no faster than one under a pupil law.
+// Ratio to its sigma of the sigma of a Gaussian that falls no faster than a Gaussian under a pupil
+// law.
 constexpr double kLawReach = 0.85;
 
-// Rows transformed together: enough to spread the set-up of the FFT, few enough for the cache.
+// Number of rows that are transformed together: enough to share the set-up of the FFT, few enough
+// for the cache.
 constexpr int kBlock = 16;
 
 // I0(x) by its power series, whose terms are all positive.
@@ -37,16 +39,16 @@ double BesselI0(double x) {
   return sum;
 }
 
-// The plan of one axis: frequencies -limit..limit to `count` pixel centres.
+// The plan of one axis: from frequencies -limit..limit to `count` pixel centres.
 struct AxisPlan {
   int limit = 0;
   int grid_size = 0;
-  std::vector<double> factor;   // of frequency |a|: separable transfer over the window's transform
-  std::vector<int> first_node;  // of each pixel
-  std::vector<double> taps;     // kTaps a pixel
+  std::vector<double> factor;   // for frequency |a|: separable transfer over the window's transform
+  std::vector<int> first_node;  // one per pixel
+  std::vector<double> taps;     // kTaps per pixel
 };
 
-// `gaussian_sigma_px` is the blur that separates; at least `reach_sigma_px` blurs in all.
+// `gaussian_sigma_px` is the separable blur. The total blur is at least `reach_sigma_px`.
 AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_sigma_px,
                   double reach_sigma_px, bool pixel_box) {
   AxisPlan plan;
@@ -58,8 +60,9 @@ AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_s
   const int wanted = std::max(static_cast<int>(std::ceil(kOversampling * band)), 2 * kTaps);
   plan.grid_size = 2 * cv::getOptimalDFTSize((wanted + 1) / 2);
 
-  // Window phi(t) = I0(beta sqrt(1 - (2t/w)^2)) on |t| <= w/2, t in grid nodes, with the transform
-  // w sinh(q)/q, q = sqrt(beta^2 - (pi w xi)^2); beta after Beatty, Nishimura & Pauly (2005) [L4].
+  // The window is phi(t) = I0(beta sqrt(1 - (2t/w)^2)) on |t| <= w/2, t in grid nodes, with the
+  // transform w sinh(q)/q, q = sqrt(beta^2 - (pi w xi)^2); beta is that of Beatty, Nishimura &
+  // Pauly (2005) [L4].
   const double oversampling = static_cast<double>(plan.grid_size) / band;
   const double beta =
       kPi * std::sqrt(std::pow(kTaps / oversampling * (oversampling - 0.5), 2) - 0.8);
@@ -91,14 +94,14 @@ AxisPlan PlanAxis(const AxisSampling& axis, int max_frequency, double gaussian_s
   return plan;
 }
 
-// A grid with its first kTaps nodes repeated behind the end, so that no tap wraps round. `grid` is
+// A grid with its first kTaps nodes repeated behind the end, so that no tap wraps around. `grid` is
 // the part that the FFT writes.
 template <typename Value>
 struct WrappedGrid {
   WrappedGrid(int grid_size, int type)
       : storage(kBlock, grid_size + kTaps, type), grid(storage.colRange(0, grid_size)) {}
 
-  // `row` of the grid at every pixel of the plan.
+  // Evaluates `row` of the grid at every pixel of the plan.
   template <typename Store>
   void Interpolate(const AxisPlan& plan, int row, const Store& store) {
     Value* nodes = storage.ptr<Value>(row);
@@ -141,13 +144,14 @@ std::complex<double> PeriodicPicture::Coefficient(int a, int b) const {
 
 cv::Mat PeriodicPicture::Evaluate(const AxisSampling& x, const AxisSampling& y,
                                   const FrameBlur& blur) const {
-  // Gaussians of both kinds are one Gaussian, and it separates; a disc does not, nor does the light
-  // of a pupil law.
+  // Gaussians of both kinds combine to one Gaussian, which is separable. A disc and the light of a
+  // pupil law are not.
   const bool separates =
       blur.defocus_sigma_px == 0 || (blur.psf == Psf::kGaussian && blur.profile == nullptr);
   const double gaussian_sigma_px =
       separates ? std::hypot(blur.floor_sigma_px, blur.defocus_sigma_px) : blur.floor_sigma_px;
-  // The transfer function of a Gaussian under a pupil law falls nearly as fast as its own.
+  // The transfer function of a Gaussian under a pupil law falls nearly as fast as that of the
+  // Gaussian.
   const double reach_sigma_px =
       separates || blur.psf == Psf::kDisc
           ? gaussian_sigma_px
@@ -160,7 +164,8 @@ cv::Mat PeriodicPicture::Evaluate(const AxisSampling& x, const AxisSampling& y,
                : blur.profile->Transfer(2 * kPi * blur.defocus_sigma_px * std::hypot(fx, fy));
   };
 
-  // First axis: row b of the spectrum to the pixels' columns; kept transposed for the second.
+  // First axis: row b of the spectrum is evaluated at the pixels' columns and kept transposed for
+  // the second axis.
   const int rows = y_plan.limit + 1;
   cv::Mat columns(x.count, rows, CV_64FC2);
   {
@@ -189,8 +194,8 @@ cv::Mat PeriodicPicture::Evaluate(const AxisSampling& x, const AxisSampling& y,
     }
   }
 
-  // Second axis: the half spectrum of each column to its pixels. The rows of `packed` hold it as
-  // cv::dft wants the transform of real numbers: Re 0, Re 1, Im 1, Re 2, Im 2, ...
+  // Second axis: the half spectrum of each column is evaluated at its pixels. The rows of `packed`
+  // have the format of cv::dft for the transform of real numbers: Re 0, Re 1, Im 1, Re 2, Im 2, ...
   cv::Mat picture(y.count, x.count, CV_64F);
   cv::Mat packed(kBlock, y_plan.grid_size, CV_64F);
   WrappedGrid<double> fine(y_plan.grid_size, CV_64F);

@@ -10,37 +10,38 @@
 
 namespace thicklens::model {
 
-// Where a row (or column) of pixel centres lies on a periodic picture, in periods: pixel j at
-// start + j * step, or at at[j] where they are not evenly spaced. What blurs is measured in steps.
+// Positions of a row (or column) of pixel centres on a periodic image, in periods: pixel j is at
+// start + j * step, or at at[j] if they are not evenly spaced. Blurs are measured in steps.
 struct AxisSampling {
   double start = 0;
   double step = 0;
   int count = 0;
-  std::vector<double> at = {};  // `count` of them, or none
+  std::vector<double> at = {};  // `count` numbers, or none
 };
 
-// What happens to the light between the picture and the stored pixel; lengths in px of the frame.
+// Effects on the light between the image and the stored pixel; lengths are in px of the frame.
 struct FrameBlur {
   double floor_sigma_px = 0;
   Psf psf = Psf::kGaussian;
   double defocus_sigma_px = 0;
-  bool pixel_box = true;  // else a pixel is the light at its centre
-  // The shape of the defocus blur where it is not that of `psf` itself; not owned.
+  bool pixel_box = true;  // false: a pixel is the light at its centre
+  // The shape of the defocus blur if it is not that of `psf`; not owned.
   const PupilProfile* profile = nullptr;
 };
 
-// A picture that is a finite Fourier series: it repeats in both directions and is band-limited by
-// definition, so that a blurred, scaled and shifted frame of it is a sum that can be computed to
-// rounding. Nothing is resampled and no kernel is sampled.
+// An image that is a finite Fourier series: it repeats in both directions and is band-limited by
+// definition. A blurred, scaled and shifted frame of it is a sum that is computed to rounding
+// error, without resampling and without a sampled kernel.
 class PeriodicPicture {
  public:
-  // From one period of samples, CV_64F, row 0 at y = 0. The series runs through the samples, except
+  // `samples` is one period, CV_64F, row 0 at y = 0. The series interpolates the samples, except
   // that the highest frequency of an even count, which has no phase of its own, is left out.
   explicit PeriodicPicture(const cv::Mat& samples);
 
-  // The picture behind blur and pixel box at every pixel centre, CV_64F, y.count x x.count:
-  // sum over (a, b) of c(a, b) T(a x.step, b y.step) exp(2 pi i (a x + b y)), T the product of the
-  // transfer functions. Absolute error below 1e-9 of the coefficients' norm. Thread safe.
+  // Returns the image behind blur and pixel box at every pixel centre, CV_64F, y.count x x.count:
+  // sum over (a, b) of c(a, b) T(a x.step, b y.step) exp(2 pi i (a x + b y)), where T is the
+  // product of the transfer functions. The absolute error is below 1e-9 of the coefficients' norm.
+  // Thread safe.
   cv::Mat Evaluate(const AxisSampling& x, const AxisSampling& y, const FrameBlur& blur) const;
 
   // The coefficient of exp(2 pi i (a x + b y)), a and b from -(count - 1)/2 to (count - 1)/2.

@@ -1,4 +1,4 @@
-// What a simulated sweep may be.
+// Valid options of a simulated sweep.
 #include <fmt/format.h>
 
 #include <algorithm>

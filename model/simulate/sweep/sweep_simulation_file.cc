@@ -11,12 +11,13 @@ namespace {
 
 constexpr char kSchema[] = "thicklens/simulate-sweep/1";
 
-// What is missing keeps the default that `field` came with.
+// A missing key keeps the default value of `field`.
 void ReadNumber(const YamlNode& node, const char* key, double* field) {
   if (const auto found = node.Find(key)) *field = found->Number();
 }
 
-// The truth of the simulation: the camera's calibration, in which `truth` replaces what it names.
+// The truth of the simulation is the camera's calibration with the values of `truth` in place of
+// its own.
 void ReadTruth(const YamlNode& node, Camera* camera) {
   node.RequireKeys({"focus_depth_mm", "image_distance_mm", "blur_ratio", "blur_floor_px"});
   if (!camera->calibration) {
@@ -47,8 +48,8 @@ void ReadTruth(const YamlNode& node, Camera* camera) {
   }
 }
 
-// A centred part of the sensor: the axis stays where it is on the chip. An odd difference leaves
-// the extra row or column below or on the right.
+// The crop is a centred part of the sensor; the axis keeps its position on the chip. An odd
+// difference leaves the extra row or column below or on the right.
 void CropSensor(const YamlNode& node, Sensor* sensor) {
   const auto sides = node.ElementsExactly(2);
   const int width_px = sides[0].Integer(1, sensor->width_px);

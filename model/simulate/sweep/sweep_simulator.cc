@@ -23,24 +23,24 @@ namespace thicklens::model {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// Of a tilted target whose field is still drawn: what is five times as far away as its middle.
+// Minimum nearness of a drawn part of a tilted target: its depth is five times that of the middle.
 constexpr double kLeastNearness = 0.2;
-// Sigma, px, beyond which a profile's transfer function is not tabulated up to one cycle per px: a
-// disc's has sunk below 1e-3 by then and is summed anew.
+// Sigma, px, above which a profile's transfer function is not tabulated up to one cycle per px. A
+// disc's transfer function is then below 1e-3 there and is summed directly.
 constexpr double kSharpestTail = 12;
 
 bool IsEdge(TargetKind kind) {
   return kind == TargetKind::kPrintedEdge || kind == TargetKind::kKnifeEdge;
 }
 
-// What distinguishes one frame from another.
+// The state of one frame.
 struct FrameState {
   double depth_mm = 0;
   double reading_mm = 0;
   double lamp = 1;                 // irradiance, 1 = the mean of full scale
-  Eigen::Vector2d drift_mm{0, 0};  // of the target, X right, Y down
+  Eigen::Vector2d drift_mm{0, 0};  // displacement of the target, X right, Y down
   double pixel_mm = 0;             // one px on the target: p/|m|
-  double defocus_sigma_px = 0;     // kappa r_defocus
+  double defocus_sigma_px = 0;     // value of kappa r_defocus
 };
 
 }  // namespace
@@ -71,12 +71,12 @@ struct SweepSimulator::Impl {
 
   void Decide() {
     EffectChoice choice = options.effects;
-    // All costs nothing where frames are sums of waves.
+    // All effects together cost nothing because frames are sums of waves.
     choice.kept = choice.kept.With(SweepEffects());
     const double last_depth_mm =
         options.first_depth_mm + (options.frame_count - 1) * options.step_mm;
     const auto [near, far] = std::minmax(options.first_depth_mm, last_depth_mm);
-    // The sides of a tilted target lie nearer and farther than its middle.
+    // The sides of a tilted target are nearer and farther than its middle.
     const auto [least, most] = Nearnesses(options.target.tilt_deg * kPi / 180);
     decision = DecideEffects(choice, Conditions(),
                              PlacesBetween(options.camera, near / std::max(1.0, most),
@@ -89,7 +89,7 @@ struct SweepSimulator::Impl {
 
   bool On(Effect effect) const { return decision.on.Has(effect); }
 
-  // Of the picture's sides (TiltedTarget), the lesser first.
+  // Nearness (TiltedTarget) of the two sides of the image, the smaller first.
   std::pair<double, double> Nearnesses(double tilt_rad) const {
     const Sensor& sensor = options.camera.sensor;
     const TiltedTarget target(tilt_rad, 1, options.camera.focal_scale_px());
@@ -98,7 +98,7 @@ struct SweepSimulator::Impl {
         {target.Nearness(-0.5 - axis_px), target.Nearness(sensor.width_px - 0.5 - axis_px)});
   }
 
-  // p/|m|, mm on the target, of one px at a depth.
+  // Width p/|m|, mm on the target, of one px at a depth.
   double PixelMm(double depth_mm, const EffectSet& on) const {
     if (!on.Has(Effect::kMagnification)) depth_mm = options.camera.focus_depth_mm();
     return options.camera.sensor.pixel_pitch_mm /
@@ -106,27 +106,27 @@ struct SweepSimulator::Impl {
                                           depth_mm));
   }
 
-  // The pixel in the middle of the sensor, from the principal point.
+  // The middle of the sensor, px from the principal point.
   Eigen::Vector2d CentrePx() const {
     const Sensor& sensor = options.camera.sensor;
     return Eigen::Vector2d(sensor.width_px - 1, sensor.height_px - 1) / 2 -
            sensor.principal_point_px;
   }
 
-  // sigma = kappa r_defocus, here in px.
+  // Defocus sigma = kappa r_defocus, here in px.
   double DefocusPx(double depth_mm) const {
     const Camera& camera = options.camera;
     return camera.blur_ratio() * BlurRadiusMm(camera.lens, camera.image_distance_mm(), depth_mm) /
            camera.sensor.pixel_pitch_mm;
   }
 
-  // The target of a frame; its scale is the frame's, whatever the depth.
+  // The target of a frame. Its scale is the frame's at each depth.
   TiltedTarget TargetOf(double depth_mm, double pixel_mm, const EffectSet& on) const {
     const double scale_px = options.camera.focal_scale_px();
     return {on.Has(Effect::kTilt) ? options.target.tilt_deg * kPi / 180 : 0, depth_mm, scale_px,
             pixel_mm * scale_px / depth_mm};
   }
-  // The same as seen by the columns about one, px from the axis.
+  // The target of a frame as seen by the columns around `x_px`, px from the axis.
   TiltedTarget SeenTarget(const FrameState& frame, double x_px) const {
     const double depth_mm = TargetOf(frame.depth_mm, frame.pixel_mm, decision.on).DepthMm(x_px);
     return TargetOf(frame.depth_mm, frame.pixel_mm * SeenScale(depth_mm), decision.on);
@@ -149,7 +149,8 @@ struct SweepSimulator::Impl {
       frame.reading_mm =
           DirectionSign(options.direction) * (frame.depth_mm - options.bench_offset_mm) +
           (on.Has(Effect::kReadingError) ? options.reading_sigma_mm * bench.Normal() : 0);
-      // The lamp stands at the camera: irradiance of the target (zf/z)^2, 1 in the plane of focus.
+      // The lamp is at the camera: the irradiance of the target is (zf/z)^2, 1 in the plane of
+      // focus.
       const double falloff = options.lamp_falloff && on.Has(Effect::kLampFalloff)
                                  ? std::pow(focus_depth_mm / frame.depth_mm, 2)
                                  : 1.0;
@@ -166,8 +167,8 @@ struct SweepSimulator::Impl {
     return states;
   }
 
-  // How the light of a point spreads over the pupil. Its second moment is (kappa r)^2 under any
-  // law; the mean of the rays that a pixel off the axis gets lies a little aside.
+  // Sets the distribution of the light of a point over the pupil. Its second moment is (kappa r)^2
+  // for any law; the mean of the rays of a pixel off the axis is slightly displaced.
   void MakePupil() {
     law = options.pupil_law.value_or(On(Effect::kFalloff) ? PupilLaw::kPaper : PupilLaw::kUniform);
     if (law == PupilLaw::kUniform || !On(Effect::kDefocus) || options.camera.blur_ratio() == 0)
@@ -177,7 +178,7 @@ struct SweepSimulator::Impl {
     const double distance_mm = On(Effect::kThickness) ? camera.image_distance_mm() : scale_mm;
     double most_px = 0;
     for (const FrameState& frame : frames) most_px = std::max(most_px, frame.defocus_sigma_px);
-    // No frequency of a frame is above one cycle per px of either axis.
+    // Every frequency of a frame is at most one cycle per px on each axis.
     profile.emplace(
         law,
         PupilOptics{stored_camera.psf, camera.blur_ratio() * camera.lens.aperture_radius_mm,
@@ -185,7 +186,7 @@ struct SweepSimulator::Impl {
         2 * kPi * std::sqrt(2.0) * std::min(most_px, kSharpestTail));
     mean_per_landing = profile->mean_per_landing();
   }
-  // How much larger what a pixel sees at a depth lies, for the mean of the rays that bring it.
+  // Factor of the positions that a pixel sees at a depth, for the mean of its rays.
   double SeenScale(double depth_mm) const {
     const Camera& camera = options.camera;
     return 1 +
@@ -210,8 +211,9 @@ struct SweepSimulator::Impl {
     }
   }
 
-  // What each pixel gets of a uniform target's light, 1 at the principal point: by symmetry a
-  // function of the distance from there, and of no depth, since [S12] knows the ray alone.
+  // Computes the light of a uniform target at each pixel, 1 at the principal point. By symmetry it
+  // is a function of the distance from the principal point. It does not depend on the depth because
+  // [S12] depends only on the ray.
   void MakeFalloff() {
     if (!On(Effect::kFalloff)) return;
     const Sensor& sensor = options.camera.sensor;
@@ -243,24 +245,24 @@ struct SweepSimulator::Impl {
     }
   }
 
-  // The depth of the sweep at which the target is seen best; zf itself if the sweep passes it.
+  // The depth of the sweep at which the target is sharpest; zf itself if the sweep passes it.
   double ReferenceDepthMm() const {
     const auto [near, far] = std::minmax(frames.front().depth_mm, frames.back().depth_mm);
     return std::clamp(truth.focus_depth_mm, near, far);
   }
 
-  // Where the target's centre lies, mm: in the middle of the picture at the reference depth, which
-  // is not on the axis where the principal point is not the middle.
+  // Position of the target's centre, mm: in the middle of the image at the reference depth. It is
+  // off the axis if the principal point is not in the middle.
   Eigen::Vector2d TargetCentreMm(const EffectSet& on) const {
     const double depth_mm = ReferenceDepthMm();
     return TargetOf(depth_mm, PixelMm(depth_mm, on), on).At(CentrePx());
   }
 
-  // The tile must hold the field of every frame with its drift and blur (of a large blur a part:
-  // beyond the tile the target repeats itself, it does not end), and its highest frequency
-  // is one cycle per px in the nearest frame: what lies above is taken by the pixel box, whose
-  // first zero is there, and what lies between that and half of it is the aliasing that a real
-  // sensor has. Effects that are left out change nothing of what the target shows.
+  // The tile must cover the field of every frame with its drift and blur; of a large blur it covers
+  // only a part, because the target repeats itself beyond the tile. Its highest frequency is one
+  // cycle per px in the nearest frame. The pixel box removes higher frequencies because its first
+  // zero is there. Frequencies between half of that and that are the aliasing of a real sensor.
+  // Effects that are left out do not change the content of the target.
   void MakeTile(const LinearPicture& picture) {
     const Sensor& sensor = options.camera.sensor;
     const EffectSet all = SweepEffects();
@@ -278,7 +280,7 @@ struct SweepSimulator::Impl {
                                1;
       const TiltedTarget target = TargetOf(frame.depth_mm, frame.pixel_mm, all);
       for (double x_px : {-0.5 - margin_px, sensor.width_px - 0.5 + margin_px}) {
-        // Beyond a side that is that far away the target repeats itself.
+        // Beyond a side that is so far away, the target repeats itself.
         if (target.Nearness(x_px - axis_px.x()) < kLeastNearness) {
           x_px = std::clamp(x_px, -0.5, sensor.width_px - 0.5);
         }
@@ -312,9 +314,9 @@ struct SweepSimulator::Impl {
     return picture;
   }
 
-  // [D44] The most by which blur, or the place of what is shown in the outermost rows, changes from
-  // one column to the next: d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|; a
-  // row y shows Y = (y p/K) z, and dz/z = -tan(tilt)/(N K/p) dx.
+  // [D44] Maximum change of the blur, or of the position that the outermost rows show, from one
+  // column to the next: d(1/z)/dx = tan(tilt)/(z0 K/p), and sigma = kappa r K/p |1/z - 1/zf|; a row
+  // y shows Y = (y p/K) z, and dz/z = -tan(tilt)/(N K/p) dx.
   double ChangePerColumnPx(const FrameState& frame) const {
     if (!IsTilted()) return 0;
     const Camera& camera = options.camera;
@@ -328,7 +330,7 @@ struct SweepSimulator::Impl {
                     std::max(far_px, 1.0) / (camera.focal_scale_px() * least));
   }
 
-  // Sigma of defocus and light of a column that lies at a depth.
+  // Sigma of the defocus, and below the light, of a column at a depth.
   double SeenDefocusPx(const FrameState& frame, double depth_mm) const {
     return IsTilted() && On(Effect::kDefocus) ? DefocusPx(depth_mm) : frame.defocus_sigma_px;
   }
@@ -338,7 +340,7 @@ struct SweepSimulator::Impl {
   }
 
   // Columns `first` .. `last` of a frame with the blur and the scale of one of them. Pixel (x, y)
-  // looks at what its chief ray meets: the picture shows the target upright.
+  // shows the point that its chief ray meets, so that the image shows the target upright.
   cv::Mat TileColumns(const FrameState& frame, int first, int last, double node_px) const {
     const Sensor& sensor = options.camera.sensor;
     const Eigen::Vector2d& axis_px = sensor.principal_point_px;
@@ -398,8 +400,8 @@ struct SweepSimulator::Impl {
     return picture;
   }
 
-  // Dark left, bright right of an edge through the target's centre; a positive angle leans its
-  // upper end to the right.
+  // An edge through the target's centre, dark on the left and bright on the right. A positive angle
+  // leans its upper end to the right.
   LinearPicture RenderEdge(const FrameState& frame) const {
     const Sensor& sensor = options.camera.sensor;
     LinearPicture picture{sensor.width_px, sensor.height_px, 1, {}};
@@ -412,8 +414,9 @@ struct SweepSimulator::Impl {
     return picture;
   }
 
-  // An edge on the target is a line g = 0, g the distance on it in mm, whose gradient in the
-  // picture says how far, in px and which way, a pixel is from the line.
+  // An edge on the target is a line g = 0, where g is the distance on the target in mm. The
+  // gradient of g in the image converts it to the distance of a pixel from the line, in px, and
+  // gives its direction.
   void RenderEdge(const FrameState& frame, const ColumnStrip& strip, LinearPicture* picture) const {
     const Sensor& sensor = options.camera.sensor;
     const TargetOptions& options_of = options.target;
@@ -426,7 +429,8 @@ struct SweepSimulator::Impl {
       return normal.dot(target.At(from_axis_px) - on_edge_mm);
     };
 
-    // Where the edge crosses the middle of the strip, or at the end of it that is nearest to that.
+    // The point where the edge crosses the middle of the strip, or the end of the middle that is
+    // nearest to the edge.
     Eigen::Vector2d middle_px(strip.middle_px() - axis_px.x(), 0);
     const double down_mm = target.PixelDownMm(middle_px.x());
     const double row_px = -distance_mm(middle_px) / (normal.y() * down_mm);
@@ -467,13 +471,13 @@ struct SweepSimulator::Impl {
   Camera stored_camera;
   double floor_px = 0;
   PupilLaw law = PupilLaw::kUniform;
-  std::optional<PupilProfile> profile;  // none of the uniform law, whose blur is that of the PSF
+  std::optional<PupilProfile> profile;  // none for the uniform law, whose blur is that of the PSF
   double mean_per_landing = 0;
-  std::vector<float> light_of_pixel;  // none without fall-off
+  std::vector<float> light_of_pixel;  // empty without fall-off
   std::vector<FrameState> frames;
   SweepTruth truth;
   std::optional<PeriodicPicture> tile_texture;  // none for an edge
-  TargetTile tile_frame;                        // its place; the samples are in tile_texture
+  TargetTile tile_frame;  // position of the tile; the samples are in tile_texture
 };
 
 SweepSimulator::SweepSimulator(const SweepSimulationOptions& options,

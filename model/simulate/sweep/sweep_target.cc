@@ -16,17 +16,18 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Sizes drawn where none is given, in px near the plane of focus.
+// Default sizes, in px near the plane of focus.
 constexpr double kLeafRadiusPx = 2;
 constexpr double kNoisePeriodPx = 2;
 constexpr double kSquarePx = 24;
 constexpr int kStarCycles = 36;
-// The largest leaf, as a part of the field.
+// The largest leaf, as a fraction of the field.
 constexpr double kLargestLeaf = 1.0 / 6;
 
-// Beyond it memory and time would grow past what a sweep is worth (a tile of 4096 x 4096 holds
-// 128 MiB). The samples of a sweep that asks for more, because its field is large or its nearest
-// and farthest depth differ much, lie further apart: the near frames then lack the finest detail.
+// Maximum number of samples per side; more would need too much memory and time for a sweep (a tile
+// of 4096 x 4096 has 128 MiB). If a sweep requires more, because its field is large or its nearest
+// and farthest depth differ much, the spacing of the samples is larger, and the near frames lack
+// the finest detail.
 constexpr int kMaxSamples = 4096;
 
 double FeatureSizeMm(const TargetOptions& options, double chosen_mm, double smallest_mm,
@@ -42,10 +43,10 @@ double FeatureSizeMm(const TargetOptions& options, double chosen_mm, double smal
   return size_mm;
 }
 
-// The frame of the drawing: positions of the samples.
+// The tile that is drawn and the positions of its samples.
 class Canvas {
  public:
-  // `unit_mm`: the period's sides are whole multiples of it; 0: any length.
+  // The sides of the period are whole multiples of `unit_mm`; if it is 0, they have any length.
   Canvas(const TileRequest& request, double unit_mm) {
     const auto rounded_up = [unit_mm](double length_mm) {
       return unit_mm > 0 ? unit_mm * std::ceil(length_mm / unit_mm) : length_mm;
@@ -60,7 +61,7 @@ class Canvas {
     };
     const int columns = count(tile_.width_mm);
     const int rows = count(tile_.height_mm);
-    if (!(unit_mm > 0)) {  // the samples that make the count a quick one may widen the tile
+    if (!(unit_mm > 0)) {  // counts for a fast DFT may widen the tile
       tile_.width_mm = columns * spacing_mm;
       tile_.height_mm = rows * spacing_mm;
     }
@@ -99,13 +100,14 @@ class Canvas {
   double spacing_y_mm_;
 };
 
-// Discs that hide each other, radii distributed as r^-3 between the smallest and the largest: the
-// statistics of natural pictures, without a preferred size. Drawn from the front backward until
-// nothing shines through, so that each sample is settled by the first leaves that meet it.
+// Discs that occlude each other, with radii distributed as r^-3 between the smallest and the
+// largest: the statistics of natural images, without a preferred size. They are drawn from the
+// front backward until nothing shines through, so that the first leaves that cover a sample
+// determine it.
 TargetTile DrawDeadLeaves(const TargetOptions& options, const TileRequest& request,
                           RandomDraws* draws) {
   Canvas canvas(request, 0);
-  const double spacing_mm = canvas.spacing_x_mm();  // the same in y: the sides are free
+  const double spacing_mm = canvas.spacing_x_mm();  // equal in y because the sides are free
   const double smallest_mm =
       FeatureSizeMm(options, kLeafRadiusPx * request.pixel_mm, 2 * spacing_mm, request.field_mm);
   const double largest_mm = std::max(kLargestLeaf * request.field_mm, 2 * smallest_mm);
@@ -114,7 +116,7 @@ TargetTile DrawDeadLeaves(const TargetOptions& options, const TileRequest& reque
 
   cv::Mat& samples = canvas.samples();
   samples.setTo(0);
-  cv::Mat open(samples.size(), CV_64F, cv::Scalar(1));  // what still shines through
+  cv::Mat open(samples.size(), CV_64F, cv::Scalar(1));  // transmitted part of each sample
   const int columns = samples.cols;
   const int rows = samples.rows;
   const double total = static_cast<double>(columns) * rows;
@@ -140,7 +142,7 @@ TargetTile DrawDeadLeaves(const TargetOptions& options, const TileRequest& reque
       for (int j = static_cast<int>(std::ceil(x - half_chord)); j <= last; ++j) {
         const int column = (j % columns + columns) % columns;
         if (through[column] == 0) continue;
-        // The part of the sample's cell that the leaf covers, its border taken as straight.
+        // The covered part of the sample's cell, with the leaf's border assumed to be straight.
         const double inside = radius + 0.5 - std::hypot(j - x, dy);
         const double hidden = through[column] * std::clamp(inside, 0.0, 1.0);
         light[column] += hidden * grey;
@@ -153,8 +155,8 @@ TargetTile DrawDeadLeaves(const TargetOptions& options, const TileRequest& reque
   return canvas.Finish();
 }
 
-// Gaussian noise whose amplitude falls as 1/f (pink, from one cycle per field on) or not at all
-// (white), up to the shortest period. A tanh keeps it between no light and twice the mean.
+// Gaussian noise up to the shortest period. Its amplitude decreases as 1/f (pink, from one cycle
+// per field on) or is constant (white). A tanh limits it to the range from 0 to twice the mean.
 TargetTile DrawNoise(const TargetOptions& options, const TileRequest& request, RandomDraws* draws) {
   Canvas canvas(request, 0);
   const double spacing_mm = canvas.spacing_x_mm();
@@ -201,7 +203,7 @@ TargetTile DrawCheckerboard(const TargetOptions& options, const TileRequest& req
 }
 
 // Bright and dark sectors around the field's centre. The feature size is a sector's width at half
-// the field's shorter side from the centre. Each sample is the mean along its circle over its cell.
+// the field's shorter side from the centre. Each sample is the mean over its cell along its circle.
 TargetTile DrawSiemensStar(const TargetOptions& options, const TileRequest& request) {
   const double rim_mm = request.field_mm / 2;
   const double sector_mm =
@@ -214,9 +216,9 @@ TargetTile DrawSiemensStar(const TargetOptions& options, const TileRequest& requ
   return canvas.Finish();
 }
 
-// The user's picture, upright and centred, mirrored at its sides where the tile is larger. Its
-// width is the feature size, or such that it covers all that the frames see. The contrast is its
-// own.
+// The user's image, upright and centred, mirrored at its sides where the tile is larger. Its width
+// is the feature size or, by default, such that it covers all that the frames see. The contrast is
+// its own.
 TargetTile DrawPicture(const TargetOptions& options, const TileRequest& request,
                        const LinearPicture& picture) {
   if (picture.width_px < 1 || picture.height_px < 1) {

@@ -10,13 +10,13 @@
 
 namespace thicklens::model {
 
-// What a sweep needs of its textured target. Positions are in the target's plane, mm from the
+// Requirements of a sweep for its textured target. Positions are in the target's plane, mm from the
 // optical axis, X right, Y down.
 struct TileRequest {
   Eigen::Vector2d centre_mm{0, 0};
-  double width_mm = 0;  // what the frames see, with margins
+  double width_mm = 0;  // size of the field that the frames see, with margins
   double height_mm = 0;
-  double spacing_mm = 0;  // wanted between samples
+  double spacing_mm = 0;  // wanted spacing of samples
   double pixel_mm = 0;    // one px on the target near the plane of focus: the unit of fine detail
   double field_mm = 0;    // the shorter side of the field there: the unit of coarse detail
 };
@@ -26,11 +26,11 @@ struct TargetTile {
   cv::Mat samples;  // CV_64F
   double width_mm = 0;
   double height_mm = 0;
-  Eigen::Vector2d origin_mm{0, 0};  // of the sample (0, 0)
+  Eigen::Vector2d origin_mm{0, 0};  // position of the sample (0, 0)
 };
 
-// Draws every kind but the edges. `picture` is looked at for kPicture alone.
-// Throws Error for a feature size that the tile cannot show, and for an empty or black picture.
+// Draws every kind except the edges; only kPicture uses `picture`. Throws Error for a feature size
+// that the tile cannot show, and for an empty or black image.
 TargetTile DrawTargetTile(const TargetOptions& options, const TileRequest& request,
                           const LinearPicture& picture, RandomDraws* draws);
 

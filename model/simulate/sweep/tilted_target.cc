@@ -17,7 +17,7 @@ int ColumnsWithin(double limit_px, double change_px_per_px) {
 }  // namespace
 
 std::vector<ColumnStrip> StripsOf(int width_px, double change_px_per_px) {
-  // From the middle of a strip to its ends.
+  // The limit applies from the middle of a strip to its ends.
   const int count = ColumnsWithin(2 * kAllowedPx, change_px_per_px);
   std::vector<ColumnStrip> strips;
   for (int first = 0; first < width_px; first += count) {
