@@ -10,28 +10,28 @@
 
 namespace thicklens::kernels {
 
-// The unit impulse g of [M16] that carries a ray from where it lands to the pixels.
+// The unit impulse g of [M16] that distributes a ray from its landing point to the pixels.
 enum class Splat {
   kNearest,   // all of it to the nearest pixel, floor(position + 1/2)
   kBilinear,  // shared by the two nearest pixels of each axis, by distance
 };
 
-// The rays and pixels of one block of a picture, in plain numbers. One step of s or t is one pixel.
+// The rays and pixels of one block of an image, as plain numbers. One step of s or t is one pixel.
 //
-// A ray (s, t) of view (k, l) lands at (s + s_shift[k] + s_fraction[k],
-// t + t_shift[l] + t_fraction[l]), fractions in [-1/2, 1/2): nearest to the pixel
-// (s + s_shift[k], t + t_shift[l]). The rays of a block are those that land nearest to its pixels,
-// and are numbered by them: ray (l * u_count + k) * pixels + y * width_px + x stands for the sample
-// s = first_x + x - s_shift[k], t = first_y + y - t_shift[l], and exists if that is a sample of the
-// light field. So blocks share no ray.
+// A ray (s, t) of view (k, l) lands at (s + s_shift[k] + s_fraction[k], t + t_shift[l] +
+// t_fraction[l]), with fractions in [-1/2, 1/2). The nearest pixel is (s + s_shift[k], t +
+// t_shift[l]). The rays of a block are those that land nearest to its pixels, and their numbers
+// follow the pixels: ray (l * u_count + k) * pixels + y * width_px + x is the sample s = first_x +
+// x - s_shift[k], t = first_y + y - t_shift[l]. It exists if that is a sample of the light field.
+// Blocks therefore share no ray.
 struct BlockGeometry {
-  int first_x = 0, first_y = 0;  // the block's first pixel in the picture
+  int first_x = 0, first_y = 0;  // first pixel of the block in the image
   int width_px = 0, height_px = 0;
-  int s_count = 0, t_count = 0;  // of the whole light field
+  int s_count = 0, t_count = 0;  // sizes of the whole light field
   int u_count = 0, v_count = 0;
   std::vector<int> s_shift, t_shift;           // per u, per v
   std::vector<double> s_fraction, t_fraction;  // per u, per v
-  std::vector<double> view_weight;             // v * u_count + u; >= 0
+  std::vector<double> view_weight;             // at v * u_count + u; >= 0
 
   int pixels() const { return width_px * height_px; }
   int views() const { return u_count * v_count; }
@@ -43,78 +43,84 @@ struct BlockGeometry {
   }
 };
 
-// Slots a pixel has in FindRays: its rays are at most these.
+// Number of slots of a pixel in FindRays, an upper bound of its rays.
 inline int RaySlots(const BlockGeometry& block, Splat splat) {
   return block.views() * (splat == Splat::kNearest ? 1 : 4);
 }
 
-// The computations of the estimator that a device can do. Every method is a pure function of its
-// arguments. The plain C++ twin (NewReference) is the specification; a device's results differ from
-// it by rounding alone. An object is used by one thread at a time; Clone gives one for another.
-// Throws Error for arguments whose sizes do not fit, and for what the device reports.
+// The computations of the estimator that a device can do. FindRays to FormPicture are pure
+// functions of their arguments; StartWhole, AddBlock and FinishWhole accumulate a light field. The
+// plain C++ twin (NewReference) is the specification; the results of a device differ from it only
+// by rounding. An object is used by one thread at a time; Clone makes one for another thread.
+// Throws Error for arguments whose sizes do not fit, and for errors of the device.
 template <typename Real>
 class Kernels {
  public:
   virtual ~Kernels() = default;
   virtual std::unique_ptr<Kernels> Clone() const = 0;
 
-  // H, first half: the rays that land on each pixel of the block. Slot * pixels + pixel holds a
-  // ray's number or -1. Slots: view-major, and within a view for kBilinear (y, x) taps 0 and 1:
-  // tap 0 is the ray nearest to the pixel, tap 1 its neighbour on the side from which a share
-  // arrives (none if the fraction is 0). Rays that do not exist are left out.
+  // First half of H: the rays that land on each pixel of the block. Element slot * pixels + pixel
+  // is a ray's number or -1. The slots are view-major. Within a view, kBilinear has the (y, x) taps
+  // 0 and 1: tap 0 is the ray nearest to the pixel, and tap 1 is its neighbour on the side from
+  // which a share arrives (none if the fraction is 0). Rays that do not exist are left out.
   virtual std::vector<std::int32_t> FindRays(const BlockGeometry& block, Splat splat) = 0;
 
-  // H of [M10], second half: the weight of each ray found. H0 = view weight times the share of the
-  // splat; rows are divided by their sums (W = 1/(H0 1), for the samples that exist; a row of sum 0
-  // stays 0) and then multiplied by `irradiance` (one number a ray of the block; empty: 1).
+  // Second half of H of [M10]: the weight of each ray found. H0 is the view weight times the share
+  // of the splat. Rows are divided by their sums (W = 1/(H0 1), for the samples that exist; a row
+  // of sum 0 remains 0) and then multiplied by `irradiance` (one number per ray of the block;
+  // empty: 1).
   virtual EllMatrix<Real> WeighRays(const BlockGeometry& block, Splat splat,
                                     const std::vector<std::int32_t>& rays,
                                     const std::vector<Real>& irradiance) = 0;
 
   // The derivation mask of each ray in the warp form [M18], [D111]: (D L)(i, k) = L(i + m, k + 1) -
-  // L(i, k), m in samples per view step, linear interpolation between samples. Rows: first one a
-  // ray for the step in u (its m in slope_u), then one a ray for the step in v. A row is empty
-  // where the slope is NaN, where there is no next view, and where a tap that has weight does not
-  // exist or is outside of the block. 3 slots: the ray itself (-1), the two taps.
+  // L(i, k), with m in samples per view step and linear interpolation between samples. There are
+  // two rows per ray: first those of all rays for the step in u (m is slope_u), then those for the
+  // step in v. A row is empty if the slope is NaN, if there is no next view, or if a tap with a
+  // weight does not exist or is outside of the block. There are 3 slots: the ray itself (-1) and
+  // the two taps.
   virtual EllMatrix<Real> WarpDifferences(const BlockGeometry& block,
                                           const std::vector<Real>& slope_u,
                                           const std::vector<Real>& slope_v) = 0;
 
   // The derivation mask of each ray as six explicit finite differences of the second derivative
   // [M20] along the rays of its scene point, (m d/ds + d/du)^2 and the same in t and v:
-  //   (G L) = m^2 L_ss + 2 m L_su + L_uu + n^2 L_tt + 2 n L_tv + L_vv,
-  // central differences with step 1, L_su by the four diagonal neighbours over 4. A neighbour that
-  // does not exist or is outside of the block is replaced by the ray itself, so that a constant
-  // light field has G L = 0 everywhere. Empty where slope_u or slope_v is NaN. Not symmetric where
-  // the slopes differ from ray to ray. Slots: 17.
+  //   (G L) = m^2 L_ss + 2 m L_su + L_uu + n^2 L_tt + 2 n L_tv + L_vv.
+  // The differences are central with step 1; L_su uses the four diagonal neighbours over 4. A
+  // neighbour that does not exist or is outside of the block is replaced by the ray itself, so that
+  // a constant light field has G L = 0 everywhere. A row is empty if slope_u or slope_v is NaN. The
+  // matrix is not symmetric where the slopes differ from ray to ray. It has 17 slots.
   virtual EllMatrix<Real> SixTermMasks(const BlockGeometry& block, const std::vector<Real>& slope_u,
                                        const std::vector<Real>& slope_v) = 0;
 
-  // A x and A^T x.
+  // Return A x and A^T x.
   virtual std::vector<Real> Multiply(const CsrMatrix<Real>& a, const std::vector<Real>& x) = 0;
   virtual std::vector<Real> MultiplyTransposed(const CsrMatrix<Real>& a,
                                                const std::vector<Real>& x) = 0;
 
-  // values += scale * A^T A at the entries of `pattern`, which must hold all of A^T A's.
+  // Adds scale * A^T A to `values` at the entries of `pattern`, which must include all entries of
+  // A^T A.
   virtual void AddNormalProduct(const CsrMatrix<Real>& a, Real scale, const CsrPattern& pattern,
                                 std::vector<Real>* values) = 0;
 
-  // The picture of a light field, one channel: views (l * u_count + k) * t_count * s_count +
-  // t * s_count + s, gathered at every pixel of the block `whole` (usually the whole picture) with
-  // the weights of WeighRays without irradiance. Pixels at y * width_px + x.
+  // Returns the image of a light field of one channel. `views` has sample (s, t) of view (k, l) at
+  // (l * u_count + k) * t_count * s_count + t * s_count + s. Every pixel of the block `whole`
+  // (usually the whole image) is the sum with the weights of WeighRays without irradiance. The
+  // pixels are at y * width_px + x.
   virtual std::vector<Real> FormPicture(const BlockGeometry& whole, Splat splat,
                                         const std::vector<Real>& views) = 0;
 
-  // The whole light field that blocks are added to, kept where the device has it.
+  // Starts a whole light field to which blocks are added; it is kept in the memory of the device.
   virtual void StartWhole(int s_count, int t_count, int u_count, int v_count, int channels) = 0;
-  // Adds the rays of a block (in its numbering) to channel `channel`; those that do not exist are
+  // Adds the rays of a block (in its numbering) to channel `channel`; rays that do not exist are
   // left out. The sum is kept in float.
   virtual void AddBlock(const BlockGeometry& block, int channel, const std::vector<Real>& rays) = 0;
-  // ((channel * v_count + v) * u_count + u) * t_count * s_count + t * s_count + s.
+  // Returns the light field, with samples at ((channel * v_count + v) * u_count + u) * t_count *
+  // s_count + t * s_count + s.
   virtual std::vector<float> FinishWhole() = 0;
 };
 
-// The specification, in plain C++.
+// Returns the specification in plain C++.
 template <typename Real>
 std::unique_ptr<Kernels<Real>> NewReference();
 

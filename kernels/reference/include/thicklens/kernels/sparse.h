@@ -7,9 +7,9 @@
 
 namespace thicklens::kernels {
 
-// A sparse matrix with a fixed number of slots a row, as kernels fill it: one item a row or a slot,
-// no search, neighbouring items write neighbouring addresses. Entry (row, slot) is at
-// slot * rows + row; column -1 marks an unused slot.
+// A sparse matrix with a fixed number of slots per row. Kernels fill it with one item per row or
+// per slot, without a search; neighbouring items write neighbouring addresses. Entry (row, slot) is
+// at slot * rows + row; column -1 marks an unused slot.
 template <typename Real>
 struct EllMatrix {
   int rows = 0;
@@ -19,19 +19,19 @@ struct EllMatrix {
   std::vector<Real> value;
 };
 
-// Compressed rows; columns ascend within a row, none twice.
+// Compressed rows; columns ascend within a row, without duplicates.
 template <typename Real>
 struct CsrMatrix {
   int rows = 0;
   int columns = 0;
-  std::vector<std::int64_t> row_start;  // rows + 1
+  std::vector<std::int64_t> row_start;  // rows + 1 numbers
   std::vector<std::int32_t> column;
   std::vector<Real> value;
 
   std::int64_t entries() const { return row_start.empty() ? 0 : row_start.back(); }
 };
 
-// Where the entries of a matrix lie, without values.
+// The positions of the entries of a matrix, without values.
 struct CsrPattern {
   int rows = 0;
   int columns = 0;
@@ -41,19 +41,19 @@ struct CsrPattern {
   std::int64_t entries() const { return row_start.empty() ? 0 : row_start.back(); }
 };
 
-// Drops unused slots and sorts each row; entries of the same column are summed.
+// Removes unused slots and sorts each row; entries of the same column are added.
 template <typename Real>
 CsrMatrix<Real> Compress(const EllMatrix<Real>& ell);
 
 template <typename Real>
 CsrMatrix<Real> Transpose(const CsrMatrix<Real>& matrix);
 
-// The pattern of A^T A + Id: symmetric, with the whole diagonal.
+// Returns the pattern of A^T A + Id: symmetric, with the whole diagonal.
 template <typename Real>
 CsrPattern NormalPattern(const CsrMatrix<Real>& a);
 template <typename Real>
 CsrPattern PatternOf(const CsrMatrix<Real>& a);
-// The union of two patterns of the same size.
+// Returns the union of two patterns of the same size. Throws Error if the sizes differ.
 CsrPattern SumPattern(const CsrPattern& a, const CsrPattern& b);
 
 }  // namespace thicklens::kernels
