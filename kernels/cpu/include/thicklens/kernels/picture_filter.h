@@ -10,48 +10,49 @@
 
 namespace thicklens::kernels {
 
-// Linear maps from pictures to pictures of the same size in which every pixel of the result has
-// weights of its own. Pictures are planes, one for each channel, rows top to bottom.
+// Linear maps from images to images of the same size in which every pixel of the result has its own
+// weights. Images are planes, one per channel, rows top to bottom.
 
 enum class Axis { kAcross, kDown };
 
-// Pixels of a row that share a radius: [0, 64), [64, 128), ...
+// Number of pixels of a row that share a radius: [0, 64), [64, 128), ...
 constexpr int kFilterBlockPx = 64;
 
-// (F x)(p) = sum_n c_n(p) x(p + n e), n from -radius to radius, e along the axis.
-// No coefficient reaches beyond the picture: c_n(p) = 0 where p + n e is outside (Check sees to
-// it).
+// The map (F x)(p) = sum_n c_n(p) x(p + n e), n from -radius to radius, e along the axis. No
+// coefficient reaches beyond the image: c_n(p) = 0 where p + n e is outside (tested by Check).
 template <typename Real>
 struct PixelFilter {
   Axis axis = Axis::kAcross;
   int width_px = 0, height_px = 0;
-  // Of each block, the blocks of a row from left to right, row after row.
+  // Radius of each block; the blocks of a row from left to right, row after row.
   std::vector<std::int32_t> radius_px;
-  std::vector<std::size_t> start;  // of a block's coefficients; one more than there are blocks
-  std::vector<Real> coefficients;  // of a block: [n + radius][kFilterBlockPx]; 0 beyond the row
+  std::vector<std::size_t> start;  // start of each block's coefficients; one more than there are
+                                   // blocks
+  std::vector<Real> coefficients;  // of each block [n + radius][kFilterBlockPx]; 0 beyond the row
 
   int blocks_in_row() const { return (width_px + kFilterBlockPx - 1) / kFilterBlockPx; }
 };
 
-// For some pixels of the result a sum over any pixels: (R x)(pixel_r) = sum_e weight_e x(index_e).
+// Sums over arbitrary pixels for some pixels of the result: (R x)(pixel_r) = sum_e weight_e
+// x(index_e).
 template <typename Real>
 struct PixelRows {
-  int pixels = 0;                   // of the picture
-  std::vector<std::int32_t> pixel;  // ascending, none twice
-  std::vector<std::int64_t> start;  // of a row's entries; one more than there are rows
+  int pixels = 0;                   // number of pixels of the image
+  std::vector<std::int32_t> pixel;  // ascending, without duplicates
+  std::vector<std::int64_t> start;  // first entry of each row; one more than there are rows
   std::vector<std::int32_t> index;
   std::vector<Real> weight;
 };
-// The same numbers by the pixels that they read: (R^T y)(pixel) = sum weight y(index). Entries of a
-// row in the order of the rows they came from.
+// Returns the same weights sorted by the pixels that they read: (R^T y)(pixel) = sum weight
+// y(index). The entries of a row have the order of their original rows.
 template <typename Real>
 PixelRows<Real> Transposed(const PixelRows<Real>& rows);
 
-// Pixels beside each other that are read together.
+// Number of adjacent pixels that are read together.
 constexpr int kPixelsOfRun = 8;
 
-// For vectors whose resize() leaves new numbers as they are, so that the threads that write them
-// first are those that pay for the memory.
+// Allocator of vectors whose resize() leaves new numbers uninitialised. The threads that first
+// write them then bear the cost of the memory.
 template <typename T>
 struct UntouchedAllocator : std::allocator<T> {
   UntouchedAllocator() = default;
@@ -67,39 +68,42 @@ struct UntouchedAllocator : std::allocator<T> {
   }
 };
 
-// The same sums by runs of pixels that lie beside each other, which take less to hold and to read:
-// run n reads the pixels index_n to index_n + kPixelsOfRun - 1 of a copy of the picture whose rows
-// lie stride_px() apart, by weights that may be 0 (and are beyond the picture's row).
+// The sums of PixelRows in runs of adjacent pixels, which need less memory and are faster to read.
+// Run n reads the pixels index_n to index_n + kPixelsOfRun - 1 of a copy of the image whose rows
+// are stride_px() apart. Its weights may be 0, and are 0 beyond the row of the image.
 template <typename Real>
 struct PixelRuns {
   int width_px = 0, height_px = 0;
-  std::vector<std::int32_t> pixel;  // of each row: ascending, none twice
-  std::vector<std::int64_t> run;    // of each row its first; one more than there are rows
-  std::vector<std::int32_t> index;  // of each run
-  // kPixelsOfRun of each run. resize() leaves them to be written.
+  std::vector<std::int32_t> pixel;  // pixel of each row: ascending, without duplicates
+  std::vector<std::int64_t> run;    // first run of each row; one more than there are rows
+  std::vector<std::int32_t> index;  // first pixel of each run
+  // kPixelsOfRun weights per run. resize() leaves them uninitialised.
   std::vector<Real, UntouchedAllocator<Real>> weight;
-  // First rows of bands, and the end: two bands that have one between them read different pixels.
+  // First rows of bands, and the end. Two bands with one band between them read different pixels.
   std::vector<std::size_t> band;
-  // The parts of the copy that runs read, each in one row of it, ascending; some pixels more.
+  // The parts of the copy that runs read, each in one row of it, ascending. They may include
+  // further pixels.
   struct Part {
     std::int32_t first = 0, last = 0;  // indices of pixels: [first, last)
   };
   std::vector<Part> read;
 
-  // Every row has room behind it for a run that begins in it; and an odd number of parts of 64
-  // bytes (of floats), so that rows and planes do not meet in one place of a cache.
+  // Every row has space behind it for a run that begins in it. The stride is an odd number of parts
+  // of 64 bytes (of floats), so that rows and planes do not share one place of a cache.
   int stride_px() const { return ((width_px + kPixelsOfRun + 15) / 16 | 1) * 16; }
 };
-// From all but the bands and the parts that are read, which it sets.
+// Sets `band` and `read` from all other fields.
 template <typename Real>
 void SetBands(PixelRuns<Real>* runs);
-// One form from the other: entries that follow each other share a run; weights of 0 are left out.
+// Conversions between the two forms: RunsOf puts entries that follow each other into one run;
+// RowsOf leaves out weights of 0.
 template <typename Real>
 PixelRuns<Real> RunsOf(const PixelRows<Real>& rows, int width_px);
 template <typename Real>
 PixelRows<Real> RowsOf(const PixelRuns<Real>& runs);
 
-// What a map is applied to: `channels` planes of as many pixels, `plane_stride` apart.
+// The image to which a map is applied (PictureOut: its result): `channels` planes of equal size,
+// `plane_stride` numbers apart. The memory is not owned.
 template <typename Real>
 struct PictureIn {
   const Real* values = nullptr;
@@ -113,10 +117,10 @@ struct PictureOut {
   int channels = 1;
 };
 
-// Every function below sets its whole result (ApplyRuns: the pixels that have a row, the others
-// are left as they are; AddTransposed: adds to it), uses up to `threads` threads (>= 1), and gives
-// the same bits for any number of them. In and out are different memory. Sizes and order are taken
-// as right; Check tells them.
+// Each function below sets its whole result, with two exceptions: ApplyRuns sets only the pixels
+// that have a row and does not change the others, and AddTransposed adds to its result. The
+// functions use up to `threads` threads (>= 1) and give the same bits for any number of threads.
+// Input and output must not overlap. Sizes and order are not tested; use Check for this.
 template <typename Real>
 void Apply(const PixelFilter<Real>& filter, const PictureIn<Real>& x, const PictureOut<Real>& y,
            int threads);
@@ -126,19 +130,19 @@ void ApplyTransposed(const PixelFilter<Real>& filter, const PictureIn<Real>& x,
 template <typename Real>
 void ApplyRuns(const PixelRuns<Real>& runs, const PictureIn<Real>& x, const PictureOut<Real>& y,
                int threads);
-// x += R^T y.
+// Adds: x += R^T y.
 template <typename Real>
 void AddTransposed(const PixelRuns<Real>& runs, const PictureIn<Real>& y, const PictureOut<Real>& x,
                    int threads);
 
-// Throws Error that names the field if sizes or indices do not fit or a number is not finite.
+// Throws Error, which names the field, if sizes or indices do not fit or a number is not finite.
 template <typename Real>
 void Check(const PixelFilter<Real>& filter);
 template <typename Real>
 void Check(const PixelRows<Real>& rows);
 
-// Sum of x y w over `count` numbers (w may be null: 1), added in double, in an order that does not
-// depend on `threads`.
+// Returns the sum of x y w over `count` numbers (w may be null: 1). It is added in double, in an
+// order that does not depend on `threads`.
 template <typename Real>
 double Dot(const Real* x, const Real* y, const Real* w, std::size_t count, int threads);
 
