@@ -10,7 +10,7 @@
 namespace thicklens::kernels {
 namespace {
 
-// Sums of some of them still fit into an int.
+// Sums of several such numbers still fit into an int.
 constexpr int kLargest = std::numeric_limits<int>::max() / 8;
 
 void CheckRange(const std::string& what, std::int64_t value, std::int64_t low, std::int64_t high) {
@@ -28,7 +28,7 @@ void CheckShifts(const char* what, const std::vector<int>& shifts, int count) {
 void CheckFractions(const char* what, const std::vector<double>& fractions, int count) {
   CheckSize(fmt::format("block: {}", what), fractions.size(), static_cast<std::size_t>(count));
   for (const double fraction : fractions) {
-    // Some more than a half, for who subtracts a rounded number.
+    // The limit is slightly above one half, for callers that subtract a rounded number.
     if (!(std::abs(fraction) <= 0.5 + 1e-6)) {
       throw Error(fmt::format("block: {} is {}: it must be -1/2 to 1/2", what, fraction));
     }

@@ -11,27 +11,27 @@
 
 namespace thicklens::kernels {
 
-// The arguments of Kernels, checked alike by all that implement it: each throws Error naming what
-// does not fit.
+// Tests of the arguments of Kernels, common to all implementations. Each throws Error, which names
+// the argument that does not fit.
 
-// Sizes, weights and fractions; pixels must have a number.
+// Tests sizes, weights and fractions. The number of pixels must be small enough to number them.
 void CheckBlock(const BlockGeometry& block);
-// And rays, with `rows_per_ray` matrix rows for each.
+// Tests the block and the number of its rays, with `rows_per_ray` matrix rows for each.
 void CheckRayNumbers(const BlockGeometry& block, int rows_per_ray);
 
-// Slopes of WarpDifferences and SixTermMasks.
+// Tests the slopes of WarpDifferences and SixTermMasks.
 void CheckSlopes(const BlockGeometry& block, int rows_per_ray, std::size_t slopes_u,
                  std::size_t slopes_v);
 
 void CheckSize(const std::string& what, std::size_t size, std::size_t right);
-// `rays` as FindRays gives them.
+// Tests `rays`, a result of FindRays.
 void CheckRays(const BlockGeometry& block, Splat splat, const std::vector<std::int32_t>& rays);
 
 template <typename Real>
 void CheckCsr(const CsrMatrix<Real>& a);
 void CheckPattern(const CsrPattern& pattern, int rows);
 
-// The whole light field that blocks are added to.
+// The size of the whole light field to which blocks are added.
 struct WholeShape {
   int s_count = 0, t_count = 0, u_count = 0, v_count = 0, channels = 0;
 
@@ -43,7 +43,7 @@ struct WholeShape {
   }
 };
 void CheckWhole(const WholeShape& whole);
-// Whether a block of `rays` numbers can be added to that channel.
+// Tests that a block of `rays` numbers can be added to the channel.
 void CheckAddition(const WholeShape& whole, const BlockGeometry& block, int channel,
                    std::size_t rays);
 

@@ -19,24 +19,25 @@ constexpr int kFarAway = 1 << 30;
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// Ray numbers (see BlockGeometry).
+// Returns the number of a ray (see BlockGeometry).
 std::int32_t RayNumber(const BlockGeometry& block, int k, int l, int x, int y) {
   return (l * block.u_count + k) * block.pixels() + y * block.width_px + x;
 }
 
-// The ray of view (k, l) nearest to the block's pixel (x, y), or -1.
+// Returns the ray of view (k, l) nearest to the block's pixel (x, y), or -1.
 std::int32_t RayAt(const BlockGeometry& block, int k, int l, int x, int y) {
   if (k < 0 || k >= block.u_count || l < 0 || l >= block.v_count) return -1;
   if (x < 0 || x >= block.width_px || y < 0 || y >= block.height_px) return -1;
   return block.Exists(k, l, x, y) ? RayNumber(block, k, l, x, y) : -1;
 }
 
-// Sample s + step of view k + 1 or k - 1 (k + 0: the same) has the number x + step + this.
+// Returns the shift by which sample s + step of view `to` has the number x + step + shift, if
+// sample s of view `from` has the number x.
 int ShiftBetween(const std::vector<int>& shift, int from, int to) {
   return to < 0 || to >= static_cast<int>(shift.size()) ? 0 : shift[Index(to)] - shift[Index(from)];
 }
 
-// One row of slots that are filled in turn.
+// Writes the slots of one row in turn.
 template <typename Real>
 class RowWriter {
  public:
@@ -74,7 +75,8 @@ void ForEachRay(const BlockGeometry& block, const Visit& visit) {
   }
 }
 
-// The whole samples and the rest that a slope moves a ray by; false for NaN and what is far away.
+// Splits a slope into whole samples and the rest. Returns false for NaN and for slopes that are too
+// large.
 template <typename Real>
 bool SplitSlope(Real slope, int* whole, Real* rest) {
   const Real floored = std::floor(slope);
@@ -84,7 +86,7 @@ bool SplitSlope(Real slope, int* whole, Real* rest) {
   return true;
 }
 
-// One row of D: -1 at the ray, 1 - w and w at the next view's samples around it.
+// Writes one row of D: -1 at the ray, 1 - w and w at the next view's samples around it.
 template <typename Real>
 void PutDifference(std::int32_t ray, std::int32_t tap0, std::int32_t tap1, Real rest,
                    RowWriter<Real>* row) {
@@ -95,9 +97,9 @@ void PutDifference(std::int32_t ray, std::int32_t tap0, std::int32_t tap1, Real 
   row->Put(rest != 0 ? tap1 : -1, rest);
 }
 
-// The eight neighbours of a ray in one plane, (s, u) or (t, v), and the weights of
-//   m^2 L_ss + 2 m L_su + L_uu
-// there, as (step along the samples, step along the views, weight).
+// The eight neighbours of a ray in one plane, (s, u) or (t, v), and their weights in
+//   m^2 L_ss + 2 m L_su + L_uu,
+// as (step along the samples, step along the views, weight).
 template <typename Real>
 struct Neighbour {
   int samples;
@@ -166,9 +168,8 @@ class Reference : public Kernels<Real> {
     return h;
   }
 
-  // [D111] (D L)(i, k) = L(i + m, k + 1) - L(i, k) = (1 - w) L(i + n, k + 1) + w L(i + n + 1, k +
-  // 1)
-  // - L(i, k), n = floor(m), w = m - n.
+  // [D111] (D L)(i, k) = L(i + m, k + 1) - L(i, k)
+  //   = (1 - w) L(i + n, k + 1) + w L(i + n + 1, k + 1) - L(i, k), n = floor(m), w = m - n.
   EllMatrix<Real> WarpDifferences(const BlockGeometry& block, const std::vector<Real>& slope_u,
                                   const std::vector<Real>& slope_v) override {
     CheckSlopes(block, 2, slope_u.size(), slope_v.size());
@@ -223,7 +224,7 @@ class Reference : public Kernels<Real> {
     return g;
   }
 
-  // y_i = sum_j A_ij x_j, columns ascending.
+  // Computes y_i = sum_j A_ij x_j, columns ascending.
   std::vector<Real> Multiply(const CsrMatrix<Real>& a, const std::vector<Real>& x) override {
     CheckCsr(a);
     CheckSize("vector to be multiplied", x.size(), Index(a.columns));
@@ -238,7 +239,7 @@ class Reference : public Kernels<Real> {
     return y;
   }
 
-  // y_j = sum_i A_ij x_i, rows ascending.
+  // Computes y_j = sum_i A_ij x_i, rows ascending.
   std::vector<Real> MultiplyTransposed(const CsrMatrix<Real>& a,
                                        const std::vector<Real>& x) override {
     CheckCsr(a);
@@ -252,8 +253,8 @@ class Reference : public Kernels<Real> {
     return y;
   }
 
-  // N_ij += scale * sum_r A_ri A_rj, r ascending: row i of N gathers the rows of A that have an
-  // entry in column i.
+  // Computes N_ij += scale * sum_r A_ri A_rj, r ascending: row i of N gathers the rows of A that
+  // have an entry in column i.
   void AddNormalProduct(const CsrMatrix<Real>& a, Real scale, const CsrPattern& pattern,
                         std::vector<Real>* values) override {
     CheckCsr(a);
@@ -276,8 +277,9 @@ class Reference : public Kernels<Real> {
     }
   }
 
-  // I(x) = sum over rays of H0(x, ray) L(ray) / sum over rays of H0(x, ray). A row of the picture
-  // at a time, so that sums stay near while the views are read in their order.
+  // Computes I(x) = sum over rays of H0(x, ray) L(ray) / sum over rays of H0(x, ray). One row of
+  // the image is computed at a time, so that the sums stay in the cache while the views are read in
+  // their order.
   std::vector<Real> FormPicture(const BlockGeometry& whole, Splat splat,
                                 const std::vector<Real>& views) override {
     CheckBlock(whole);
@@ -329,7 +331,7 @@ class Reference : public Kernels<Real> {
   }
 
  private:
-  // The share of view (k, l) in the picture's row y.
+  // Adds the contribution of view (k, l) to row y of the image.
   static void AddView(const BlockGeometry& whole, Splat splat, int k, int l, int y,
                       const Real* view, std::vector<Real>* sums, std::vector<Real>* weights) {
     const int taps = TapCount(splat);
@@ -342,7 +344,7 @@ class Reference : public Kernels<Real> {
       for (int tap_x = 0; tap_x < taps; ++tap_x) {
         const auto in_x = TapOf<Real>(splat, whole.s_fraction[Index(k)], tap_x);
         const Real weight = view_weight * in_y.share * in_x.share;
-        // A view without weight is not looked at: it may be absent.
+        // A view without weight is not read, because it may be absent.
         if (weight == 0) continue;
         // Pixel x has ray x + offset, sample x + to_s.
         const int to_s = whole.first_x + in_x.offset - whole.s_shift[Index(k)];

@@ -1,4 +1,4 @@
-// A picture read for a view, plainly; warp.cl does the same.
+// Reads an image for a view in plain C++; warp.cl computes the same.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,12 +20,12 @@ std::size_t PixelsOf(const SurfacePicture& picture) {
   return Index(picture.width_px) * Index(picture.height_px);
 }
 
-// A place on a line of pixels: the pixel before it, and the rest of the way to the next, < 1.
+// A position on a line of pixels: the pixel before it, and the distance from that pixel, < 1.
 struct Place {
   int pixel = 0;
   float rest = 0;
 };
-// `limit_px`: more than the line is long.
+// `limit_px` is larger than the length of the line.
 Place PlaceAt(int sample, float source, int count, float limit_px) {
   const float way = std::clamp(source, -limit_px, limit_px);
   const float below = std::floor(way);
@@ -34,7 +34,7 @@ Place PlaceAt(int sample, float source, int count, float limit_px) {
   return {pixel, at == pixel && at < count - 1 ? way - below : 0.0F};
 }
 
-// Of the pixels at -1, 0, 1 and 2; of Catmull and Rom.
+// Weights of the pixels at -1, 0, 1 and 2, after Catmull and Rom.
 std::array<float, 4> CatmullRom(float t) {
   return {((-0.5F * t + 1) * t - 0.5F) * t, (1.5F * t - 2.5F) * t * t + 1,
           ((-1.5F * t + 2) * t + 0.5F) * t, (0.5F * t - 0.5F) * t * t};
@@ -128,7 +128,7 @@ class ReferenceWarp : public ViewWarp {
       for (int i = 0; i < 2; ++i) {
         const float weight =
             (i == 0 ? 1 - across.rest : across.rest) * (j == 0 ? 1 - down.rest : down.rest);
-        if (weight == 0) continue;  // perhaps outside of the picture
+        if (weight == 0) continue;  // may be outside of the image
         const int x = across.pixel + i, y = down.pixel + j;
         const float there = (*picture_.disparity)[At(x, y)];
         if (std::abs(there - disparity) < closest) {
@@ -170,7 +170,7 @@ void CheckPicture(const SurfacePicture& picture) {
 namespace {
 
 void CheckMixed(const std::vector<MixedSample>& mixed, std::size_t pixels) {
-  std::int32_t before = -1;  // else two items of a device would write one sample
+  std::int32_t before = -1;  // otherwise two items of a device would write one sample
   for (const MixedSample& one : mixed) {
     if (one.index <= before || Index(one.index) >= pixels) {
       throw Error(
@@ -199,7 +199,7 @@ void CheckView(const SurfacePicture& picture, const ViewSources& view) {
       throw Error(fmt::format("hidden sample of a view has the index {}: it must be 0 to {}",
                               hidden.index, PixelsOf(picture) - 1));
     }
-    // Else two items of a device would write it.
+    // Otherwise two items of a device would write this sample.
     const float seen = (*view.disparity)[Index(hidden.index)];
     if (std::isnan(seen)) continue;
     throw Error(
@@ -217,7 +217,7 @@ TapRanges TapRangesOf(const SurfacePicture& picture) {
   const auto row_at = [&](int y) {
     return picture.disparity->data() + Index(std::clamp(y, 0, height - 1)) * Index(width);
   };
-  // Of the four pixels in each column, then of four columns.
+  // The extremes of the four pixels in each column, then of four columns.
   std::vector<float> lowest(Index(width)), highest(Index(width));
   for (int y = 0; y < height; ++y) {
     const float* const rows[] = {row_at(y - 1), row_at(y), row_at(y + 1), row_at(y + 2)};

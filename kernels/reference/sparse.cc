@@ -33,13 +33,14 @@ void CheckEll(const EllMatrix<Real>& ell) {
   }
 }
 
-// The column counts that stand in start[1 ...] become where each row starts.
+// Converts the column counts in start[1 ...] to the starts of the rows.
 void SumUp(std::vector<std::int64_t>* start) {
   for (std::size_t i = 1; i < start->size(); ++i) (*start)[i] += (*start)[i - 1];
 }
 
-// Sorts the entries [begin, end) by column, keeping the order of equal ones, adds up these, and
-// moves the row to `to`. Returns its new end. By insertion: rows come nearly sorted from kernels.
+// Sorts the entries [begin, end) by column, keeping the order of equal ones, adds entries of the
+// same column, and moves the row to `to`. Returns its new end. The insertion sort is fast because
+// rows from kernels are nearly sorted.
 template <typename Real>
 std::int64_t SortRow(std::int64_t begin, std::int64_t end, std::int64_t to,
                      std::vector<std::int32_t>* columns, std::vector<Real>* values) {
@@ -67,7 +68,8 @@ std::int64_t SortRow(std::int64_t begin, std::int64_t end, std::int64_t to,
   return to;
 }
 
-// Where the entries of the transposed matrix lie. moved(e, to) is told that entry e goes to `to`.
+// Returns the positions of the entries of the transposed matrix. Calls moved(e, to) for each entry
+// e that moves to `to`.
 template <typename Moved>
 CsrPattern TransposePattern(int rows, int columns, const std::vector<std::int64_t>& row_start,
                             const std::vector<std::int32_t>& column, const Moved& moved) {
@@ -153,7 +155,8 @@ template <typename Real>
 CsrPattern NormalPattern(const CsrMatrix<Real>& a) {
   const auto ignore = [](std::int64_t, std::int64_t) {};
   const CsrPattern a_t = TransposePattern(a.rows, a.columns, a.row_start, a.column, ignore);
-  // Row i: the columns of all rows of A that have an entry in column i, as they come.
+  // Row i has the columns of all rows of A that have an entry in column i, in the order in which
+  // they are found.
   std::vector<std::int64_t> row_start(Index(a.columns) + 1, 0);
   std::vector<std::int32_t> column;
   std::vector<std::int32_t> seen_by(Index(a.columns), -1);
@@ -172,7 +175,7 @@ CsrPattern NormalPattern(const CsrMatrix<Real>& a) {
     }
     row_start[Index(i) + 1] = static_cast<std::int64_t>(column.size());
   }
-  // The pattern is symmetric, so transposing sorts it and does nothing else.
+  // The pattern is symmetric, so that the transposition only sorts it.
   return TransposePattern(a.columns, a.columns, row_start, column, ignore);
 }
 

@@ -9,12 +9,12 @@
 
 namespace thicklens::kernels {
 
-// Taps of one axis.
+// Number of taps of one axis.
 inline int TapCount(Splat splat) { return splat == Splat::kNearest ? 1 : 2; }
 
-// What pixel x gets, on one axis, of rays that land `fraction` f beside the pixel nearest to them:
+// Tap of pixel x, on one axis, for rays that land `fraction` f beside their nearest pixel:
 //   share 1 - |f| of ray x (tap 0) and |f| of ray x - sign(f) (tap 1),
-// the unit impulse g(d) = max(0, 1 - |d|); or, by kNearest, all of ray x.
+// the unit impulse g(d) = max(0, 1 - |d|). With kNearest it is all of ray x.
 template <typename Real>
 struct Tap {
   int offset;
@@ -28,7 +28,8 @@ Tap<Real> TapOf(Splat splat, double exact_fraction, int tap) {
   return {fraction > 0 ? -1 : 1, std::abs(fraction)};
 }
 
-// H0 = view weight * g of [M16] for each slot of FindRays: the same for all pixels.
+// Returns H0 = view weight * g of [M16] for each slot of FindRays, which is the same for all
+// pixels.
 template <typename Real>
 std::vector<Real> SlotWeights(const BlockGeometry& block, Splat splat) {
   std::vector<Real> weights;

@@ -5,12 +5,12 @@
 
 namespace thicklens::kernels {
 
-// Throw Error for sizes and indices that do not fit.
+// Both functions throw Error for sizes and indices that do not fit.
 void CheckPicture(const SurfacePicture& picture);
 void CheckView(const SurfacePicture& picture, const ViewSources& view);
 
-// The 4 x 4 pixels at -1 to 2 around each pixel, cut to the picture: the least and the largest of
-// their disparities.
+// Minimum and maximum of the disparities of the 4 x 4 pixels at -1 to 2 around each pixel, clamped
+// to the image.
 struct TapRanges {
   std::vector<float> lowest, highest;
 };
