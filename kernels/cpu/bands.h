@@ -8,15 +8,16 @@
 
 namespace thicklens::kernels {
 
-// So many that none has fewer than `least` (as far as there are so many at all): a short one is
-// done before another thread has woken up.
+// Returns the number of bands. It is chosen so that no band has fewer than `least` items (unless
+// `count` is smaller), because a short band is finished before another thread has woken up.
 inline int BandCount(int count, int threads, int least) {
   return std::max(1, std::min(threads, count / std::max(1, least)));
 }
 
-// Calls work(band, first, last) for all of each band of [0, count), one piece after the other, the
-// bands side by side, one thread each. `work` must not throw. Throws Interrupted if that is asked
-// for, when the pieces that have begun are done; one that takes long may look at IsCancelled().
+// Calls work(band, first, last) for all items of each band of [0, count). The pieces of a band run
+// one after the other; the bands run in parallel, one thread each. `work` must not throw. After a
+// cancellation ForBands throws Interrupted when the pieces that have begun are done; a long piece
+// may test IsCancelled().
 template <typename Work>
 void ForBands(int count, int bands, const Work& work) {
   constexpr int kPieces = 32;

@@ -6,11 +6,11 @@
 
 namespace thicklens::kernels {
 
-// The innermost loops of picture_filter.h, compiled once for each kind of processor. What they get
-// is raw memory: a file that is compiled for one kind of processor must not instantiate anything
-// that the linker could take for another.
+// The innermost loops of picture_filter.h, compiled once for each kind of processor. Their
+// arguments are raw memory, because a file that is compiled for one kind of processor must not
+// instantiate a function that the linker could use in place of that of another file.
 
-// Weights of consecutive pixels, and the numbers of the first channel that they are for.
+// Weights of consecutive pixels, and the numbers of the first channel to which they apply.
 template <typename Real>
 struct FilterTerm {
   const Real* weight = nullptr;
@@ -21,42 +21,42 @@ struct FilterTerm {
 template <typename Real>
 struct RunRange {
   const std::int32_t* pixel = nullptr;
-  const std::int64_t* run = nullptr;    // of each row its first
-  const std::int32_t* index = nullptr;  // of each run
-  const Real* weight = nullptr;         // kPixelsOfRun of each run
+  const std::int64_t* run = nullptr;    // first run of each row
+  const std::int32_t* index = nullptr;  // first pixel of each run
+  const Real* weight = nullptr;         // kPixelsOfRun weights per run
   std::size_t first = 0, last = 0;
 };
 
-constexpr int kMostChannels = 4;  // that a loop takes together
+constexpr int kMostChannels = 4;  // maximum number that a loop processes together
 
 template <typename Real>
 struct FilterLoops {
-  // y[c y_stride + p] = sum_k weight_k[p] x_k[c x_stride + p], p < count, c < channels <= 4; terms
-  // are added in their order. `ahead`: how far behind each weight those lie that will be wanted
-  // soon.
+  // Computes y[c y_stride + p] = sum_k weight_k[p] x_k[c x_stride + p], p < count, c < channels <=
+  // 4; terms are added in their order. `ahead` is the distance behind each weight of the weights
+  // that are needed soon (for prefetching).
   void (*sum_terms)(const FilterTerm<Real>* terms, int term_count, std::ptrdiff_t ahead,
                     std::ptrdiff_t x_stride, int channels, int count, Real* y,
                     std::ptrdiff_t y_stride);
-  // y(pixel) = sum weight x of each row, for up to 4 channels.
+  // Computes y(pixel) = sum weight x of each row, for up to 4 channels.
   void (*sum_runs)(const RunRange<Real>& rows, const Real* x, std::ptrdiff_t x_stride, int channels,
                    Real* y, std::ptrdiff_t y_stride);
-  // The transposed: x += weight y(pixel).
+  // Computes the transposed map: x += weight y(pixel).
   void (*spread_runs)(const RunRange<Real>& rows, const Real* y, std::ptrdiff_t y_stride,
                       int channels, Real* x, std::ptrdiff_t x_stride);
-  // Sum of x y w (w may be null: 1).
+  // Returns the sum of x y w (w may be null: 1).
   double (*dot)(const Real* x, const Real* y, const Real* w, std::size_t count);
 };
 
-// For every processor of the architecture.
+// The loops for every processor of the architecture.
 template <typename Real>
 FilterLoops<Real> PlainFilterLoops();
 #if defined(__x86_64__)
-// With AVX2 and FMA.
+// The loops with AVX2 and FMA.
 template <typename Real>
 FilterLoops<Real> Avx2FilterLoops();
 bool HasAvx2();
 #endif
-// The fastest of these that runs on this processor.
+// The fastest of these loops that this processor can run.
 template <typename Real>
 const FilterLoops<Real>& BestFilterLoops();
 

@@ -7,8 +7,8 @@
 #include "kernels/cpu/filter_loops.h"
 #include "thicklens/kernels/picture_filter.h"
 
-// The loops of filter_loops.h, for the processor that the including file is compiled for; each of
-// these has its own copy (hence the namespace without a name).
+// The loops of filter_loops.h, for the processor for which the including file is compiled. Each
+// including file has its own copy (hence the unnamed namespace).
 
 namespace thicklens::kernels {
 namespace {
@@ -33,7 +33,7 @@ inline __attribute__((always_inline)) void Store(const Vector& from, Real* to) {
   __builtin_memcpy(to, &from, sizeof(Vector));
 }
 
-// kVectors vectors of kChannels channels from pixel p on, all sums in registers.
+// Computes kVectors vectors of kChannels channels from pixel p on, with all sums in registers.
 template <typename Real, int kChannels, int kVectors>
 inline __attribute__((always_inline)) void SumGroup(const FilterTerm<Real>* terms, int term_count,
                                                     std::ptrdiff_t ahead, std::ptrdiff_t x_stride,
@@ -72,14 +72,14 @@ template <typename Real, int kChannels>
 void SumTermsOf(const FilterTerm<Real>* terms, int term_count, std::ptrdiff_t ahead,
                 std::ptrdiff_t x_stride, int count, Real* y, std::ptrdiff_t y_stride) {
   constexpr int kLanes = kVectorBytes / static_cast<int>(sizeof(Real));
-  // Sums and a weight fit into 16 registers.
+  // The sums and a weight fit into 16 registers.
   constexpr int kMost = kChannels == 1 ? 8 : kChannels == 4 ? 2 : 4;
   int p = 0;
   for (; p + kMost * kLanes <= count; p += kMost * kLanes) {
     SumGroup<Real, kChannels, kMost>(terms, term_count, ahead, x_stride, p, y, y_stride);
   }
-  // What is left is done by vectors that reach back to pixels that are done: the same numbers
-  // again.
+  // The remaining pixels are computed by vectors that overlap finished pixels; these get the same
+  // numbers again.
   while (p < count) {
     const int left = count - p;
     if (left > kLanes && count >= 2 * kLanes) {
@@ -161,8 +161,8 @@ inline __attribute__((always_inline)) void SpreadRow(const RunRange<Real>& rows,
     Real* to = x + rows.index[n];
 #pragma GCC unroll 4
     for (int i = 0; i < kPixelsOfRun; i += kLanes, weight += kLanes, to += kLanes) {
-      // Planes may lie a multiple of 4096 bytes apart, where a processor takes what is read for
-      // what was just written: all is read first.
+      // Planes may be a multiple of 4096 bytes apart. A processor then mistakes a read for the
+      // previous write, so that everything is read first.
       Vector w, sum[kChannels];
       Load(weight, &w);
 #pragma GCC unroll 4
@@ -176,9 +176,9 @@ inline __attribute__((always_inline)) void SpreadRow(const RunRange<Real>& rows,
   }
 }
 
-// Neighbouring rows reach the same pixels, a little aside: a vector that was just written would be
-// read again in two parts, for which the processor waits. So rows take turns that are a quarter of
-// them apart.
+// Neighbouring rows reach almost the same pixels. A vector that was just written would be read
+// again in two parts, for which the processor waits. The loop therefore alternates between rows
+// that are a quarter of all rows apart.
 template <typename Real, int kChannels>
 void SpreadRunsOf(const RunRange<Real>& rows, const Real* y, std::ptrdiff_t y_stride, Real* x,
                   std::ptrdiff_t x_stride) {

@@ -15,7 +15,7 @@ namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-constexpr int kBandRows = 16;  // of a sum, whatever the number of threads
+constexpr int kBandRows = 16;  // rows of a band of a sum, for any number of threads
 
 using Sums = std::array<double, 3>;
 
@@ -39,15 +39,15 @@ class NativeSteps : public RadianceSteps<Real> {
   std::vector<Real> ProjectTransposed(const std::vector<Real>& y) override;
 
  private:
-  // Room for a row of differences and one of results.
+  // Memory for a row of differences and one of results.
   struct Room {
     std::vector<Real> across, row;
   };
-  // rows(y0, y1, room) for bands that do not depend on the number of threads.
+  // Work rows(y0, y1, room) for bands that do not depend on the number of threads.
   using Rows = std::function<Sums(int y0, int y1, Room* room)>;
   Sums SumOverBands(const Rows& rows) const;
-  // row(first, pixel, room) for all rows of all channels, in bands: `first` is its first number,
-  // `pixel` its first pixel.
+  // Calls row(first, pixel, y, room) for all rows y of all channels, in bands: `first` is the index
+  // of the row's first number, `pixel` that of its first pixel.
   template <typename RowWork>
   Sums SumRows(const RowWork& row) const;
 
@@ -55,10 +55,11 @@ class NativeSteps : public RadianceSteps<Real> {
   void UpdatePreconditioner();
   void StartAt(const std::vector<Real>& x);
   void MultiplyData(const std::vector<Real>& x, std::vector<Real>* y);  // y = H^T W H x
-  // Sum over the channels of the squared forward differences of x at each pixel of a row.
+  // Computes the sum over the channels of the squared forward differences of x at each pixel of a
+  // row.
   void SquaredDifferences(int y, std::vector<Real>* squares) const;
 
-  // Null: 0.
+  // Null: the target is 0.
   const Real* Target() const {
     if (prior_.target_is_photograph) return photograph_->data();
     return prior_.target.empty() ? nullptr : prior_.target.data();
@@ -69,9 +70,9 @@ class NativeSteps : public RadianceSteps<Real> {
   TotalVariation<Real> variation_;
   std::vector<Real> slope_squared_;
   std::vector<Real> weighted_photograph_;  // H^T W I
-  std::vector<Real> data_diagonal_;        // of H^T W H, about
+  std::vector<Real> data_diagonal_;        // diagonal of H^T W H, approximate
   std::vector<Real> inverse_diagonal_;
-  // Of the system that was started.
+  // State of the system that was started.
   int channels_ = 1;
   std::vector<Real> other_photograph_, other_right_;
   const std::vector<Real>* photograph_ = nullptr;
@@ -89,8 +90,9 @@ NativeSteps<Real>::NativeSteps(const DataTerm<Real>& data)
       projected_(data.photograph.size()) {
   const std::vector<Real> weighted = Weighted(data.photograph);
   data.projection.apply_transposed(weighted.data(), data.channels, weighted_photograph_.data());
-  // The diagonal is sum_i W_i H_ij^2. Taking H_ij^2 for H_ij times the row's mean of H by itself,
-  // sum_j H_ij^2, costs one application; exact where a row's weights are equal.
+  // The diagonal is sum_i W_i H_ij^2. If H_ij^2 is replaced by H_ij times the mean of H over the
+  // row with weights H, sum_j H_ij^2, one application suffices. This is exact if the weights of a
+  // row are equal.
   const std::vector<Real> squares = Weighted(data.squared_row);
   data.projection.apply_transposed(squares.data(), 1, data_diagonal_.data());
 }
@@ -100,7 +102,7 @@ Sums NativeSteps<Real>::SumOverBands(const Rows& rows) const {
   const int bands = (data_.height_px + kBandRows - 1) / kBandRows;
   const int threads = BandCount(bands, data_.threads, 1);
   std::vector<Sums> of_band(Index(bands));
-  // Made before the threads are, as these must not throw.
+  // The memory is allocated before the threads start, because threads must not throw.
   std::vector<Room> rooms(Index(threads), Room{std::vector<Real>(Index(data_.width_px) + 1),
                                                std::vector<Real>(Index(data_.width_px))});
   ForBands(bands, threads, [&](int thread, int first, int last) {

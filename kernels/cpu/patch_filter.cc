@@ -14,14 +14,14 @@ std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBandRows = 64;
 constexpr int kColours = 3;
-// sqrt(1/3), sqrt(1/2), sqrt(1/6).
+// Values of sqrt(1/3), sqrt(1/2) and sqrt(1/6).
 constexpr double kThird = 0.57735026918962576451, kHalf = 0.70710678118654752440,
                  kSixth = 0.40824829046386301637;
-// Orthonormal: sum and two differences of the colours.
+// Orthonormal sum and two differences of the colours.
 constexpr std::array<std::array<double, kColours>, kColours> kOpponents{
     {{kThird, kThird, kThird}, {kHalf, 0, -kHalf}, {kSixth, -2 * kSixth, kSixth}}};
 
-// Filters a picture in bands of rows; one thread uses one Room.
+// Filters an image in bands of rows; each thread uses its own Room.
 template <typename Real>
 class PatchFilter {
  public:
@@ -44,7 +44,7 @@ class PatchFilter {
     return {rows, rows, rows, std::vector<Real>(Index(kPatchPx * stride_))};
   }
 
-  // Rows [y0, y1); they are 0 before.
+  // Filters rows [y0, y1), which must be 0 before.
   void FilterRows(int y0, int y1, Room* room) const {
     for (int channel = 0; channel < channels_; ++channel) {
       const int first = std::max(0, y0 - (kPatchPx - 1));
@@ -73,7 +73,7 @@ class PatchFilter {
     return (Index(channel) * Index(height_px_) + Index(y)) * Index(width_px_);
   }
 
-  // A row of what is filtered, from and to the channels.
+  // Read and Write convert a row between the channels and the filtered sums and differences.
   void Read(int channel, int y, Real* row) const {
     if (channels_ != kColours) {
       std::copy_n(picture_.data() + Start(channel, y), width_px_, row);
@@ -115,7 +115,7 @@ std::vector<Real> FilterPatches(int width_px, int height_px, int channels,
                                  static_cast<Real>(threshold), &filtered);
   const int bands = (height_px + kBandRows - 1) / kBandRows;
   const int used = BandCount(bands, threads, 1);
-  // Made before the threads are, as these must not throw.
+  // The memory is allocated before the threads start, because threads must not throw.
   std::vector<typename PatchFilter<Real>::Room> rooms(Index(used), filter.NewRoom());
   ForBands(bands, used, [&](int thread, int first, int last) {
     for (int band = first; band < last; ++band) {

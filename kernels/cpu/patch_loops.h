@@ -5,23 +5,24 @@
 
 namespace thicklens::kernels {
 
-// The innermost loop of patch_filter.h, compiled once for each kind of processor; what is said in
-// filter_loops.h holds here.
+// The innermost loop of patch_filter.h, compiled once for each kind of processor; see
+// filter_loops.h for its restrictions.
 
 constexpr int kPatchPx = 8;
-constexpr int kPatchChunkPx = 64;  // of a row, that is done at a time
+constexpr int kPatchChunkPx = 64;  // pixels of a row that are processed at once
 
-// All patches with their first row in common. Rows are `stride` apart, which is a multiple of 16
-// and at least 16 more than the width rounded up to chunks; what lies there beside the picture is
+// All patches with the same first row. Rows are `stride` apart. The stride is a multiple of 16 and
+// at least 16 more than the width rounded up to chunks; the numbers there beside the image are
 // finite.
 template <typename Real>
 struct PatchRow {
   const Real* from = nullptr;  // 8 rows
-  Real* columns = nullptr;     // room for 8 rows
+  Real* columns = nullptr;     // memory for 8 rows
   std::ptrdiff_t stride = 0;
   int patches = 0;
   Real threshold = 0;
-  // 8 rows each: what the patches come to, times their weights, and the weights are added here.
+  // 8 rows each: the filtered patches times their weights are added to `sum`, the weights to
+  // `weight`.
   Real* sum = nullptr;
   Real* weight = nullptr;
 };
@@ -31,15 +32,15 @@ struct PatchLoops {
   void (*filter_row)(const PatchRow<Real>& row);
 };
 
-// For every processor of the architecture.
+// The loop for every processor of the architecture.
 template <typename Real>
 PatchLoops<Real> PlainPatchLoops();
 #if defined(__x86_64__)
-// With AVX2 and FMA.
+// The loop with AVX2 and FMA.
 template <typename Real>
 PatchLoops<Real> Avx2PatchLoops();
 #endif
-// The fastest of these that runs on this processor.
+// The fastest of these loops that this processor can run.
 template <typename Real>
 const PatchLoops<Real>& BestPatchLoops();
 

@@ -1,4 +1,4 @@
-// Compiled for processors with AVX2 and FMA (see CMakeLists.txt), on x86 only.
+// This file is compiled for processors with AVX2 and FMA (see CMakeLists.txt), on x86 only.
 #include "kernels/cpu/patch_loops.h"
 #include "kernels/cpu/patch_loops_body.h"
 

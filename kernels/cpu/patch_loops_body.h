@@ -5,8 +5,9 @@
 
 #include "kernels/cpu/patch_loops.h"
 
-// The loop of patch_loops.h, for the processor that the including file is compiled for; each of
-// these has its own copy (hence the namespace without a name). Vectors are patches side by side.
+// The loop of patch_loops.h, for the processor for which the including file is compiled. Each
+// including file has its own copy (hence the unnamed namespace). The lanes of a vector are adjacent
+// patches.
 
 namespace thicklens::kernels {
 namespace {
@@ -39,7 +40,7 @@ inline __attribute__((always_inline)) void AddLanes(const Vector& what, Real* to
   StoreLanes(sum, to);
 }
 
-// cos(m pi/16)/2; that of m = 4 is sqrt(1/8), the value of a constant.
+// Values of cos(m pi/16)/2; for m = 4 it is sqrt(1/8), which is also the value of a constant.
 template <typename Real>
 struct Cosines {
   static constexpr Real k1 = static_cast<Real>(0.49039264020161522456);
@@ -51,8 +52,8 @@ struct Cosines {
   static constexpr Real k7 = static_cast<Real>(0.09754516100806413392);
 };
 
-// In place: v_k = c_k sum_j cos((2 j + 1) k pi/16) v_j, c_0 = sqrt(1/8), else 1/2. Even and odd k
-// ask for sums and differences of v_j and v_(7 - j) alone.
+// Computes in place v_k = c_k sum_j cos((2 j + 1) k pi/16) v_j, where c_0 = sqrt(1/8) and the other
+// c_k are 1/2. Even and odd k need only sums and differences of v_j and v_(7 - j).
 template <typename Real, typename Vector>
 inline __attribute__((always_inline)) void Dct(Vector* v) {
   using C = Cosines<Real>;
@@ -69,7 +70,7 @@ inline __attribute__((always_inline)) void Dct(Vector* v) {
   v[7] = C::k7 * d0 - C::k5 * d1 + C::k3 * d2 - C::k1 * d3;
 }
 
-// Its transpose, which is its inverse.
+// Computes the transpose of Dct, which is its inverse.
 template <typename Real, typename Vector>
 inline __attribute__((always_inline)) void InverseDct(Vector* v) {
   using C = Cosines<Real>;
@@ -90,16 +91,17 @@ inline __attribute__((always_inline)) void InverseDct(Vector* v) {
   v[4] = s3 - d3;
 }
 
-// What the patches of a chunk give to the pixel that lies i px right of their first column, as
-// down-transforms: part[k][i][patch]; and their weights. Before the first patch stand the last of
-// the chunk before.
+// The contributions of the patches of a chunk to the pixel i px to the right of their first column,
+// as transforms down: part[k][i][patch]; and their weights. The last patches of the previous chunk
+// precede the first patch.
 template <typename Real>
 struct PatchParts {
   Real part[kPatchPx][kPatchPx][kPatchPx + kPatchChunkPx] = {};
   Real weight[kPatchPx + kPatchChunkPx] = {};
 };
 
-// The patches at x and as many right of it as a vector has lanes, to parts from `at` on.
+// Filters the patches at x and to the right of it, as many as a vector has lanes, to parts from
+// `at` on.
 template <typename Real>
 inline __attribute__((always_inline)) void FilterGroup(const PatchRow<Real>& row, int x, int at,
                                                        PatchParts<Real>* parts) {
@@ -139,7 +141,7 @@ inline __attribute__((always_inline)) void FilterGroup(const PatchRow<Real>& row
   }
 }
 
-// The pixels at x and right of it, from parts at `at` and left of it.
+// Sums up the pixels at x and to the right of it, from parts at `at` and to the left of it.
 template <typename Real>
 inline __attribute__((always_inline)) void AddPixels(const PatchParts<Real>& parts, int at, int x,
                                                      const PatchRow<Real>& row) {

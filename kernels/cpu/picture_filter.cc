@@ -15,7 +15,7 @@ constexpr int kLeastBandPx = 4096;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Computes rows of the result, one after the other, with the memory that it needs for that.
+// Computes rows of the result, one after the other, and has the memory for this.
 template <typename Real>
 class RowFilter {
  public:
@@ -31,7 +31,7 @@ class RowFilter {
 
  private:
   struct Block {
-    int x = 0, count = 0;  // its first pixel, and how many it has
+    int x = 0, count = 0;  // first pixel and number of pixels
     int radius = 0;
     const Real* coefficients = nullptr;
 
@@ -39,14 +39,14 @@ class RowFilter {
     const Real* of(int n) const {
       return coefficients + std::ptrdiff_t{n + radius} * kFilterBlockPx;
     }
-    // To the same coefficient of a later block, if that has the same radius: far enough for memory
-    // to answer meanwhile.
+    // Distance to the same coefficient of a later block, if that has the same radius. It is large
+    // enough for the latency of the memory.
     std::ptrdiff_t ahead() const {
       const std::ptrdiff_t size = std::ptrdiff_t{terms()} * kFilterBlockPx;
       return size * (1 + 1536 / size);
     }
   };
-  // Elements after what is written here, so that nobody else writes to the same line of the cache.
+  // Unused elements behind written memory, so that no other thread writes to the same cache line.
   static constexpr std::size_t kApart = 32;
 
   Block BlockAt(int row, int column) const {
@@ -55,7 +55,7 @@ class RowFilter {
     return {x, std::min(kFilterBlockPx, filter_.width_px - x), filter_.radius_px[block],
             filter_.coefficients.data() + filter_.start[block]};
   }
-  // Calls work(first, count) for every group of channels that the loops take together.
+  // Calls work(first, count) for every group of channels that the loops process together.
   template <typename Work>
   void ForChannels(const Work& work) const {
     for (int first = 0; first < x_.channels; first += kMostChannels) {
@@ -68,8 +68,8 @@ class RowFilter {
   Real* Out(int channel, int row, int x) const {
     return y_.values + channel * y_.plane_stride + std::ptrdiff_t{row} * filter_.width_px + x;
   }
-  // Per channel: the window has a block's pixels, and on either side as many as two radii; the
-  // sums have those that a block gives to; the row has all pixels, and a radius on either side.
+  // Sizes per channel: the window has a block's pixels and two radii on either side; the sums have
+  // the pixels to which a block contributes; the row has all pixels and one radius on either side.
   int window_stride() const { return kFilterBlockPx + 4 * most_radius_; }
   int sums_stride() const { return kFilterBlockPx + 2 * most_radius_; }
   int row_stride() const { return filter_.width_px + 2 * most_radius_; }
@@ -85,7 +85,7 @@ class RowFilter {
   void Down(int row);
   void DownTransposed(int row);
   static void Prefetch(const Block& block);
-  // The window's margins are 0 and remain so.
+  // The window's margins are always 0.
   void FillWindow(const Block& block, int row, int first_channel, int channels);
   void AddToRow(const Block& block, int row, int first_channel, int channels);
 
@@ -112,7 +112,7 @@ RowFilter<Real>::RowFilter(const PixelFilter<Real>& filter, bool transposed,
   row_.resize(Index(kMostChannels) * Index(row_stride()) + kApart);
 }
 
-// (F x)(p) = sum_n c_n(p) x(p + n). Blocks at the border read a copy with zeros beside it.
+// Computes (F x)(p) = sum_n c_n(p) x(p + n). Blocks at the border read a copy with zeros beside it.
 template <typename Real>
 void RowFilter<Real>::Across(int row) {
   for (int column = 0; column < filter_.blocks_in_row(); ++column) {
@@ -147,11 +147,12 @@ void RowFilter<Real>::FillWindow(const Block& block, int row, int first_channel,
   }
 }
 
-// What the pixels of a block give: to q, which is -radius to 63 + radius from the first of them,
-// sum_n c_n(q - n) x(q - n), x being 0 beside the block. Taken for each q, as a sum that stays in a
-// register. Where q - n is beside the block, another coefficient of this block is read instead,
-// which is finite: it lies (q - n) behind the start of c_n, so -(n + radius) to 63 + radius - n,
-// and before c_n there are 64 for each of n + radius, after it 64 for each of radius - n.
+// Adds the contributions of the pixels of a block: pixel q, from -radius to 63 + radius relative to
+// the first of them, gets sum_n c_n(q - n) x(q - n), where x is 0 beside the block. The sum is
+// computed for each q, so that it remains in a register. Where q - n is beside the block, another
+// coefficient of this block is read instead, which is finite: its offset from the start of c_n is q
+// - n, that is -(n + radius) to 63 + radius - n. Before c_n there are 64 coefficients for each of n
+// + radius, and after it 64 for each of radius - n.
 template <typename Real>
 void RowFilter<Real>::AddToRow(const Block& block, int row, int first_channel, int channels) {
   FillWindow(block, row, first_channel, channels);
@@ -169,7 +170,8 @@ void RowFilter<Real>::AddToRow(const Block& block, int row, int first_channel, i
   }
 }
 
-// (F^T x)(q) = sum_n c_n(q - n) x(q - n), by blocks of x: rows are independent of each other.
+// Computes (F^T x)(q) = sum_n c_n(q - n) x(q - n), by blocks of x: rows are independent of each
+// other.
 template <typename Real>
 void RowFilter<Real>::AcrossTransposed(int row) {
   ForChannels([&](int first, int channels) {
@@ -199,8 +201,9 @@ void RowFilter<Real>::Down(int row) {
   }
 }
 
-// A column of blocks gives each row of the result another part of each block. A block is brought
-// nearer as a whole, before its first part is wanted: part by part, memory is several times slower.
+// A column of blocks gives a different part of each block to each row of the result. A block is
+// prefetched as a whole before its first part is needed, because memory is several times slower
+// part by part.
 template <typename Real>
 void RowFilter<Real>::Prefetch(const Block& block) {
   constexpr std::ptrdiff_t kLine = 64 / sizeof(Real);
@@ -208,8 +211,8 @@ void RowFilter<Real>::Prefetch(const Block& block) {
   for (std::ptrdiff_t i = 0; i < size; i += kLine) __builtin_prefetch(block.coefficients + i, 0, 2);
 }
 
-// (F^T x)(q) = sum_n c_n(q - n e) x(q - n e): nothing is added to memory, so that no two rows of
-// the result meet.
+// Computes (F^T x)(q) = sum_n c_n(q - n e) x(q - n e). Nothing is added to memory, so that no two
+// rows of the result conflict.
 template <typename Real>
 void RowFilter<Real>::DownTransposed(int row) {
   const int top = std::max(0, row - most_radius_);
@@ -235,7 +238,7 @@ void ApplyEither(const PixelFilter<Real>& filter, bool transposed, const Picture
                  const PictureOut<Real>& y, int threads) {
   const int least_rows = kLeastBandPx / std::max(1, filter.width_px);
   const int bands = BandCount(filter.height_px, threads, least_rows);
-  // Made before the threads are, as these must not throw.
+  // The memory is allocated before the threads start, because threads must not throw.
   std::vector<RowFilter<Real>> filters(Index(bands), RowFilter<Real>(filter, transposed, x, y));
   ForBands(filter.height_px, bands, [&](int band, int first, int last) {
     for (int row = first; row < last; ++row) filters[Index(band)].Filter(row);

@@ -16,7 +16,7 @@ constexpr std::int64_t kMostPixels = std::numeric_limits<std::int32_t>::max();
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// Throws unless every pixel of the block reads from inside of the picture only.
+// Throws Error unless every pixel of the block reads only pixels inside the image.
 template <typename Real>
 void CheckBlockAt(const PixelFilter<Real>& filter, int row, int column, std::size_t block) {
   const bool across = filter.axis == Axis::kAcross;
@@ -42,7 +42,7 @@ void CheckBlockAt(const PixelFilter<Real>& filter, int row, int column, std::siz
   }
 }
 
-// Checks the number of starts and the first of them, and calls check(i) for each interval.
+// Checks the number of starts and that the first is 0, and calls check(i) for each interval.
 template <typename Start, typename CheckInterval>
 void CheckStart(const char* what, const Start& start, std::size_t intervals,
                 const CheckInterval& check) {

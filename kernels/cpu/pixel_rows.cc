@@ -11,7 +11,7 @@ namespace thicklens::kernels {
 namespace {
 
 constexpr std::size_t kDotChunk = 4096;
-constexpr int kLeastDotChunks = 8;  // of a band
+constexpr int kLeastDotChunks = 8;  // minimum number of a band
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
@@ -21,7 +21,7 @@ template <typename Real>
 PixelRows<Real> Transposed(const PixelRows<Real>& rows) {
   PixelRows<Real> transposed;
   transposed.pixels = rows.pixels;
-  // Where the entries of each pixel go.
+  // The position of the next entry of each pixel.
   std::vector<std::int64_t> next(Index(rows.pixels) + 1, 0);
   for (const std::int32_t index : rows.index) ++next[Index(index)];
   std::int64_t entries = 0;

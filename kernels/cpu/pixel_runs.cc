@@ -13,13 +13,14 @@
 namespace thicklens::kernels {
 namespace {
 
-// Of a band: enough that a thread is not woken up for little, few enough that there are bands for
-// all threads.
+// Minimum size of a band: large enough that a thread is worth waking, small enough that there are
+// bands for all threads.
 constexpr std::int64_t kLeastRuns = 1 << 14;
 constexpr int kLeastRowsOfAThread = 512;
-constexpr int kLeastCopiedPx = 16384;  // by a thread
-constexpr int kPartPx = 64;            // parts of a row are made of so many
-// Between pieces and between so many rows it may be stopped: far fewer than take 0.2 s.
+constexpr int kLeastCopiedPx = 16384;  // minimum number per thread
+constexpr int kPartPx = 64;            // parts of a row have multiples of this size
+// A computation can be cancelled between pieces and between this number of rows, which need far
+// less than 0.2 s.
 constexpr int kPiecesOfAPart = 16;
 constexpr std::size_t kRowsAtOnce = 1024;
 
@@ -30,7 +31,7 @@ RunRange<Real> RangeOf(const PixelRuns<Real>& runs, std::size_t first, std::size
   return {runs.pixel.data(), runs.run.data(), runs.index.data(), runs.weight.data(), first, last};
 }
 
-// The first row of a part, so that all parts have about as many runs.
+// Returns the first row of a part; the parts have nearly equal numbers of runs.
 template <typename Real>
 std::size_t FirstRow(const PixelRuns<Real>& runs, int part, int parts) {
   if (part == parts) return runs.pixel.size();
@@ -39,7 +40,7 @@ std::size_t FirstRow(const PixelRuns<Real>& runs, int part, int parts) {
   return static_cast<std::size_t>(row - runs.run.begin());
 }
 
-// A copy of planes in rows as runs read them, of the parts alone that they do read.
+// A copy of planes with the row stride of runs. It contains only the parts that the runs read.
 template <typename Real>
 class SpacedPlanes {
  public:
@@ -73,8 +74,8 @@ class SpacedPlanes {
   }
 
  private:
-  // work(channel, pixel, count, beyond, part): `count` pixels of the picture from `pixel` on, and
-  // `beyond` places past the end of its row.
+  // Calls work(channel, pixel, count, beyond, part) with `count` pixels of the image from `pixel`
+  // on and `beyond` places past the end of its row.
   template <typename Work>
   void ForParts(int channels, const Work& work) {
     ForBands(static_cast<int>(runs_.read.size()), threads_, [&](int, int first, int last) {
@@ -129,12 +130,12 @@ void SetRead(PixelRuns<Real>* runs) {
 
 }  // namespace
 
-// A band ends where all rows that come read beyond what was read before the band began: then the
-// next but one of any band reads beyond what that has read.
+// A band ends where all following rows read beyond the pixels that were read before the band began.
+// The band after the next of any band then reads beyond the pixels of that band.
 template <typename Real>
 void SetBands(PixelRuns<Real>* runs) {
   const std::size_t rows = runs->pixel.size();
-  // The first pixel that a row, or one that comes after it, reads.
+  // The first pixel that a row or a later row reads.
   std::vector<std::int32_t> first(rows + 1, std::numeric_limits<std::int32_t>::max());
   for (std::size_t r = rows; r-- > 0;) {
     ThrowIfCancelled();
@@ -144,7 +145,7 @@ void SetBands(PixelRuns<Real>* runs) {
     }
   }
   runs->band.assign(1, 0);
-  std::int32_t read = -1, read_before = -1;  // the last pixel: by now, and before the band
+  std::int32_t read = -1, read_before = -1;  // last pixel read so far, and before the band
   for (std::size_t r = 0; r < rows; ++r) {
     ThrowIfCancelled();
     if (runs->run[r] - runs->run[runs->band.back()] >= kLeastRuns && first[r] > read_before) {
@@ -218,7 +219,7 @@ void ApplyRuns(const PixelRuns<Real>& runs, const PictureIn<Real>& x, const Pict
   for (int first = 0; first < x.channels; first += kMostChannels) {
     const int channels = std::min(kMostChannels, x.channels - first);
     copy.Copy(x.values + first * x.plane_stride, x.plane_stride, channels);
-    // Each of them in pieces, between which it may be stopped.
+    // Each part is computed in pieces, between which it can be cancelled.
     const int pieces = kPiecesOfAPart * parts;
     ForBands(pieces, parts, [&](int, int begin, int end) {
       loops.sum_runs(RangeOf(runs, FirstRow(runs, begin, pieces), FirstRow(runs, end, pieces)),
@@ -228,8 +229,8 @@ void ApplyRuns(const PixelRuns<Real>& runs, const PictureIn<Real>& x, const Pict
   }
 }
 
-// Bands that share no pixel side by side, and then those between them: the order in which a pixel
-// gets its sums is always the same.
+// Bands that share no pixel run in parallel, then the bands between them. The order in which the
+// sums are added to a pixel is therefore fixed.
 template <typename Real>
 void AddTransposed(const PixelRuns<Real>& runs, const PictureIn<Real>& y, const PictureOut<Real>& x,
                    int threads) {

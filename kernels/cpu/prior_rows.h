@@ -7,7 +7,7 @@
 
 namespace thicklens::kernels {
 
-// Rows of P x: pull x, and smoothness times the differences, taken back by the transposed ones.
+// Rows of P x: pull x, plus the transposed differences of the smoothness times the differences.
 template <typename Real>
 class PriorRows {
  public:
@@ -17,8 +17,8 @@ class PriorRows {
         width_(width_px),
         height_(height_px) {}
 
-  // across: room for width + 1 numbers.
-  // In the caller's instructions.
+  // `across` is memory for width + 1 numbers. The function is inlined so that it uses the
+  // instruction set of its caller.
   inline __attribute__((always_inline)) void Multiply(const Real* plane, int y,
                                                       Real* __restrict across,
                                                       Real* __restrict out) const {
@@ -42,7 +42,7 @@ class PriorRows {
     }
   }
 
-  // The smoothness of all differences that a pixel has part in, and its pull.
+  // Adds the smoothness of all differences that include a pixel, and its pull.
   void AddDiagonal(int y, Real* out) const {
     const Real* pull = pull_ + std::ptrdiff_t{y} * width_;
     for (int i = 0; i < width_; ++i) out[i] += pull[i];

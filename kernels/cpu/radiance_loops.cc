@@ -9,7 +9,7 @@ namespace {
 
 #define THICKLENS_INLINE inline __attribute__((always_inline))
 
-// Of numbers in double, which are as many as a vector of AVX2 has.
+// Number of doubles in a vector of AVX2.
 constexpr int kLanes = 4;
 
 template <typename Real>

@@ -5,10 +5,10 @@
 
 namespace thicklens::kernels {
 
-// The innermost loops of the native RadianceSteps: each over a row of numbers, with the processor's
-// widest vectors. Sums are added in double, in an order that never changes.
+// The innermost loops of the native RadianceSteps. Each processes a row of numbers with the widest
+// vectors of the processor. Sums are added in double, in a fixed order.
 
-// r = data - prior (+ pull target); sums over r, and over what it was before.
+// Computes r = data - prior (+ pull target), and sums over r and over its previous value.
 template <typename Real>
 struct ResidualRow {
   const Real* data = nullptr;
@@ -21,25 +21,26 @@ struct ResidualRow {
 template <typename Real>
 ResidualSums UpdateRow(const ResidualRow<Real>& row, int count);
 
-// p = m r + beta p; p . r.
+// Sets p = m r + beta p and returns p . r.
 template <typename Real>
 double TurnRow(const Real* m, const Real* r, Real beta, int count, Real* p);
-// x . y.
+// Returns x . y.
 template <typename Real>
 double DotRow(const Real* x, const Real* y, int count);
-// x += step p, r -= step product.
+// Computes x += step p, r -= step product.
 template <typename Real>
 void AdvanceRow(Real step, const Real* p, const Real* product, int count, Real* x, Real* r);
 
-// Row y of the prior's matrix times a plane; `across`: room for width + 1 numbers.
+// Computes row y of the prior's matrix times a plane. `across` is memory for width + 1 numbers.
 template <typename Real>
 void MultiplyPriorRow(const QuadraticPrior<Real>& prior, int width_px, int height_px,
                       const Real* plane, int y, Real* across, Real* out);
 
-// squares[i] += (x[i + 1] - x[i])^2, not of the last, and (below[i] - x[i])^2 (null: none).
+// Adds (x[i + 1] - x[i])^2, except for the last pixel, and (below[i] - x[i])^2 (below null: none)
+// to squares[i].
 template <typename Real>
 void AddSquaredDifferences(const Real* x, const Real* below, int count, Real* squares);
-// smoothness = half s^2/(s^2 squares + floor)^(1/2).
+// Computes smoothness = half s^2/(s^2 squares + floor)^(1/2).
 template <typename Real>
 void TouchRow(const Real* slope_squared, const Real* squares, Real half, Real floor, int count,
               Real* smoothness);

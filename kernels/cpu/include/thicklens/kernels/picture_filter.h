@@ -130,7 +130,7 @@ void ApplyTransposed(const PixelFilter<Real>& filter, const PictureIn<Real>& x,
 template <typename Real>
 void ApplyRuns(const PixelRuns<Real>& runs, const PictureIn<Real>& x, const PictureOut<Real>& y,
                int threads);
-// Adds: x += R^T y.
+// Computes x += R^T y.
 template <typename Real>
 void AddTransposed(const PixelRuns<Real>& runs, const PictureIn<Real>& y, const PictureOut<Real>& x,
                    int threads);
