@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kChannels = 2;
 
-// Blocks of a light field of 23 x 19 samples and 5 x 3 views.
+// Returns a block of a light field of 23 x 19 samples and 5 x 3 views.
 BlockGeometry BlockAt(int first_x, int first_y, int width_px, int height_px) {
   BlockGeometry block;
   block.first_x = first_x;
@@ -36,7 +36,7 @@ BlockGeometry BlockAt(int first_x, int first_y, int width_px, int height_px) {
   return block;
 }
 
-// Rays land on a part of this block's pixels alone: the others have none.
+// Rays land on only a part of this block's pixels; the other pixels have none.
 BlockGeometry BlockWithEmptyRows() {
   BlockGeometry block = BlockAt(0, 0, 13, 7);
   block.s_count = 5;
@@ -45,7 +45,7 @@ BlockGeometry BlockWithEmptyRows() {
   return block;
 }
 
-// Slopes of all sorts: whole, zero, none, and any.
+// Slopes of all kinds: whole numbers, zero, NaN and any other.
 template <typename Real>
 std::vector<Real> Slopes(const BlockGeometry& block, Numbers* numbers) {
   std::vector<Real> slopes = numbers->Vector<Real>(block.rays(), -2.5, 2.5);
@@ -57,7 +57,8 @@ std::vector<Real> Slopes(const BlockGeometry& block, Numbers* numbers) {
   return slopes;
 }
 
-// Some of them leave the block. Not for masks, where their square would hide all other numbers.
+// Makes some of the rays leave the block. This is not used for masks, where the squares of these
+// slopes would dominate all other numbers.
 template <typename Real>
 std::vector<Real> WithLongOnes(std::vector<Real> slopes) {
   for (std::size_t i = 9; i < slopes.size(); i += 31) slopes[i] = static_cast<Real>(1000.25);
@@ -114,7 +115,7 @@ class Comparison {
                Difference(device_->MultiplyTransposed(a, y), twin_->MultiplyTransposed(a, y)));
   }
 
-  // Added to what is there, in a pattern with entries that the product has not.
+  // The product is added to given numbers, in a pattern with more entries than the product.
   void CompareNormalProduct(const CsrMatrix<Real>& h, const CsrMatrix<Real>& d) {
     const CsrPattern pattern = SumPattern(NormalPattern(h), NormalPattern(d));
     auto right = numbers_.Vector<Real>(static_cast<int>(pattern.entries()), -1, 1);
@@ -132,7 +133,7 @@ class Comparison {
     }
   }
 
-  // Blocks beside one another and over one another.
+  // Adds adjacent and overlapping blocks.
   void CompareSums() {
     const BlockGeometry first = BlockAt(0, 0, 13, 19);
     for (Kernels<Real>* kernels : {device_, twin_.get()}) {

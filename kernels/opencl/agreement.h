@@ -15,7 +15,7 @@ namespace thicklens::kernels {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// The largest difference so far, and of what.
+// The largest difference so far, and the name of its kernel.
 struct Worst {
   double error = 0;
   std::string what;
@@ -27,8 +27,8 @@ struct Worst {
   }
 };
 
-// Largest difference over the largest right number; infinite where sizes differ or one is no number
-// and the other is.
+// Returns the largest difference over the largest right number. It is infinite if the sizes differ
+// or only one of two numbers is NaN.
 template <typename Number>
 double Difference(const std::vector<Number>& found, const std::vector<Number>& right) {
   if (found.size() != right.size()) return kInfinity;
@@ -45,7 +45,8 @@ double Difference(const std::vector<Number>& found, const std::vector<Number>& r
   return difference == 0 ? 0 : difference / largest;
 }
 
-// Numbers that are the same on every machine: no distribution of the standard library is.
+// Pseudo-random numbers that are equal on every machine, unlike the distributions of the standard
+// library.
 class Numbers {
  public:
   double Between(double low, double high) {
@@ -62,11 +63,11 @@ class Numbers {
   std::mt19937 engine_{12345};
 };
 
-// The steps of a device against the native ones.
+// Compares the steps of a device with the native ones.
 template <typename Real>
 void CompareSteps(Backend* device, Worst* worst);
 
-// A view of a device against the twin's.
+// Compares a view of a device with that of the twin.
 void CompareWarp(Backend* device, Worst* worst);
 
 }  // namespace thicklens::kernels

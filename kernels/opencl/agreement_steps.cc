@@ -9,12 +9,12 @@
 namespace thicklens::kernels {
 namespace {
 
-constexpr int kWidth = 37;  // of pictures, px
+constexpr int kWidth = 37;  // size of the images, px
 constexpr int kHeight = 9;
 constexpr int kPixels = kWidth * kHeight;
 constexpr int kChannels = 3;
 constexpr int kRadius = 3;
-constexpr int kSteps = 3;  // of each prior
+constexpr int kSteps = 3;  // steps for each prior
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
@@ -38,7 +38,7 @@ PixelFilter<Real> MakeFilter(Axis axis, Numbers* numbers) {
   return filter;
 }
 
-// Every fourth pixel, of 0 to 12 entries.
+// Rows of every fourth pixel, with 0 to 12 entries.
 template <typename Real>
 PixelRows<Real> MakeRows(Numbers* numbers) {
   PixelRows<Real> rows;
@@ -139,7 +139,7 @@ class StepsComparison {
     worst_->Add(what, Difference<double>({found}, {right}));
   }
 
-  // Both go on with the native numbers, so that no difference grows.
+  // Both continue with the step length of the native result, so that differences do not accumulate.
   void CompareIterations(bool touch) {
     AddSum("SquaredRightSide", device_->SquaredRightSide(), native_->SquaredRightSide());
     for (int step = 0; step < kSteps; ++step) {

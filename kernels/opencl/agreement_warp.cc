@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kWidth = 29, kHeight = 13;
 
-// Surfaces that are flat, rough and steep, one beside the other.
+// Flat, rough and steep surfaces side by side.
 std::vector<float> Surfaces(Numbers* numbers) {
   std::vector<float> disparity;
   for (int y = 0; y < kHeight; ++y) {
@@ -37,7 +37,7 @@ void CompareWarp(Backend* device, Worst* worst) {
       const auto source_x = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
       const auto source_y = numbers.Vector<float>(kWidth * kHeight, -reach, reach);
       const auto of_view = numbers.Vector<float>(kWidth * kHeight, -0.6, 1.7);
-      // Shifts that a float has, so that no sample is on the edge of being read elsewhere.
+      // The shifts are rounded to float, so that rounding cannot move a sample to another pixel.
       const double shift_x = numbers.Between(-reach, reach),
                    shift_y = numbers.Between(-reach, reach);
       for (const std::vector<float>* surface : {&disparity, &of_view}) {

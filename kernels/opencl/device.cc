@@ -60,7 +60,7 @@ class OpenClBackend : public Backend {
   }
 
  private:
-  // A copy of the handle; the program itself is built once.
+  // Returns a copy of the handle; the program itself is built once.
   cl::Program Built(const std::string& real, std::optional<cl::Program>* program) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!*program) *program = BuildKernels(*device_, real);
@@ -72,7 +72,7 @@ class OpenClBackend : public Backend {
   std::optional<cl::Program> float_program_, double_program_;
 };
 
-// The best device that works, or none and why.
+// Returns the best device that works, or null and the reasons in `problems`.
 std::shared_ptr<Backend> OpenBestDevice(const DeviceRequest& request, const StopCheck& stop,
                                         std::vector<std::string>* problems) {
   const DeviceSurvey& survey = SurveyDevices(false, stop);
@@ -102,7 +102,7 @@ std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* 
   if (notice != nullptr) notice->clear();
   if (request.kind == DeviceRequest::Kind::kCpu) return std::make_shared<TwinBackend>();
 
-  // One at a time: the child processes have to be done before OpenCL is in use.
+  // One call at a time: the child processes must end before OpenCL is in use.
   static std::mutex mutex;
   const std::lock_guard<std::mutex> lock(mutex);
   std::vector<std::string> problems;
@@ -111,7 +111,7 @@ std::shared_ptr<Backend> OpenBackend(const DeviceRequest& request, std::string* 
     backend = OpenBestDevice(request, stop, &problems);
   } catch (const Interrupted&) {
     throw;
-  } catch (const Error& error) {  // no child process could be had
+  } catch (const Error& error) {  // no child process could be started
     problems.emplace_back(error.what());
   }
   if (backend != nullptr) return backend;

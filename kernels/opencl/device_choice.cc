@@ -48,7 +48,7 @@ std::string ListOf(const std::vector<DeviceDescription>& devices) {
   return list.empty() ? "none" : list;
 }
 
-// The whole number from `begin` to `end`; false for anything else.
+// Reads the whole number from `begin` to `end`; returns false for any other text.
 bool ReadIndex(const std::string& text, std::size_t begin, std::size_t end, int* index) {
   if (end <= begin || end - begin > kMostDigits) return false;
   *index = 0;

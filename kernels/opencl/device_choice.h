@@ -8,13 +8,14 @@
 
 namespace thicklens::kernels {
 
-// Devices that the request allows and that have no problem, best first: real ones before simulators
-// (which may claim to be GPUs), with double before without, then GPU, accelerator, CPU, other, and
-// as OpenCL lists them. What is left out gets a line in `problems`.
+// Returns the devices that the request allows and that have no problem, best first. Real devices
+// precede simulators (which may claim to be GPUs), devices with double precede others, then the
+// order is GPU, accelerator, CPU, other, and finally that of OpenCL's list. Each excluded device
+// gets a line in `problems`.
 std::vector<DeviceDescription> Candidates(const DeviceSurvey& survey, const DeviceRequest& request,
                                           std::vector<std::string>* problems);
 
-// "opencl:0:1", "opencl:0" and "opencl" as the request has it.
+// Returns the text of the request, such as "opencl:0:1", "opencl:0" or "opencl".
 std::string RequestText(const DeviceRequest& request);
 
 }  // namespace thicklens::kernels

@@ -20,7 +20,7 @@ constexpr int kLeastMinor = 2;
 constexpr std::uint64_t kLeastAllocationBytes = std::uint64_t{16} << 20;
 constexpr std::uint64_t kLeastWorkGroup = 64;
 
-// Fields of a line, the last of which may be empty.
+// Returns the fields of a line; the last one may be empty.
 std::vector<std::string> SplitAtTabs(const std::string& line) {
   std::vector<std::string> fields(1);
   for (const char c : line) {
@@ -33,7 +33,7 @@ std::vector<std::string> SplitAtTabs(const std::string& line) {
   return fields;
 }
 
-// One line after the other from what a child told.
+// Reads the lines of a child's report one after the other.
 class SurveyReader {
  public:
   explicit SurveyReader(DeviceSurvey* survey) : survey_(survey) {}
@@ -41,12 +41,12 @@ class SurveyReader {
   void Read(const std::string& told) {
     std::istringstream lines(told);
     for (std::string line; std::getline(lines, line);) {
-      // What the child had no time to end is left out.
+      // A line that the child did not finish is left out.
       if (!lines.eof()) ReadLine(SplitAtTabs(line));
     }
   }
 
-  // The last platform begun, or -1.
+  // The last platform that was begun, or -1.
   int platform() const { return platform_; }
   const std::string& platform_name() const { return platform_name_; }
 
@@ -94,7 +94,8 @@ std::string TypeName(cl_device_type type) {
   return "other";
 }
 
-// "OpenCL 1.2 ...", whether it is 1.2 or later. What cannot be read is let through.
+// Returns true if the version of "OpenCL 1.2 ..." is at least 1.2. A version that cannot be read is
+// accepted.
 bool IsNewEnough(const std::string& version) {
   int major = 0;
   int minor = 0;
@@ -145,7 +146,7 @@ std::string Environment(const char* name) {
   return value == nullptr ? "" : OneLine(value);
 }
 
-// Where the ICD loader finds drivers.
+// The place where the ICD loader searches for drivers.
 std::string VendorsText() {
   const std::string vendors = Environment("OCL_ICD_VENDORS");
   return vendors.empty() ? "/etc/OpenCL/vendors" : "OCL_ICD_VENDORS=" + vendors;
@@ -173,7 +174,7 @@ std::string PlatformLabel(int platform, const std::string& name) {
   return fmt::format("OpenCL platform {} ({}): ", platform, name.empty() ? "without a name" : name);
 }
 
-// Counts start at 0 because drivers do not write them where they report an error.
+// Counts start at 0 because drivers do not write them if they report an error.
 std::vector<cl_device_id> DevicesOf(cl_platform_id platform, cl_int* error) {
   cl_uint count = 0;
   *error = ::clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, nullptr, &count);

@@ -11,23 +11,25 @@
 
 namespace thicklens::kernels {
 
-// Seconds that a driver gets; the first compilation of all can take several.
+// Time limit of a driver in seconds; the very first compilation can take several.
 constexpr double kChildLimitS = 60;
 
-// What the child does: tells of platforms and devices from `first_platform` on.
+// The work of the child: reports platforms and devices from `first_platform` on.
 using ListDevices = std::function<void(int first_platform, const Tell& tell)>;
 void ListOpenClDevices(int first_platform, const Tell& tell);
 
-// Runs `list` in a child, and again from the next platform on where one brings it down.
+// Runs `list` in a child. After a platform that crashes the child, a new child continues with the
+// next platform.
 DeviceSurvey SurveyWith(const ListDevices& list, double limit_s, const StopCheck& stop = {});
 
-// Compiles a small kernel and the files on the device, and runs the small kernel. Returns what went
-// wrong, or nothing.
+// Compiles a small kernel and the files on the device, and runs the small kernel. Returns the
+// problem, or an empty text.
 std::string TryDevice(int platform, int device, const std::vector<EmbeddedFile>& files);
-// The same in a child process, with the library's own files, once for each device.
+// Runs TryDevice in a child process with the library's own files, once for each device. If OpenCL
+// is already in use, it runs in this process.
 std::string TryDeviceOnce(int platform, int device, const StopCheck& stop);
 
-// What is said in a survey of devices, one line each.
+// The lines of a survey of devices.
 std::string PlatformLine(int platform, const std::string& name);
 std::string DeviceLine(const DeviceDescription& device);
 std::string ProblemLine(const std::string& problem);

@@ -25,7 +25,7 @@ kernel void Trial(const int taps, global const REAL* x, global REAL* y) {
 }
 )";
 
-// y_i = sum_k (k + 1) x_{i+k} in whole numbers, which have one right result in any order.
+// Computes y_i = sum_k (k + 1) x_{i+k} in whole numbers, whose sum is exact in any order.
 template <typename Real>
 std::vector<Real> RightSums(const std::vector<Real>& x) {
   std::vector<Real> y(kSums, Real{0});

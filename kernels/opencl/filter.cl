@@ -1,10 +1,10 @@
-// Linear maps between pictures with weights of each pixel's own: the device's form of
-// picture_filter.h, as opencl_projection.cc lays it out.
+// Linear maps between images with separate weights for each pixel: the device's form of
+// picture_filter.h, in the layout of opencl_projection.cc.
 //
-// LANES pixels beside each other are an item's work: on a processor's cores a vector, since what
-// compilers make vectors of is straight code, and loops over terms are not; elsewhere one, so that
-// neighbouring items read neighbouring numbers. TILE pixels (a multiple of LANES) share their
-// terms, SLICE rows their number of entries. SUM is the widest real number that the device has.
+// An item computes LANES adjacent pixels. On a CPU they are a vector, because compilers vectorise
+// straight code but not loops over terms. On other devices LANES is 1, so that neighbouring items
+// read neighbouring numbers. TILE pixels (a multiple of LANES) share their terms, and SLICE rows
+// share their number of entries. SUM is the widest real number of the device.
 
 // Sums of products may be fused from here on.
 #pragma OPENCL FP_CONTRACT ON
@@ -22,14 +22,14 @@
 #endif
 #define REAL4 JOINED(REAL, 4)
 
-// Pictures lie in planes of `plane` numbers: rows of stride_px numbers, of which those beyond
-// width_px are 0. `margin` numbers before the first plane and after the last are there to be read.
+// Images are planes of `plane` numbers: rows of stride_px numbers, which are 0 beyond width_px.
+// `margin` numbers before the first plane and after the last may be read.
 typedef struct {
   int width_px, height_px, stride_px, plane, margin;
 } Layout;
 
-// y = sum_k c_k x(p + (first + k) step), times `weight` if it is weighted, and added to y if `add`.
-// One item LANES pixels of all channels.
+// Computes y = sum_k c_k x(p + (first + k) step), times `weight` if `weighted` is set; it is added
+// to y if `add` is set. One item computes LANES pixels of all channels.
 kernel void FilterPicture(const Layout layout, const int channels, const int step,
                           global const int* first_term, global const int* start,
                           global const REAL* coefficients, global const REAL* x, const int weighted,
@@ -43,7 +43,7 @@ kernel void FilterPicture(const Layout layout, const int channels, const int ste
   y += layout.margin + p;
   weight += layout.margin + p;
   int channel = 0;
-  // A coefficient that is read serves three channels.
+  // Each coefficient is read once for three channels.
   for (; channel + 3 <= channels; channel += 3) {
     NUMBERS sum0 = 0;
     NUMBERS sum1 = 0;
@@ -84,8 +84,8 @@ kernel void FilterPicture(const Layout layout, const int channels, const int ste
   }
 }
 
-// Four planes from `channel` on, 0 beyond the last, pixel by pixel: what a row looks for is then in
-// one place.
+// Returns four planes from `channel` on (0 beyond the last) of one pixel, so that a row finds them
+// in one place.
 REAL4 FourOf(global const REAL* x, int plane, int channel, int channels) {
   REAL4 values = 0;
   x += (size_t)channel * plane;
@@ -96,7 +96,7 @@ REAL4 FourOf(global const REAL* x, int plane, int channel, int channels) {
   return values;
 }
 
-// One item a pixel of the list.
+// One item per pixel of the list.
 kernel void TakePixels(const Layout layout, const int channel, const int channels, const int count,
                        global const int* pixel, global const REAL* x, global REAL4* values) {
   const int i = (int)get_global_id(0);
@@ -104,9 +104,9 @@ kernel void TakePixels(const Layout layout, const int channel, const int channel
   values[i] = FourOf(x + layout.margin + pixel[i], layout.plane, channel, channels);
 }
 
-// y(pixel) += sum_e weight_e values(index_e), or that times `picture_weight` of the pixel if it is
-// weighted. One item a row; entry e of row `lane` of a slice is at start + e SLICE + lane. Entries
-// are added in four sums, so that one need not wait for the one before.
+// Computes y(pixel) += sum_e weight_e values(index_e), times `picture_weight` of the pixel if
+// `weighted` is set. One item per row; entry e of row `lane` of a slice is at start + e SLICE +
+// lane. Entries are added in four sums, so that no sum waits for the previous one.
 kernel void AddRows(const Layout layout, const int channel, const int channels, const int rows,
                     global const int* pixel, global const long* start, global const int* index,
                     global const REAL* weight, global const REAL4* values, const int weighted,

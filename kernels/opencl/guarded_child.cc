@@ -28,7 +28,7 @@ constexpr std::size_t kMostTold = std::size_t{1} << 20;
 constexpr std::size_t kChatterKept = 4096;
 constexpr int kPollMs = 10;
 
-// The two ends of a pipe, which no other program inherits.
+// The two ends of a pipe. No other program inherits them.
 class Pipe {
  public:
   Pipe() {
@@ -48,7 +48,7 @@ class Pipe {
   void CloseReadEnd() { Close(&ends_[0]); }
   void CloseWriteEnd() { Close(&ends_[1]); }
 
-  // Takes what is there without waiting for more.
+  // Reads the available text without waiting for more.
   void TakeInto(std::string* text) {
     char buffer[4096];
     while (ends_[0] >= 0) {
@@ -81,13 +81,13 @@ void WriteAll(int descriptor, const std::string& text) {
   }
 }
 
-// The child's life. The parent's signal handlers and atexit functions must not run in it.
+// Runs as the child. The parent's signal handlers and atexit functions must not run in it.
 [[noreturn]] void BeChild(const std::function<void(const Tell&)>& work, pid_t parent, int told,
                           int chatter) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
-  // Ctrl-C goes to the whole process group of the terminal, and a service's stop to all of its
-  // processes: they are meant for the parent, which then ends this one.
+  // Ctrl-C is sent to the whole process group of the terminal, and the stop of a service to all of
+  // its processes. These signals are meant for the parent, which then ends the child.
   ::setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) ::signal(signal, SIG_IGN);
   for (const int signal : {SIGQUIT, SIGPIPE, SIGALRM, SIGCHLD, SIGXFSZ, SIGXCPU}) {
@@ -98,7 +98,7 @@ void WriteAll(int descriptor, const std::string& text) {
   ::sigprocmask(SIG_UNBLOCK, &all, nullptr);
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  // Where the parent has closed its standard streams, the pipes have their numbers.
+  // If the parent has closed its standard streams, the pipes have their numbers.
   told = ::fcntl(told, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
   chatter = ::fcntl(chatter, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
   const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
@@ -116,11 +116,11 @@ void WriteAll(int descriptor, const std::string& text) {
   ::_exit(0);
 }
 
-// A child process, in a group of its own. Killed with its group if this ends before it does.
+// A child process in its own group. It is killed with its group if this object is destroyed first.
 class Child {
  public:
   explicit Child(pid_t pid) : pid_(pid) {
-    // As the child does: whoever comes first, the group is there when it is killed.
+    // The child does the same. Whichever process is first, the group exists when it is killed.
     ::setpgid(pid_, pid_);
   }
   Child(const Child&) = delete;
@@ -166,7 +166,8 @@ std::string LastLine(const std::string& text) {
   return "";
 }
 
-// By a signal that a person or a service sends, and no fault does.
+// Returns true if the process was ended by a signal that a user or a service sends and that no
+// fault causes.
 bool EndedByRequest(int status) {
   if (!WIFSIGNALED(status)) return false;
   const int signal = WTERMSIG(status);
@@ -181,7 +182,8 @@ std::string HowItEnded(int status) {
   return "";
 }
 
-// Reads from the child until it ends. False: its time was up, and it was killed.
+// Reads from the child until it ends. Returns false if the time limit or the size limit was
+// exceeded and the child was killed.
 bool WaitForChild(Child* child, double limit_s, const StopCheck& stop, Pipe* told, Pipe* chatter,
                   ChildOutcome* outcome, std::string* printed) {
   const auto deadline = Clock::now() + std::chrono::duration<double>(limit_s);
@@ -197,7 +199,7 @@ bool WaitForChild(Child* child, double limit_s, const StopCheck& stop, Pipe* tol
       child->Kill();
       return false;
     }
-    // Pipes whose child has closed them are -1 here, and then this is a mere pause.
+    // Pipes that the child has closed are -1 here; poll is then only a pause.
     pollfd ready[2] = {{told->read_end(), POLLIN, 0}, {chatter->read_end(), POLLIN, 0}};
     ::poll(ready, 2, kPollMs);
   }

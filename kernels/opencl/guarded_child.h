@@ -6,34 +6,36 @@
 
 namespace thicklens::kernels {
 
-// Hands text to the parent at once, so that it arrives even if the child crashes afterwards.
+// Sends text to the parent at once, so that it arrives even if the child crashes afterwards.
 using Tell = std::function<void(const std::string&)>;
 
-// Called several times a second while a child is waited for; what it throws ends the child and
-// passes on.
+// Called several times a second while the parent waits for a child. An exception that it throws
+// ends the child and propagates.
 using StopCheck = std::function<void()>;
 
 struct ChildOutcome {
-  std::string told;     // all that the child told
-  std::string failure;  // how it ended, if not well; with the last line it printed
+  std::string told;     // all text that the child sent
+  std::string failure;  // description of a failure, with the last line that the child printed;
+                        // empty after a normal end
 };
 
-// Runs `work` in a copy of this process (fork), which may abort, crash, hang or exit without harm
-// to this one; it is killed after `limit_s` seconds, with whatever it has started. What it prints
-// is caught. An exception counts as a failure.
+// Runs `work` in a copy of this process (fork), which may abort, crash, hang or exit without
+// affecting this one. After `limit_s` seconds the copy is killed with all processes that it has
+// started. Its printed output is captured. An exception counts as a failure.
 //
-// Whether to stop is for this process to say, by its CancelToken and by `stop` (may be empty): the
-// copy is out of reach of the terminal's Ctrl-C and ignores SIGINT, SIGTERM and SIGHUP. Should one
-// of them end it all the same, Interrupted is thrown. It is killed when this process ends, however
-// that ends.
+// Only this process decides about a cancellation, by its CancelToken and by `stop` (may be empty).
+// The copy does not receive the terminal's Ctrl-C and ignores SIGINT, SIGTERM and SIGHUP. If one of
+// them ends it nevertheless, Interrupted is thrown. The copy is killed when this process ends for
+// any reason.
 //
-// The copy has the calling thread alone: locks that other threads hold stay locked in it (not those
-// of malloc), and threads of libraries are missing. So `work` must not use a library that this
-// process has started already, OpenCL above all.
+// The copy contains only the calling thread. Locks that other threads hold remain locked in it
+// (except those of malloc), and threads of libraries are missing. `work` must therefore not use a
+// library that this process has already started, in particular OpenCL.
 ChildOutcome RunInChild(const std::function<void(const Tell&)>& work, double limit_s,
                         const StopCheck& stop = {});
 
-// One line: control characters become spaces, runs of them one, none at the ends.
+// Converts text to one line: each run of control characters and spaces becomes one space, and none
+// is left at the ends.
 std::string OneLine(const std::string& text);
 
 }  // namespace thicklens::kernels

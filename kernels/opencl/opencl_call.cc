@@ -11,10 +11,10 @@
 namespace thicklens::kernels {
 namespace {
 
-// Fixed, since some drivers compile a kernel once for each size of its groups.
+// The size is fixed because some drivers compile a kernel once for each group size.
 constexpr std::size_t kGroupItems = 64;
 
-// Does the work; what OpenCL reports is told as an error of `what` on the device.
+// Runs `work`; converts errors of OpenCL to an Error that names `what` and the device.
 template <typename Work>
 decltype(auto) Guarded(const OpenClDevice& device, const std::string& what, const Work& work) {
   try {
@@ -54,7 +54,7 @@ void OpenClQueue::Finish() {
 void OpenClQueue::Settle() noexcept {
   try {
     queue_.finish();
-  } catch (...) {  // the error that led here is the one to tell
+  } catch (...) {  // the original error is the one to report
   }
 }
 
@@ -104,7 +104,7 @@ cl::Event OpenClQueue::SendHome(const std::string& what, const cl::Buffer& buffe
       queue_.enqueueReadBuffer(buffer, CL_FALSE, 0, bytes, data, nullptr, &sent);
       return sent;
     }
-    // Mapping makes lent memory current; nothing is copied where the device works in it.
+    // Mapping updates the shared memory; nothing is copied if the device works in it.
     void* mapped = queue_.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, bytes, nullptr, &sent);
     queue_.enqueueUnmapMemObject(buffer, mapped);
     return sent;
@@ -208,14 +208,14 @@ void OpenClCall::Run(std::size_t items) {
       if (!array.is_written) continue;
       array.sent = queue_->SendHome(array.what, array.buffer, array.data, array.bytes);
     }
-    // One wait for all of it: on a processor each costs as much as a small kernel. What goes wrong
-    // while the kernel runs is said with its name.
+    // One wait for everything, because on a CPU each wait costs as much as a small kernel. An error
+    // while the kernel runs is reported with its name.
     Guarded(*queue_->device_, name_, [&] { queue_->queue_.finish(); });
     for (const Array& array : arrays_) {
       if (array.is_written) Guarded(*queue_->device_, array.what, [&] { array.sent.wait(); });
     }
   } catch (...) {
-    queue_->Settle();  // the arrays may go with the error
+    queue_->Settle();  // the arrays may be destroyed after the error
     throw;
   }
 }

@@ -11,28 +11,28 @@
 
 namespace thicklens::kernels {
 
-// How a device comes to a host's array.
+// The way in which a device gets an array of the host.
 enum class HostMemory {
-  kShared,  // lent to the device, which works in it
+  kShared,  // the device works in the memory of the host
   kCopied,
 };
-// kShared where the device says that it has the host's memory.
+// Returns kShared if the device reports that it shares the host's memory.
 HostMemory HostMemoryOf(const OpenClDevice& device);
 
-// A queue of a device, and the kernels of a program for one thread: OpenCL keeps a kernel's
-// arguments in the kernel. Throws Error for whatever the device reports.
+// A queue of a device and the kernels of a program, for one thread, because OpenCL keeps a kernel's
+// arguments in the kernel. Throws Error for errors of the device.
 class OpenClQueue {
  public:
   OpenClQueue(std::shared_ptr<const OpenClDevice> device, cl::Program program, HostMemory memory);
 
-  // Another queue on the same device and program, with its own kernels.
+  // Returns another queue on the same device and program, with its own kernels.
   std::unique_ptr<OpenClQueue> Clone() const;
 
-  // Waits until all that was sent is there for other queues as well.
+  // Waits until all data sent are available for other queues as well.
   void Finish();
-  // Waits until nothing works in memory that is lent, whatever became of it.
+  // Waits until no command uses shared memory; errors are ignored.
   void Settle() noexcept;
-  // Whether the device can have that much in one piece.
+  // Throws Error if the device does not allow a buffer of this size.
   void CheckAllocation(const std::string& what, std::size_t bytes) const;
 
  private:
@@ -47,7 +47,8 @@ class OpenClQueue {
   Entry& EntryOf(const std::string& kernel);
   cl::Buffer NewBuffer(const std::string& what, void* data, std::size_t bytes, bool is_read,
                        bool is_written);
-  // Returns at once: it is there when the queue is done, and the event says whether it came.
+  // Returns at once. The data are available when the queue is done, and the event reports the
+  // success.
   cl::Event SendHome(const std::string& what, const cl::Buffer& buffer, void* data,
                      std::size_t bytes);
 
@@ -59,17 +60,18 @@ class OpenClQueue {
   cl_ulong max_allocation_bytes_ = 0;
 };
 
-// Numbers that stay on the device from call to call. `data` is their home, which must outlive this
-// and is not to be touched before BringHome.
+// Numbers that stay on the device from call to call. `data` is their memory on the host. It must
+// outlive this object and must not be accessed before BringHome.
 class DeviceArray {
  public:
   enum class Holds {
-    kData,     // what is at home
-    kNothing,  // until a kernel has written every element
+    kData,     // the numbers in the host's memory
+    kNothing,  // undefined until a kernel has written every element
   };
   DeviceArray(OpenClQueue* queue, const std::string& what, void* data, std::size_t bytes,
               Holds holds = Holds::kData);
-  // Waits for calls that still work in it: an error may have come between.
+  // Waits for calls that still use the memory, because an error may have occurred before they
+  // ended.
   ~DeviceArray() { queue_->Settle(); }
   DeviceArray(const DeviceArray&) = default;
   DeviceArray& operator=(const DeviceArray&) = default;
@@ -85,14 +87,14 @@ class DeviceArray {
   cl::Buffer buffer_;
 };
 
-// Memory of the device alone.
+// Memory that exists only on the device.
 class DeviceMemory {
  public:
-  // Of 0 bytes it is one a kernel can be given, and nothing is written or read.
+  // Memory of 0 bytes is a valid argument of a kernel; Write and Read then do nothing.
   DeviceMemory(OpenClQueue* queue, const std::string& what, std::size_t bytes);
-  void Clear();  // all bytes 0
+  void Clear();  // sets all bytes to 0
   void Write(const void* from);
-  void Read(void* to) const;  // when all calls before are done
+  void Read(void* to) const;  // after all previous calls are done
   std::size_t bytes() const { return bytes_; }
 
  private:
@@ -111,7 +113,7 @@ DeviceMemory Copied(OpenClQueue* queue, const std::string& what, const std::vect
   return memory;
 }
 
-// One call of a kernel: arguments in the kernel's order, then Run. Arrays must not be empty.
+// One call of a kernel: the arguments in the kernel's order, then Run. Arrays must not be empty.
 class OpenClCall {
  public:
   OpenClCall(OpenClQueue* queue, const std::string& kernel);
@@ -123,11 +125,11 @@ class OpenClCall {
   }
   template <typename Plain>
   OpenClCall& Input(const std::string& what, const std::vector<Plain>& array) {
-    // Lent for reading only.
+    // The device only reads the array.
     AddArray(what, const_cast<Plain*>(array.data()), array.size() * sizeof(Plain), true, false);
     return *this;
   }
-  // What the kernel writes, every element of it.
+  // An array of which the kernel writes every element.
   template <typename Plain>
   OpenClCall& Output(const std::string& what, std::vector<Plain>* array) {
     AddArray(what, array->data(), array->size() * sizeof(Plain), false, true);
@@ -141,12 +143,12 @@ class OpenClCall {
   OpenClCall& OnDevice(const DeviceArray& array);
   OpenClCall& OnDevice(const DeviceMemory& memory);
 
-  // Returns when all is done and the outputs are at home.
+  // Returns when the kernel is done and the outputs are in the host's memory.
   void Run(std::size_t items);
-  // Returns at once; what is called or read later waits. No array may be an output, and inputs must
-  // stay until the queue is done.
+  // Returns at once; later calls and reads wait. No array may be an output, and inputs must stay
+  // until the queue is done.
   void Enqueue(std::size_t items);
-  // Of so many items.
+  // Number of groups for this number of items.
   std::size_t Groups(std::size_t items) const;
 
  private:

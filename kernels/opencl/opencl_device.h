@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-// The same in every source, tests included: the library's classes depend on them.
+// These macros must be equal in every source file, including tests, because the library's classes
+// depend on them.
 #ifndef CL_TARGET_OPENCL_VERSION
 #define CL_TARGET_OPENCL_VERSION 120
 #endif
@@ -23,7 +24,7 @@
 
 namespace thicklens::kernels {
 
-// A .cl file as it is in the repository, byte for byte.
+// A .cl file with the exact content of the repository.
 struct EmbeddedFile {
   std::string path;  // "kernels/opencl/project.cl", for #line and messages
   std::string text;
@@ -35,28 +36,28 @@ struct OpenClDevice {
   cl::Context context;
   cl::Device device;
   std::string name;         // "opencl:0:0"
-  std::string description;  // for people
+  std::string description;  // for users
   bool has_double = false;
   bool is_cpu = false;
 };
 
-// How kernels over pictures divide their work on a device: filter.cl.
+// The division of work of kernels over images on a device: filter.cl.
 struct ItemForm {
-  int lanes = 1;   // pixels beside each other that an item computes together
-  int tile = 32;   // pixels beside each other that share their terms; a multiple of lanes
+  int lanes = 1;   // adjacent pixels that an item computes together
+  int tile = 32;   // adjacent pixels that share their terms; a multiple of lanes
   int slice = 32;  // rows that share their number of entries
 };
 ItemForm FormOf(const OpenClDevice& device, std::size_t bytes_of_real);
 
-// All kernel files as one program, each behind its #line. `real` is "float" or "double"; the
-// program sees it as the macro REAL (and REAL_IS_DOUBLE), and the form as LANES, TILE and SLICE.
+// Builds all kernel files as one program, each after its #line. `real` is "float" or "double"; the
+// program gets it as the macro REAL (and REAL_IS_DOUBLE), and the form as LANES, TILE and SLICE.
 // Throws Error with the device and the build log.
 cl::Program BuildKernels(const OpenClDevice& device, const std::string& real);
 
 template <typename Real>
 std::unique_ptr<Kernels<Real>> NewOpenClKernels(std::shared_ptr<const OpenClDevice> device,
                                                 const cl::Program& program);
-// Keeps nothing of `data`.
+// Copies `data` and keeps no reference to it.
 template <typename Real>
 std::unique_ptr<RadianceSteps<Real>> NewOpenClSteps(std::shared_ptr<const OpenClDevice> device,
                                                     const cl::Program& program,

@@ -20,7 +20,7 @@ std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 constexpr const char* kChannel = "channel of the light field";
 
-// The numbers of a block as kernels take them: Block in project.cl.
+// The numbers of a block in the form of kernels: Block in project.cl.
 struct BlockArgument {
   cl_int first_x, first_y, width_px, height_px;
   cl_int s_count, t_count, u_count, v_count;
@@ -51,8 +51,8 @@ EllMatrix<Real> NewEll(int rows, int columns, int slots) {
   return {rows, columns, slots, std::vector<std::int32_t>(entries), std::vector<Real>(entries)};
 }
 
-// Every method checks its arguments as the twin does, answers what is empty by itself, and leaves
-// the rest to the kernel of the same name.
+// Each method checks its arguments like the twin, handles empty arguments itself, and runs the
+// kernel of the same name otherwise.
 template <typename Real>
 class OpenClKernels : public Kernels<Real> {
  public:
@@ -152,7 +152,7 @@ class OpenClKernels : public Kernels<Real> {
               Index(whole.s_count) * Index(whole.t_count) * Index(whole.views()));
     std::vector<Real> picture(Index(whole.pixels()));
     if (picture.empty() || views.empty()) return picture;
-    constexpr std::size_t kStripPx = 16;  // STRIP in render.cl
+    constexpr std::size_t kStripPx = 16;  // equal to STRIP in render.cl
     const std::size_t strips = (Index(whole.width_px) + kStripPx - 1) / kStripPx;
     OpenClCall(queue_.get(), "FormPicture")
         .Value(ArgumentOf(whole))
@@ -233,7 +233,7 @@ class OpenClKernels : public Kernels<Real> {
 
   std::unique_ptr<OpenClQueue> queue_;
   WholeShape shape_;
-  std::vector<float> whole_;  // before channels_, which work in it
+  std::vector<float> whole_;  // declared before channels_, which use its memory
   std::vector<DeviceArray> channels_;
 };
 

@@ -34,14 +34,14 @@ const char* ErrorName(int error) {
       return "wrong work group size";
     case CL_INVALID_BUFFER_SIZE:
       return "wrong buffer size";
-    case -1001:  // of the ICD loader: CL_PLATFORM_NOT_FOUND_KHR
+    case -1001:  // code of the ICD loader: CL_PLATFORM_NOT_FOUND_KHR
       return "no platform found";
     default:
       return nullptr;
   }
 }
 
-// Platforms and devices in the order of the survey, whose indices these are.
+// Returns a device by its indices, which are those of the survey.
 cl::Device DeviceAt(int platform_index, int device_index, std::string* platform_text) {
   std::vector<cl::Platform> platforms;
   cl::Platform::get(&platforms);
@@ -61,7 +61,7 @@ cl::Device DeviceAt(int platform_index, int device_index, std::string* platform_
 
 constexpr char kLineDirective[] = "#line 1 ";
 
-// The compiler takes files and lines in its messages from here.
+// The compiler uses this directive for files and lines in its messages.
 std::string LineDirective(const std::string& path) {
   std::string quoted;
   for (const char c : path) {
@@ -71,7 +71,8 @@ std::string LineDirective(const std::string& path) {
   return fmt::format("{}\"{}\"\n", kLineDirective, quoted);
 }
 
-// "second.cl:2" of each line of a source in which files stand behind their directives; "" before.
+// Returns the place, such as "second.cl:2", of each line of a source in which files follow their
+// directives; "" before the first one.
 std::vector<std::string> PlacesOfLines(const std::string& source) {
   std::vector<std::string> places;
   std::string file;
@@ -79,7 +80,7 @@ std::vector<std::string> PlacesOfLines(const std::string& source) {
   std::istringstream lines(source);
   for (std::string line; std::getline(lines, line); ++line_in_file) {
     if (line.rfind(kLineDirective, 0) == 0) {
-      const std::size_t start = sizeof kLineDirective;  // behind the quotation mark
+      const std::size_t start = sizeof kLineDirective;  // after the quotation mark
       file = line.substr(start, line.size() - start - 1);
       line_in_file = 0;
     }
@@ -141,7 +142,7 @@ std::shared_ptr<const OpenClDevice> OpenOpenClDevice(int platform, int device) {
   }
 }
 
-// A CPU reads a line of its cache at once, and a row's entries one after the other.
+// A CPU reads a whole cache line at once, and the entries of a row one after the other.
 ItemForm FormOf(const OpenClDevice& device, std::size_t bytes_of_real) {
   constexpr std::size_t kLineBytes = 64;
   const int lanes = static_cast<int>(kLineBytes / bytes_of_real);

@@ -9,17 +9,19 @@
 
 namespace thicklens::kernels {
 
-// "error -5, out of resources"; the name where it is one of the common ones.
+// Returns a text such as "error -5, out of resources", with the name if the error is a common one.
 std::string OpenClErrorText(int error);
 
-// Drivers have two ways of saying it: in core since 1.2, and as an extension.
+// Returns true if the device has double. Drivers report it in two ways: as a core feature since
+// 1.2, and as an extension.
 bool HasDouble(const cl::Device& device);
 
-// Opens the device with these indices. From here on OpenCL is in use in this process. Throws Error.
+// Opens the device with these indices. Afterwards OpenCL is in use in this process. Throws Error.
 std::shared_ptr<const OpenClDevice> OpenOpenClDevice(int platform, int device);
 
-// What NVIDIA's compiler says of a program. It ignores #line and counts the lines of the whole
-// source: in place of "<kernel>:LINE:" stand the file and the line in it, as others have them.
+// Converts the build log of NVIDIA's compiler, which ignores #line and counts the lines of the
+// whole source: "<kernel>:LINE:" is replaced by the file and its line, as in the logs of other
+// compilers.
 std::string WithFilesNamed(const std::string& log, const std::string& source);
 
 // BuildKernels for any files.

@@ -7,13 +7,13 @@ namespace {
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-constexpr int kTogether = 4;  // channels of a row's entry
-// Numbers before and after planes that items may read beside what filters reach: a vector, and a
-// neighbour.
+constexpr int kTogether = 4;  // channels that an entry of a row processes together
+// Minimum number of numbers before and after planes that items may read beyond the reach of
+// filters: a vector and a neighbour.
 constexpr int kLeastMargin = 64;
 
-// The pixels that rows read, as places on the plane, ascending; and of each pixel of the picture
-// its place among them.
+// The pixels that rows read, as ascending places on the plane, and for each pixel of the image its
+// index among them (-1: none).
 struct ReadPixels {
   std::vector<std::int32_t> pixel, place_of;
 };
@@ -84,7 +84,7 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
     return ToDevice(packed, across ? 1 : plane.stride_px);
   };
   for (const auto& product : data.filters.products) {
-    // What the product says of a pixel with a row does not count.
+    // At a pixel with a row, the product is ignored.
     products_.push_back({pack(*product.across, false, false), pack(*product.down, false, true),
                          pack(*product.across, true, false), pack(*product.down, true, true)});
   }
@@ -99,7 +99,7 @@ OpenClProjection<Real>::OpenClProjection(OpenClQueue* queue, const DataTerm<Real
   rows_ = std::make_unique<Rows>(ToDevice(packed));
   read_ = std::make_unique<Pixels>(Pixels{static_cast<int>(read.pixel.size()),
                                           Copied(queue, "pixels that rows read", read.pixel)});
-  // Which of the rows a pixel has.
+  // The index of a pixel's row.
   std::vector<std::int32_t> row_of(Index(data.width_px) * Index(data.height_px), 0);
   for (std::size_t i = 0; i < packed.order.size(); ++i) {
     row_of[Index(rows.pixel[Index(packed.order[i])])] = static_cast<std::int32_t>(i);

@@ -14,7 +14,7 @@
 
 namespace thicklens::kernels {
 
-// How pictures lie on a device: Layout in filter.cl.
+// The layout of images on a device: Layout in filter.cl.
 struct PictureLayout {
   cl_int width_px = 0, height_px = 0, stride_px = 0, plane = 0, margin = 0;
 
@@ -24,14 +24,14 @@ struct PictureLayout {
   }
 };
 
-// A picture on a device, from planes without gaps and back. What is beside the planes is 0.
+// An image on a device; it is converted from and to planes without gaps. The numbers beside the
+// planes are 0.
 template <typename Real>
 class DevicePicture {
  public:
   DevicePicture(OpenClQueue* queue, const std::string& what, const PictureLayout& layout,
                 int channels);
-  // As many planes as there are in `planes`; `beside` is what numbers of a row beyond the picture
-  // become.
+  // Writes as many planes as `planes` has. Numbers of a row beyond the image become `beside`.
   void Write(const std::vector<Real>& planes, Real beside = 0);
   std::vector<Real> Read(int channels) const;
   void Clear() { memory_.Clear(); }
@@ -42,15 +42,16 @@ class DevicePicture {
   DeviceMemory memory_;
 };
 
-// FilteredMap on a device.
+// A FilteredMap on a device.
 template <typename Real>
 class OpenClProjection {
  public:
-  // Up to `channels` planes at once. Of `data` nothing is kept.
+  // The map processes up to the number of channels of `data` at once. No reference to `data` is
+  // kept.
   OpenClProjection(OpenClQueue* queue, const DataTerm<Real>& data, const ItemForm& form);
 
   const PictureLayout& layout() const { return layout_; }
-  // y = H x, or with a plane of weights W, W H x.
+  // Computes y = H x, or with a plane of weights W, y = W H x.
   void Apply(const DevicePicture<Real>& x, int channels, const DevicePicture<Real>* weight,
              DevicePicture<Real>* y);
   void ApplyTransposed(const DevicePicture<Real>& y, int channels, DevicePicture<Real>* x);
@@ -78,7 +79,7 @@ class OpenClProjection {
   void Add(const Rows& rows, const DeviceMemory& values, int channel, int channels,
            const DevicePicture<Real>* weight, DevicePicture<Real>* y);
 
-  // Four channels of those pixels.
+  // Copies four channels of the given pixels.
   void Take(const DevicePicture<Real>& from, int channel, int channels, int count,
             const DeviceMemory& pixel, const DeviceMemory& to);
 
@@ -87,9 +88,9 @@ class OpenClProjection {
   PictureLayout layout_;
   std::vector<Product> products_;
   std::unique_ptr<Rows> rows_, rows_transposed_;
-  std::unique_ptr<Pixels> read_;  // by rows
+  std::unique_ptr<Pixels> read_;  // pixels that rows read
   std::unique_ptr<DevicePicture<Real>> between_;
-  // Four channels beside each other, of the pixels that rows read and of those that have rows.
+  // Four adjacent channels of the pixels that rows read and of those that have rows.
   std::unique_ptr<DeviceMemory> of_pixels_, of_rows_;
 };
 

@@ -16,10 +16,11 @@ namespace {
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-constexpr std::size_t kItemPixels = 16;  // ITEM_PIXELS in radiance.cl
-constexpr std::size_t kSums = 3;         // SUMS
+constexpr std::size_t kItemPixels = 16;  // equal to ITEM_PIXELS in radiance.cl
+constexpr std::size_t kSums = 3;         // equal to SUMS in radiance.cl
 
-// The steps by the kernels of radiance.cl; what they mean stands there and in radiance_steps.h.
+// The steps as calls of the kernels of radiance.cl; see there and radiance_steps.h for their
+// meaning.
 template <typename Real>
 class OpenClSteps : public RadianceSteps<Real> {
  public:
@@ -36,7 +37,7 @@ class OpenClSteps : public RadianceSteps<Real> {
     photograph_.Write(data.photograph);
     weight_.Write(data.weight);
     WeighBack(photograph_, data.channels, &right_);
-    // As the twin does: the diagonal, about.
+    // The approximate diagonal, as in the twin.
     other_photograph_.Write(data.squared_row);
     WeighBack(other_photograph_, 1, &data_diagonal_);
   }
@@ -164,7 +165,7 @@ class OpenClSteps : public RadianceSteps<Real> {
  private:
   enum class Target { kNone, kPhotograph, kGiven };
 
-  // Without one, any.
+  // Without a target, any image is returned.
   const DevicePicture<Real>& TargetPicture() const {
     return target_ == Target::kGiven ? *given_target_ : *started_photograph_;
   }
@@ -183,13 +184,13 @@ class OpenClSteps : public RadianceSteps<Real> {
     return DevicePicture<Real>(queue_.get(), what, layout_, channels);
   }
 
-  // 1 beside the picture, so that the preconditioner is a number there.
+  // The pull is 1 beside the image, so that the preconditioner is finite there.
   void SetPull(const std::vector<Real>& pull) {
     pull_.Write(pull, 1);
     pull_value_ = std::nan("");
   }
 
-  // to = H^T W picture.
+  // Computes to = H^T W picture.
   void WeighBack(const DevicePicture<Real>& picture, int channels, DevicePicture<Real>* to) {
     Call("MultiplyPlanes")
         .Value(cl_int{channels})
@@ -230,7 +231,7 @@ class OpenClSteps : public RadianceSteps<Real> {
     std::vector<Number> of_group(sums_.bytes() / sizeof(Number));
     sums_.Read(of_group.data());
     std::array<double, kSums> sums{};
-    const std::size_t count = SumGroups() * kSums;  // not anew for each number: it is looked up
+    const std::size_t count = SumGroups() * kSums;  // called once, because it is a look-up
     for (std::size_t i = 0; i < count; ++i) {
       sums[i % kSums] += static_cast<double>(of_group[i]);
     }
@@ -263,7 +264,7 @@ class OpenClSteps : public RadianceSteps<Real> {
   DevicePicture<Real> projected_ = NewPicture("projected picture", most_channels_);
 
   TotalVariation<Real> variation_;
-  double pull_value_ = std::nan("");  // of all pixels alike; NaN: they are not
+  double pull_value_ = std::nan("");  // value of all pixels; NaN if they differ
   Target target_ = Target::kNone;
   std::optional<DevicePicture<Real>> given_target_;
   int channels_ = 1;

@@ -3,11 +3,11 @@
 
 namespace thicklens::kernels {
 
-// What looks at drivers does so in a child process, and that works only as long as OpenCL is not
-// in use in this one: a copy of a process with a loaded driver lacks the driver's threads. So:
-// first the survey and the trials, then the device. SetOpenClInUse says that the time has come.
-// From then on the survey is the one that was made, and a trial of another device is made in this
-// process, without the guard.
+// Drivers are examined in a child process, which works only as long as OpenCL is not in use in this
+// process, because a copy of a process with a loaded driver lacks the driver's threads. The survey
+// and the trials therefore precede the device. SetOpenClInUse marks this point. Afterwards the
+// survey returns its previous result, and a trial of another device runs in this process, without
+// the guard.
 void SetOpenClInUse();
 bool IsOpenClInUse();
 

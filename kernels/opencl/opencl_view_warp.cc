@@ -16,16 +16,16 @@ namespace {
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-constexpr int kBefore = 1, kAfter = 2;  // pixels of a border that are repeated
-constexpr int kFour = 4;                // channels of a pixel read at once, of more than one
+constexpr int kBefore = 1, kAfter = 2;  // repeated border pixels before and after
+constexpr int kFour = 4;  // channels of a pixel that are read at once if there are several
 
-// Surfaces in warp.cl.
+// The structure Surfaces of warp.cl.
 struct SurfacesArgument {
   cl_int width_px, height_px, channels;
   cl_float tolerance, limit_px;
 };
 
-// The pixels of a picture as warp.cl has them.
+// Returns the pixels of an image in the layout of warp.cl.
 std::vector<float> PixelsOf(const SurfacePicture& picture) {
   const int of_pixel = picture.channels == 1 ? 1 : kFour;
   const int planes = (picture.channels + of_pixel - 1) / of_pixel;
@@ -48,9 +48,9 @@ std::vector<float> PixelsOf(const SurfacePicture& picture) {
   return pixels;
 }
 
-// The shift of a view in floats, and what they leave of it, so that a device without double finds
-// the sources to the last digit of a float, as the twin does. A product with what is larger than
-// the bound is outside of any picture.
+// Returns the shift of a view as floats, and their rounding errors. A device without double then
+// finds the sources with the full precision of float, like the twin. The product with a shift above
+// the bound is outside of any image.
 cl_float4 ShiftOf(const ViewSources& view) {
   constexpr double kBound = 1e30;
   const double x = std::clamp(view.shift_x, -kBound, kBound);
@@ -62,7 +62,7 @@ cl_float4 ShiftOf(const ViewSources& view) {
 static_assert(sizeof(HiddenSample) == 16, "Hidden in warp.cl");
 static_assert(sizeof(MixedSample) == 24, "Mixed in warp.cl");
 
-// Least, largest, pixel by pixel.
+// Returns minimum and maximum alternately, pixel by pixel.
 std::vector<float> PairsOf(const TapRanges& ranges) {
   std::vector<float> pairs;
   pairs.reserve(2 * ranges.lowest.size());
@@ -82,7 +82,7 @@ class OpenClWarp : public ViewWarp {
         pixels_(Copied(queue_.get(), "picture of surfaces", PixelsOf(picture))),
         disparity_(Copied(queue_.get(), "disparity of a picture", *picture.disparity)),
         ranges_(Copied(queue_.get(), "ranges of disparities", PairsOf(ranges))) {
-    queue_->Finish();  // the queues that read the picture know nothing of this one's order
+    queue_->Finish();  // the queues that read the image are not synchronised with this one
   }
 
   void Warp(const ViewSources& view, std::vector<float>* values) override {
@@ -90,7 +90,7 @@ class OpenClWarp : public ViewWarp {
     const SurfacesArgument surfaces{picture_.width_px, picture_.height_px, picture_.channels,
                                     picture_.tolerance,
                                     static_cast<cl_float>(picture_.width_px + picture_.height_px)};
-    // In place of an empty list, which OpenCL cannot have.
+    // Replaces an empty list, which OpenCL does not allow.
     const std::vector<HiddenSample> no_sample(1);
     const std::vector<HiddenSample>& hidden = view.hidden->empty() ? no_sample : *view.hidden;
     const auto hidden_count = static_cast<int>(view.hidden->size());
@@ -125,8 +125,8 @@ class OpenClWarp : public ViewWarp {
   }
 
  private:
-  // Each thread in here has a queue, so that the device computes a view while another waits to be
-  // told of the last one: of small views that is most of the time.
+  // Each thread in Warp has its own queue, so that the device computes a view while another thread
+  // waits for the result of the previous one. For small views this wait is most of the time.
   std::unique_ptr<OpenClQueue> TakeQueue() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (spare_queues_.empty()) return queue_->Clone();
@@ -136,8 +136,8 @@ class OpenClWarp : public ViewWarp {
   }
   std::size_t ItemsOf(int samples) const { return Index((samples + lanes_ - 1) / lanes_); }
 
-  const std::unique_ptr<OpenClQueue> queue_;  // by which the picture came
-  const int lanes_;                           // samples of an item
+  const std::unique_ptr<OpenClQueue> queue_;  // queue that sent the image
+  const int lanes_;                           // samples per item
   const SurfacePicture picture_;
   const DeviceMemory pixels_, disparity_, ranges_;
   std::mutex mutex_;

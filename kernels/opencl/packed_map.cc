@@ -10,11 +10,11 @@
 namespace thicklens::kernels {
 namespace {
 
-constexpr int kWindowSlices = 16;  // over which rows are sorted
+constexpr int kWindowSlices = 16;  // number of slices in a window over which rows are sorted
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// The coefficients of a filter, wherever they are asked for.
+// The coefficients of a filter at any position.
 template <typename Real>
 class Coefficients {
  public:
@@ -26,7 +26,8 @@ class Coefficients {
 
   int most_radius() const { return most_; }
 
-  // c_n of `count` pixels of row y from x on, 0 where there is none. Whether one is not 0.
+  // Copies c_n of `count` pixels of row y from x on, with 0 where there is none. Returns true if
+  // any is not 0.
   bool Copy(int n, int x, int y, int count, Real* out) const {
     std::fill(out, out + count, Real{0});
     if (y < 0 || y >= filter_.height_px) return false;
@@ -52,8 +53,8 @@ class Coefficients {
     return any;
   }
 
-  // What pixels from x on get from those n beside them: c_n of theirs, or of the transposed filter
-  // c_-n of those.
+  // Copies the weights with which pixels from x on read the pixels n away: their own c_n, or for
+  // the transposed filter c_-n of the pixels that they read.
   bool CopyTerm(bool transposed, int n, int x, int y, int count, Real* out) const {
     if (!transposed) return Copy(n, x, y, count, out);
     return filter_.axis == Axis::kAcross ? Copy(-n, x + n, y, count, out)
@@ -96,7 +97,8 @@ PackedFilter<Real> Pack(const PixelFilter<Real>& filter, bool transposed,
   packed.start.resize(tiles + 1, 0);
   const int bands = BandCount(plane.height_px, threads, 1);
   std::vector<std::vector<Real>> rooms(Index(bands), std::vector<Real>(Index(tile_px)));
-  // Of each tile the number of its terms; then where they start; then they themselves.
+  // First the number of terms of each tile is computed, then their starts, then the terms
+  // themselves.
   ForBands(plane.height_px, bands, [&](int band, int first_row, int last_row) {
     for (int y = first_row; y < last_row; ++y) {
       for (int column = 0; column < tiles_in_row; ++column) {

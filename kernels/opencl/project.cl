@@ -1,14 +1,14 @@
-// What all kernel files share, for they are one program; then H, from rays to pixels.
+// The common part of all kernel files, which are one program; then H, from rays to pixels.
 //
-// REAL is float or double. Every kernel does what its namesake in reference.cc does, term by term
-// and in the same order, and differs from it by rounding alone. Items beyond the last do nothing:
-// the number of items is rounded up to whole groups.
+// REAL is float or double. Each kernel computes the same as the function of its name in
+// reference.cc, term by term and in the same order, and differs from it only by rounding. Items
+// beyond the last do nothing, because the number of items is rounded up to whole groups.
 
-// As the C++ twin: 1 - w that is 0 there must be 0 here.
+// Fusing is off as in the C++ twin: where 1 - w is 0 there, it must be 0 here.
 #pragma OPENCL FP_CONTRACT OFF
 
-// As BlockGeometry has it. Its lists are buffers: `shift` holds s_shift, then t_shift; `fraction`
-// s_fraction, then t_fraction.
+// The structure BlockGeometry. Its lists are buffers: `shift` holds s_shift, then t_shift;
+// `fraction` holds s_fraction, then t_fraction.
 typedef struct {
   int first_x, first_y, width_px, height_px;
   int s_count, t_count, u_count, v_count;
@@ -16,7 +16,7 @@ typedef struct {
 
 int PixelsOf(const Block block) { return block.width_px * block.height_px; }
 
-// The ray of view (k, l) nearest to the block's pixel (x, y), or -1.
+// Returns the ray of view (k, l) nearest to the block's pixel (x, y), or -1.
 int RayAt(const Block block, global const int* shift, int k, int l, int x, int y) {
   if (k < 0 || k >= block.u_count || l < 0 || l >= block.v_count) return -1;
   if (x < 0 || x >= block.width_px || y < 0 || y >= block.height_px) return -1;
@@ -26,14 +26,14 @@ int RayAt(const Block block, global const int* shift, int k, int l, int x, int y
   return (l * block.u_count + k) * PixelsOf(block) + y * block.width_px + x;
 }
 
-// What a pixel gets, on one axis, of rays that land `fraction` beside the pixel nearest to them:
-// tap 0 is the ray nearest to it, tap 1 the neighbour (of `taps` 1: all of the nearest).
+// The shares of a pixel, on one axis, of rays that land `fraction` beside their nearest pixel: tap
+// 0 is the ray nearest to it, tap 1 the neighbour. With `taps` 1 it gets all of the nearest ray.
 int TapOffset(REAL fraction, int tap) { return tap == 0 ? 0 : fraction > 0 ? -1 : 1; }
 REAL TapShare(REAL fraction, int tap, int taps) {
   return taps == 1 ? 1 : tap == 0 ? 1 - fabs(fraction) : fabs(fraction);
 }
 
-// One item a pixel: neighbours write neighbouring addresses in every slot.
+// One item per pixel: neighbours write neighbouring addresses in every slot.
 kernel void FindRays(const Block block, const int taps, global const int* shift,
                      global const REAL* fraction, global int* rays) {
   const int pixels = PixelsOf(block);
@@ -60,7 +60,7 @@ kernel void FindRays(const Block block, const int taps, global const int* shift,
   }
 }
 
-// One item a pixel, which goes over its slots twice: for the sum, then to divide by it.
+// One item per pixel, which reads its slots twice: for the sum, then for the division by it.
 kernel void WeighRays(const int pixels, const int slots, global const REAL* slot_weight,
                       global const int* rays, const int has_irradiance,
                       global const REAL* irradiance, global int* column, global REAL* value) {

@@ -1,4 +1,4 @@
-// The steps of radiance_steps.h. Pictures and planes as in filter.cl.
+// The steps of radiance_steps.h. Images and planes have the layout of filter.cl.
 
 #if LANES == 1
 #define WHOLE int
@@ -14,7 +14,7 @@
 #define REAL_OF(whole) JOINED(JOINED(convert_, REAL), 16)(whole)
 #endif
 
-// 1 where there is a pixel and one on its right, or on its left, else 0.
+// Return 1 for a pixel in the image with a neighbour on its right (or left), and 0 otherwise.
 NUMBERS HasRight(int x, int width_px) {
   return REAL_OF(clamp((WHOLE)(width_px - 1 - x) - ORDER, (WHOLE)0, (WHOLE)1));
 }
@@ -22,7 +22,7 @@ NUMBERS HasLeft(int x, int width_px) {
   return REAL_OF(clamp(min((WHOLE)x + ORDER, (WHOLE)(width_px - x) - ORDER), (WHOLE)0, (WHOLE)1));
 }
 
-// The smoothness t of the four differences that a pixel has part in; 0 where there is none.
+// The smoothness t of the four differences that include a pixel; 0 where there is none.
 typedef struct {
   NUMBERS right, left, below, above;
 } Ties;
@@ -39,7 +39,7 @@ Ties TiesAt(const Layout layout, int p, global const REAL* t) {
   return ties;
 }
 
-// P r of one channel.
+// Returns P r of one channel.
 NUMBERS PriorOf(const Layout layout, int p, const Ties ties, NUMBERS pull, global const REAL* r) {
   const int y = p / layout.stride_px;
   const int down = y + 1 < layout.height_px ? layout.stride_px : 0;
@@ -65,8 +65,8 @@ REAL SumOf(NUMBERS numbers) {
 }
 #endif
 
-// An item of a sum takes ITEM_PIXELS pixels, LANES at a time, as far as there are any. Its group
-// goes along the picture beside it.
+// An item of a sum processes up to ITEM_PIXELS pixels, LANES at a time. The items of its group
+// process the pixels beside it.
 #define ITEM_PIXELS 16
 #define FOR_PIXELS(p)                                                                  \
   for (int p = ((int)get_group_id(0) * ITEM_PIXELS * (int)get_local_size(0) +          \
@@ -75,7 +75,7 @@ REAL SumOf(NUMBERS numbers) {
        turn < ITEM_PIXELS / LANES && p < layout.plane;                                 \
        ++turn, p += (int)get_local_size(0) * LANES)
 
-// Of a group, up to SUMS sums.
+// Up to SUMS sums of a group.
 #define SUMS 3
 #define MOST_ITEMS 64
 void PutSums(SUM first, SUM second, SUM third, local SUM* of_item) {
@@ -91,7 +91,8 @@ void AddUp(local const SUM* of_item, global SUM* sums) {
   }
   for (int i = 0; i < SUMS; ++i) sums[(int)get_group_id(0) * SUMS + i] = total[i];
 }
-// The quadratic that touches the total variation at x: t = half s^2/(s^2 |dx|^2 + floor)^(1/2).
+// Sets the quadratic that touches the total variation at x: t = half s^2/(s^2 |dx|^2 +
+// floor)^(1/2).
 kernel void TouchVariation(const Layout layout, const int channels, const REAL half_strength,
                            const REAL floor_squared, global const REAL* slope_squared,
                            global const REAL* x, global REAL* t) {
@@ -112,7 +113,7 @@ kernel void TouchVariation(const Layout layout, const int channels, const REAL h
   STORE(half_strength * s2 / sqrt(s2 * squares + floor_squared), t + layout.margin + p);
 }
 
-// r = data_residual - P x + pull target, m = M^-1; sums r.r, r.m r, r.m (what r was before).
+// Sets r = data_residual - P x + pull target, m = M^-1; computes the sums r.r, r.m r, r.m (previous r).
 kernel void UpdateResidual(const Layout layout, const int channels,
                            global const REAL* data_diagonal, global const REAL* pull,
                            global const REAL* t, global const REAL* x,
@@ -146,7 +147,7 @@ kernel void UpdateResidual(const Layout layout, const int channels,
   if (get_local_id(0) == 0) AddUp(of_item, sums);
 }
 
-// |b|^2.
+// Computes |b|^2.
 kernel void SquareRightSide(const Layout layout, const int channels, global const REAL* pull,
                             global const REAL* right, const int has_target,
                             global const REAL* target, global SUM* sums) {
@@ -165,7 +166,7 @@ kernel void SquareRightSide(const Layout layout, const int channels, global cons
   if (get_local_id(0) == 0) AddUp(of_item, sums);
 }
 
-// direction = m r + beta direction; sum direction.r.
+// Sets direction = m r + beta direction and computes the sum direction.r.
 kernel void TurnDirection(const Layout layout, const int channels, const REAL beta,
                           global const REAL* m, global const REAL* r, global REAL* direction,
                           global SUM* sums) {
@@ -186,7 +187,7 @@ kernel void TurnDirection(const Layout layout, const int channels, const REAL be
   if (get_local_id(0) == 0) AddUp(of_item, sums);
 }
 
-// Sums direction.P direction and direction.product.
+// Computes the sums direction.P direction and direction.product.
 kernel void MeasureCurvature(const Layout layout, const int channels, global const REAL* pull,
                              global const REAL* t, global const REAL* direction,
                              global const REAL* product, global SUM* sums) {
@@ -208,7 +209,7 @@ kernel void MeasureCurvature(const Layout layout, const int channels, global con
   if (get_local_id(0) == 0) AddUp(of_item, sums);
 }
 
-// y += scale x, over all channels. One item LANES numbers.
+// Computes y += scale x, over all channels. One item computes LANES numbers.
 kernel void AddScaled(const Layout layout, const int channels, const REAL scale,
                       global const REAL* x, global REAL* y) {
   const size_t i = (size_t)get_global_id(0) * LANES;
@@ -218,7 +219,7 @@ kernel void AddScaled(const Layout layout, const int channels, const REAL scale,
   STORE(LOAD(y) + scale * LOAD(x), y);
 }
 
-// y = weight x, one plane. One item LANES numbers.
+// Computes y = weight x with one plane of weights. One item computes LANES numbers of each channel.
 kernel void MultiplyPlanes(const Layout layout, const int channels, global const REAL* weight,
                            global const REAL* x, global REAL* y) {
   const int p = (int)get_global_id(0) * LANES;

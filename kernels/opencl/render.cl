@@ -1,13 +1,14 @@
-// From a light field to its picture, and from blocks to a light field.
+// Kernels from a light field to its image, and from blocks to a light field.
 
-// Pixels of a row that one item of FormPicture sums up: a constant, so that the loops over them are
-// unrolled and become vectors.
+// Number of pixels of a row that one item of FormPicture sums up. It is a constant, so that the
+// loops over them are unrolled and vectorised.
 #define STRIP 16
 
-// One item a strip of a row. It reads each view's strip as a whole and in the order in which views
-// lie, with the sums of all its pixels in registers: an item a pixel, whose loop over the views is
-// known when it runs only, is never vectorised on a CPU. It costs a GPU some coalescing, and cuts
-// the streams of a CPU into pieces of a strip. Every sample is read once for each tap.
+// One item per strip of a row. It reads each view's strip as a whole and in the order of the views,
+// with the sums of all its pixels in registers. An item per pixel, whose loop over the views has a
+// length that is known only at run time, is never vectorised on a CPU. The strips cost a GPU some
+// coalescing and divide the memory streams of a CPU into pieces of a strip. Every sample is read
+// once for each tap.
 kernel void FormPicture(const Block whole, const int taps, global const int* shift,
                         global const REAL* fraction, global const REAL* view_weight,
                         global const REAL* views, global REAL* picture) {
@@ -32,11 +33,11 @@ kernel void FormPicture(const Block whole, const int taps, global const int* shi
           const REAL in_x = fraction[k];
           const REAL weight =
               view_weight[view] * TapShare(in_y, tap_y, taps) * TapShare(in_x, tap_x, taps);
-          // A view without weight is not looked at: it may be absent.
+          // A view without weight is not read, because it may be absent.
           if (weight == 0) continue;
           const int offset = TapOffset(in_x, tap_x);
           const int s = whole.first_x + x + offset - shift[k];
-          // Of the strip, the pixels whose ray lies in the block and in the light field.
+          // The pixels of the strip whose ray is in the block and in the light field.
           const int begin = max(max(0, -(x + offset)), -s);
           const int end = min(min(STRIP, whole.width_px - x - offset), whole.s_count - s);
           if (begin == 0 && end == STRIP) {
@@ -60,7 +61,7 @@ kernel void FormPicture(const Block whole, const int taps, global const int* shi
   }
 }
 
-// One item a ray of the block. No two share a sample.
+// One item per ray of the block. No two items share a sample.
 kernel void AddBlock(const Block block, global const int* shift, global const REAL* rays,
                      global float* channel) {
   const int pixels = PixelsOf(block);

@@ -1,15 +1,15 @@
-// The derivation masks of rays, one item a ray.
+// The derivation masks of rays, one item per ray.
 
 // Displacements of more samples than this leave every block.
 #define FAR_AWAY ((REAL)(1 << 30))
 
-// What sample numbers of view `to` are ahead of those of view `from`, on one axis.
+// Difference of the sample numbers of view `to` from those of view `from`, on one axis.
 int ShiftBetween(global const int* shift, int from, int to, int count) {
   return to < 0 || to >= count ? 0 : shift[to] - shift[from];
 }
 
-// One row of D: -1 at the ray, 1 - w and w at the next view's samples around it. Slots are `rows`
-// apart.
+// Writes one row of D: -1 at the ray, 1 - w and w at the next view's samples around it. Slots are
+// `rows` apart.
 void PutDifference(int ray, int tap0, int tap1, REAL rest, size_t row, size_t rows,
                    global int* column, global REAL* value) {
   const REAL share = 1 - rest;
@@ -35,7 +35,7 @@ kernel void WarpDifferences(const Block block, global const int* shift, global c
   const int ray = RayAt(block, shift, k, l, x, y);
   const size_t rows = 2 * (size_t)rays;
 
-  // A slope that is NaN or too large fails the comparison, and no number comes of it.
+  // A slope that is NaN or too large fails the comparison and gives an empty row.
   const REAL whole_u = floor(slope_u[item]);
   const bool is_near_u = fabs(whole_u) < FAR_AWAY;
   const int next_x = x + ShiftBetween(shift, k, k + 1, block.u_count) +
@@ -53,8 +53,9 @@ kernel void WarpDifferences(const Block block, global const int* shift, global c
                 (size_t)rays + item, rows, column, value);
 }
 
-// The eight neighbours in one plane, (s, u) or (t, v), for m^2 L_ss + 2 m L_su + L_uu: steps along
-// the samples and along the views. Their weights: m^2 twice, 1 twice, m/2 by the diagonal's sign.
+// The eight neighbours in one plane, (s, u) or (t, v), for m^2 L_ss + 2 m L_su + L_uu, as steps
+// along the samples and along the views. Their weights are m^2 for the first two, 1 for the next
+// two, and m/2 with the diagonal's sign.
 constant int sample_step[8] = {-1, 1, 0, 0, -1, 1, -1, 1};
 constant int view_step[8] = {0, 0, -1, 1, -1, -1, 1, 1};
 

@@ -1,6 +1,7 @@
-// Compressed rows. Transposed products need no atomics: they are given the transposed matrix.
+// Compressed rows. Transposed products need no atomics, because the kernels get the transposed
+// matrix.
 
-// One item a row: y_i = sum_j A_ij x_j.
+// One item per row: y_i = sum_j A_ij x_j.
 kernel void MultiplyRows(const int rows, global const long* row_start, global const int* column,
                          global const REAL* value, global const REAL* x, global REAL* y) {
   const int row = (int)get_global_id(0);
@@ -10,8 +11,8 @@ kernel void MultiplyRows(const int rows, global const long* row_start, global co
   y[row] = sum;
 }
 
-// One item an entry (i, j) of the pattern: N_ij += scale * sum_r A_ri A_rj. Both rows of A^T are
-// sorted, so that what they have in common is found by going through them once.
+// One item per entry (i, j) of the pattern: N_ij += scale * sum_r A_ri A_rj. Both rows of A^T are
+// sorted, so that one pass finds their common columns.
 kernel void AddNormalProduct(const long entries, const REAL scale, global const int* pattern_row,
                              global const int* pattern_column, global const long* row_start,
                              global const int* column, global const REAL* value,

@@ -1,6 +1,6 @@
-// A picture read for the samples of a view: view_warp.h, reference_warp.cc.
+// Reads an image for the samples of a view: view_warp.h, reference_warp.cc.
 
-// As the C++ twin: which taps count is decided by numbers that must be the same.
+// Fusing is off as in the C++ twin, because the same numbers must decide which taps are used.
 #pragma OPENCL FP_CONTRACT OFF
 
 // LANES numbers (filter.cl), which need not be REAL; WHOLE is from radiance.cl.
@@ -16,9 +16,9 @@
 #define STORE_LANES(numbers, to) JOINED(vstore, LANES)(numbers, 0, to)
 #endif
 
-// Pixels lie in rows of width_px + 3, the rows in planes of height_px + 3: the picture's borders
-// are repeated once before and twice after. A pixel is one number, or, of a picture with more
-// channels than one, a float4 of the next four channels in each plane, 0 beyond the last.
+// Pixels are in rows of width_px + 3, and the rows in planes of height_px + 3: the borders of the
+// image are repeated once before and twice after. A pixel is one number. If the image has several
+// channels, it is a float4 of the next four channels in each plane, 0 beyond the last channel.
 typedef struct {
   int width_px, height_px, channels;
   float tolerance, limit_px;
@@ -30,14 +30,15 @@ typedef struct {
   float source_x, source_y, disparity;
 } Hidden;
 
-// MixedSample.
+// MixedSample in view_warp.h.
 typedef struct {
   int index;
   Hidden other;
   float share;
 } Mixed;
 
-// The pixels before the places of samples on a line, and the rests of the ways to the next.
+// Returns the pixels before the positions of samples on a line, and sets `rest` to the distances to
+// the positions.
 WHOLE PixelsBefore(WHOLE sample, FLOATS source, int count, float limit_px, FLOATS* rest) {
   const FLOATS way = clamp(source, -limit_px, limit_px);
   const FLOATS below = floor(way);
@@ -47,13 +48,13 @@ WHOLE PixelsBefore(WHOLE sample, FLOATS source, int count, float limit_px, FLOAT
   return pixel;
 }
 
-// Of the pixels at -1, 0, 1 and 2, after Catmull and Rom. Four of the last.
+// Weights of the pixels at -1, 0, 1 and 2, after Catmull and Rom.
 float4 CatmullRom(float t) {
   return mad(mad(mad((float4)(-0.5f, 1.5f, -1.5f, 0.5f), t, (float4)(1, -2.5f, 2, -0.5f)), t,
                  (float4)(-0.5f, 0, 0.5f, 0)),
              t, (float4)(0, 1, 0, 0));
 }
-// Each weight for the four channels of a pixel.
+// Each weight is repeated for the four channels of a pixel.
 float16 CatmullRomOfFour(float t) {
   const float16 cubic = (float16)((float4)-0.5f, (float4)1.5f, (float4)-1.5f, (float4)0.5f);
   const float16 square = (float16)((float4)1, (float4)-2.5f, (float4)2, (float4)-0.5f);
@@ -82,10 +83,10 @@ float4 BicubicOfFour(global const float4* tap, int stride, float16 weight_x, flo
   return half_sum.lo + half_sum.hi;
 }
 
-// The shares of the four pixels around, those of the surface alone.
+// Returns the shares of the four surrounding pixels; only pixels of the surface have one.
 float4 Shares(const Surfaces picture, global const float* disparity, int x, int y, float rest_x,
               float rest_y, float d) {
-  // Past the last pixel the weight is 0.
+  // Beyond the last pixel the weight is 0.
   const int there = y * picture.width_px + x;
   const int right = min(x + 1, picture.width_px - 1) - x;
   const int below = (min(y + 1, picture.height_px - 1) - y) * picture.width_px;
@@ -101,7 +102,7 @@ float4 Shares(const Surfaces picture, global const float* disparity, int x, int 
   sum_of_weights += weighed.s2;
   sum_of_weights += weighed.s3;
   if (sum_of_weights > 0) return weighed / sum_of_weights;
-  // The first of the closest.
+  // The first of the closest pixels.
   const float4 far = select(away, (float4)(INFINITY), weight == 0);
   const float closest = fmin(fmin(far.s0, far.s1), fmin(far.s2, far.s3));
   return far.s0 == closest   ? (float4)(1, 0, 0, 0)
@@ -110,7 +111,7 @@ float4 Shares(const Surfaces picture, global const float* disparity, int x, int 
                              : (float4)(0, 0, 0, 1);
 }
 
-// The first `count` of four channels.
+// Stores the first `count` of four channels.
 void StoreChannels(float4 channels, int count, global float* to) {
   if (count >= 4) {
     vstore4(channels, 0, to);
@@ -123,7 +124,7 @@ void StoreChannels(float4 channels, int count, global float* to) {
   }
 }
 
-// The first `count` of LANES samples, the last of these repeated.
+// Loads the first `count` of LANES samples and repeats the last of these.
 FLOATS LoadSamples(global const float* from, int count) {
   if (count == LANES) return LOAD_LANES(from);
   float padded[LANES];
@@ -131,9 +132,10 @@ FLOATS LoadSamples(global const float* from, int count) {
   return LOAD_LANES(padded);
 }
 
-// One item LANES samples of a row (see filter.cl); the items after those of all rows LANES hidden
-// ones each, wherever they are. `ranges`: the least and the largest of the disparities around each
-// pixel. `shift`: across and down, then what float leaves of these.
+// One item computes LANES samples of a row (see filter.cl). The items after those of all rows
+// compute LANES hidden samples each, at any position. `ranges`: minimum and maximum of the
+// disparities around each pixel. `shift`: across and down, then the rounding errors of these
+// floats.
 kernel void WarpView(const Surfaces picture, global const float* pixels,
                      global const float* disparity, global const float2* ranges,
                      global const float* view_disparity, const float4 shift,
@@ -190,7 +192,7 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
   const int plane = stride * (picture.height_px + 3);
   for (int lane = 0; lane < count; ++lane) {
     const float d = sample_disparity[lane];
-    if (isnan(d)) continue;  // one of the hidden, which another item reads
+    if (isnan(d)) continue;  // a hidden sample, which another item reads
     const int x = pixel_x[lane];
     const int y = pixel_y[lane];
     global float* to = values + (size_t)sample[lane] * picture.channels;
@@ -227,7 +229,7 @@ kernel void WarpView(const Surfaces picture, global const float* pixels,
   }
 }
 
-// One item a sample whose pixel two surfaces share; after WarpView.
+// One item per sample whose pixel two surfaces share; it runs after WarpView.
 kernel void MixSamples(const Surfaces picture, global const float* pixels,
                        global const float* disparity, global const Mixed* mixed, const int count,
                        global float* values) {
