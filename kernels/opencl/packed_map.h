@@ -31,10 +31,9 @@ PackedPlane PackedPlaneOf(int width_px, int height_px, int tile_px);
 template <typename Real>
 struct PackedFilter {
   std::vector<std::int32_t> first;  // of each tile of a plane
-  std::vector<std::int32_t>
-      start;                       // start of the terms of each tile; one more than there are tiles
-  std::vector<Real> coefficients;  // for each term one number per pixel of the tile
-  int reach_px = 0;                // maximum of |first + k|
+  std::vector<std::int32_t> start;  // first term of each tile; one more than there are tiles
+  std::vector<Real> coefficients;   // for each term one number per pixel of the tile
+  int reach_px = 0;                 // maximum of |first + k|
 };
 // `left_out`: pixels of the untransposed filter's result that are set to 0.
 template <typename Real>

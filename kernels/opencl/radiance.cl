@@ -113,7 +113,8 @@ kernel void TouchVariation(const Layout layout, const int channels, const REAL h
   STORE(half_strength * s2 / sqrt(s2 * squares + floor_squared), t + layout.margin + p);
 }
 
-// Sets r = data_residual - P x + pull target, m = M^-1; computes the sums r.r, r.m r, r.m (previous r).
+// Sets r = data_residual - P x + pull target, m = M^-1, and computes the sums r.r, r.m r and r.m
+// (previous r).
 kernel void UpdateResidual(const Layout layout, const int channels,
                            global const REAL* data_diagonal, global const REAL* pull,
                            global const REAL* t, global const REAL* x,

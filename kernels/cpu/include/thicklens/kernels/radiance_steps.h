@@ -61,8 +61,8 @@ struct QuadraticPrior {
                                   // channels of the solution; empty: 0
 };
 
-// The prior strength sum_p (g + eps^2)^(1/2) + pull |r|^2, where g is the sum over channels and
-// both differences of s^2 |dr|^2.
+// The total variation prior: strength sum_p (g + eps^2)^(1/2) + pull |r|^2, where g is the sum over
+// channels and both differences of s^2 |dr|^2.
 template <typename Real>
 struct TotalVariation {
   const std::vector<Real>* slope_squared = nullptr;  // s^2, one plane
