@@ -40,7 +40,7 @@ double DiscSecondAntiderivative(double x, double radius) {
   return radius * radius * (u * u / 4 + bracket / kPi + 1.0 / 16);
 }
 
-// Second antiderivative [D33], px^2, of the step blurred by a ring of radius R, 1/2 + asin(u)/pi.
+// Second antiderivative, px^2, of the step blurred by a ring of radius R, 1/2 + asin(u)/pi.
 // Derived by integrating twice: R^2 {u^2/4 + [(u^2/2 + 1/4) asin u + 3/4 u s]/pi + 1/8}, and x^2/2
 // + R^2/4 behind the ring.
 double RingSecondAntiderivative(double x, double radius) {
