@@ -268,9 +268,13 @@ class Calibrator {
 
   void WarnOfBands(std::size_t registered) {
     if (!result_.structure.HasBands() || !result_.scale.done) return;
-    result_.warnings.push_back(fmt::format("only {} of {} frames could be registered: {}",
-                                           registered, used().size(),
-                                           StructureInWords(result_.structure)));
+    const std::size_t frames = used().size();
+    result_.warnings.push_back(fmt::format(
+        "only {} of {} frames could be registered: {}{}", registered, frames,
+        BandsInWords(result_.structure),
+        BandsExplain(result_.structure, frames - registered, frames)
+            ? ""
+            : "; so many are not explained by that: others may show another part of the target"));
   }
 
   // The given bench zero and the readings as they are.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "calib/sharpness/edge_pixels.h"
 #include "thicklens/base/statistics.h"
@@ -378,13 +379,32 @@ bool FixedStructureIsExcluded(const FrameStructureFinding& structure) {
   return IsExcludedBy(structure.fixed_structure, FrameStructureFinding::kLeastFixed);
 }
 
-bool BandsHideFrames(const FrameStructureFinding& structure) {
-  constexpr double kFrames = 0.035;
-  return structure.HasBands() && structure.bands->value > kFrames;
+bool BandsExplain(const FrameStructureFinding& structure, std::size_t missing, std::size_t frames) {
+  // Standard deviation of the bands, share of the frames that is then missing.
+  constexpr std::array<std::pair<double, double>, 6> kCosts = {
+      {{0, 0}, {0.02, 0.13}, {0.04, 0.22}, {0.07, 0.32}, {0.1, 0.48}, {0.21, 0.9}}};
+  constexpr double kMargin = 1.5;
+  if (!structure.HasBands() || frames == 0) return false;
+  const double bands = structure.bands->value;
+  double cost = kCosts.back().second;
+  for (std::size_t i = 1; i < kCosts.size(); ++i) {
+    const auto [left, low] = kCosts[i - 1];
+    const auto [right, high] = kCosts[i];
+    if (bands < right) {
+      cost = low + (high - low) * (bands - left) / (right - left);
+      break;
+    }
+  }
+  return static_cast<double>(missing) <= kMargin * cost * static_cast<double>(frames);
 }
-bool BandsHideMostFrames(const FrameStructureFinding& structure) {
-  constexpr double kMostFrames = 0.09;
-  return structure.HasBands() && structure.bands->value > kMostFrames;
+
+std::string BandsInWords(const FrameStructureFinding& structure) {
+  if (!structure.HasBands()) return "";
+  return fmt::format(
+      "whole {0} brighten together by {1:.2g} % (standard deviation), in each frame in another "
+      "place: the lamp flickers under a rolling shutter; expose for whole periods of the lamp, "
+      "or use a steady one",
+      structure.bands_are_columns ? "columns" : "rows", 100 * structure.bands->value);
 }
 
 FrameStructureFinding MeasureStructure(const FramePlaces& places) {
@@ -393,13 +413,7 @@ FrameStructureFinding MeasureStructure(const FramePlaces& places) {
 
 std::string StructureInWords(const FrameStructureFinding& structure) {
   std::vector<std::string> found;
-  if (structure.HasBands()) {
-    found.push_back(fmt::format(
-        "whole {0} brighten together by {1:.2g} % (standard deviation), in each frame in another "
-        "place: the lamp flickers under a rolling shutter; expose for whole periods of the lamp, "
-        "or use a steady one",
-        structure.bands_are_columns ? "columns" : "rows", 100 * structure.bands->value));
-  }
+  if (structure.HasBands()) found.push_back(BandsInWords(structure));
   if (structure.HasVignetting()) {
     const double corner = std::exp(structure.vignetting->value) - 1;
     found.push_back(fmt::format(

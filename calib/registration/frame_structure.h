@@ -39,12 +39,14 @@ FrameStructureFinding MeasureStructure(const FramePlaces& places);
 bool VignettingIsExcluded(const FrameStructureFinding& structure);
 bool FixedStructureIsExcluded(const FrameStructureFinding& structure);
 
-// Whether the bands are so strong that they alone prevent the registration of frames, or of more
-// than half of them. The limits were measured on simulated sweeps of dead leaves with sinusoidal
-// bands of a different phase in each frame: a standard deviation of 2 % costs up to 4 frames of 31,
-// 4 % costs 6 or 7, 7 % costs 8 to 10, 10 % costs 14 or 15, and 21 % costs all but 3.
-bool BandsHideFrames(const FrameStructureFinding& structure);
-bool BandsHideMostFrames(const FrameStructureFinding& structure);
+// Whether the bands alone explain that so many of the frames could not be registered. The costs
+// were measured on simulated sweeps of dead leaves with sinusoidal bands of a different phase in
+// each frame: a standard deviation of 2 % costs up to 4 frames of 31, 4 % costs 6 or 7, 7 % costs 8
+// to 10, 10 % costs 14 or 15, and 21 % costs all but 3. Half as many again are put down to them.
+bool BandsExplain(const FrameStructureFinding& structure, std::size_t missing, std::size_t frames);
+
+// Describes the bands and their remedy; empty without bands.
+std::string BandsInWords(const FrameStructureFinding& structure);
 
 // Describes each structure that was found, and its remedy, in one text: "the corners are 35 %
 // darker than the centre (vignetting, or a lamp that moves with the camera)", and so on. The text

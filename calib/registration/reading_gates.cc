@@ -107,8 +107,8 @@ std::string RegistrationAdvice(const FocusSweep& sweep, const std::vector<FrameM
   return fmt::format("only {} of {} frames could be registered to one another{}", registered,
                      used.size(),
                      seen.empty() ? fmt::format(": {}", kNeeded)
-                     : BandsHideMostFrames(structure)
-                         ? fmt::format(": {}", seen)
+                     : BandsExplain(structure, used.size() - registered, used.size())
+                         ? fmt::format(": {}", BandsInWords(structure))
                          : fmt::format(": {}. If that is not the cause: {}", seen, kNeeded));
 }
 
@@ -166,15 +166,17 @@ void RejectUnregistered(const std::vector<ScaleSample>& samples,
                         const ScaleLaw& law, const FrameStructureFinding& structure,
                         std::vector<FrameMeasurement>* frames) {
   if (!law.done) return;
+  std::set<std::size_t> registered;
+  for (const ScaleSample& sample : samples) registered.insert(sample.frame);
+  const auto missing = static_cast<std::size_t>(std::count_if(
+      used.begin(), used.end(), [&](std::size_t i) { return registered.count(i) == 0; }));
   std::string why = "it shows another part of the target, or too little of it to be recognised";
   const std::string bands = "its rows or columns brighten in bands of their own";
-  if (BandsHideFrames(structure)) {
+  if (BandsExplain(structure, missing, used.size())) {
     why = bands;
   } else if (structure.HasBands()) {
     why = bands + ", or " + why;
   }
-  std::set<std::size_t> registered;
-  for (const ScaleSample& sample : samples) registered.insert(sample.frame);
   for (const std::size_t i : used) {
     if (registered.count(i) > 0) continue;
     (*frames)[i].rejection = fmt::format("cannot be registered: to {}, the sharpest frame; {}",

@@ -100,8 +100,9 @@ SharpestReading FindSharpestReading(const std::vector<FrameMeasurement>& frames,
     result.message = used.size() < kFewestFrames
                          ? fmt::format("{} of {} frames passed the checks, {} are needed",
                                        used.size(), frames.size(), kFewestFrames)
-                         : fmt::format("{} of {} frames have edges, {} are needed", samples.size(),
-                                       used.size(), kFewestFrames);
+                     : samples.empty() ? "no edges were measured in the frames"
+                                       : fmt::format("{} of {} frames have edges, {} are needed",
+                                                     samples.size(), used.size(), kFewestFrames);
     return result;
   }
   const std::size_t top = TopOf(samples);

@@ -51,6 +51,10 @@ void Rename(const fs::path& from, const fs::path& to, const std::string& shown) 
   if (failure) throw Error(fmt::format("{}: cannot be written: {}", shown, failure.message()));
 }
 
+// A file in the part of a run that writes in place. It says that the older content is no longer
+// complete.
+constexpr char kCommitBegun[] = ".commit-begun";
+
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -98,9 +102,11 @@ struct OutputFolder::Impl {
   // point.
   void RemoveLeftOver() const {
     if (!HasLeftOverPart(target.target, kInnerPartStem)) return;
-    content.RequireReplaceable(target.target, path, true, true);
+    // Without that file, the run was killed before it touched the content, which is somebody's.
+    const bool was_in_commit = HasLeftOverPart(target.target, kInnerPartStem, kCommitBegun);
+    content.RequireReplaceable(target.target, path, true, was_in_commit);
     std::error_code ignored;
-    if (!fs::exists(target.target / content.marker_file, ignored)) {
+    if (was_in_commit && !fs::exists(target.target / content.marker_file, ignored)) {
       for (const fs::path& entry : EntriesInPlace(target.target)) Remove(entry);
     }
     RemoveLeftOverParts(target.target, kInnerPartStem);
@@ -181,13 +187,20 @@ struct OutputFolder::Impl {
 
   void MoveContent() const {
     const fs::path& folder = target.target;
+    if (target.in_place) {
+      const std::string begun = (fs::path(part->path()) / kCommitBegun).string();
+      const Descriptor file(
+          ::open(begun.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+      if (file.get() < 0) throw CannotBeWritten(path, errno);
+    }
     std::error_code failure;
     fs::remove(folder / content.marker_file, failure);
     if (failure) throw Error(fmt::format("{}: cannot be replaced: {}", path, failure.message()));
     for (const fs::path& entry : EntriesInPlace(folder)) Remove(entry);
     for (const auto& entry : fs::directory_iterator(part->path(), failure)) {
       const std::string name = entry.path().filename().string();
-      if (name != content.marker_file) Rename(entry.path(), folder / name, Shown(name));
+      if (name != content.marker_file && name != kCommitBegun)
+        Rename(entry.path(), folder / name, Shown(name));
     }
     SyncFolder(folder);
     const fs::path marker = fs::path(part->path()) / content.marker_file;

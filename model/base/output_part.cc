@@ -143,8 +143,10 @@ bool IsPartName(const std::string& name, const std::string& stem) {
   return name.find_first_not_of("0123456789abcdef", beginning.size()) == name.size() - ending;
 }
 
-bool HasLeftOverPart(const fs::path& folder, const std::string& stem) {
+bool HasLeftOverPart(const fs::path& folder, const std::string& stem, const std::string& inner) {
   for (const std::string& path : PartsIn(folder, stem)) {
+    std::error_code ignored;
+    if (!inner.empty() && !fs::exists(fs::path(path) / inner, ignored)) continue;
     if (FoundPart(path).what() == Found::kLeftOver) return true;
   }
   return false;

@@ -38,7 +38,9 @@ class OutputPart {
 };
 
 // Returns true if a run of this user that has ended left such a part in the folder.
-bool HasLeftOverPart(const std::filesystem::path& folder, const std::string& stem);
+// If `inner` is not empty, only a part that contains an entry of this name counts.
+bool HasLeftOverPart(const std::filesystem::path& folder, const std::string& stem,
+                     const std::string& inner = "");
 // Removes such parts as far as possible.
 void RemoveLeftOverParts(const std::filesystem::path& folder, const std::string& stem);
 // Returns true if `name` is the name of a part with that stem.

@@ -62,7 +62,7 @@ class RunningPrograms {
   // does not ignore.
   static void AskToEnd(pid_t pid) {
     ::kill(pid, SIGTERM);
-    for (const int second : {SIGHUP, SIGINT, SIGTERM}) {
+    for (const int second : {SIGINT, SIGHUP, SIGTERM}) {
       struct sigaction now {};
       if (::sigaction(second, nullptr, &now) == 0 && now.sa_handler == SIG_IGN) continue;
       ::kill(pid, second);

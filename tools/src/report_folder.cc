@@ -14,14 +14,16 @@ ReportFolder::ReportFolder(const std::string& path) : path_(path) {
   std::error_code failure;
   if (path == "-") throw Error("-: a report cannot go to standard output; name a folder");
   if (path.empty() || fs::exists(path, failure)) return;
+  bool is_new = false;  // somebody else may make it at the same moment
   made_ = Temporary(
       [&] {
-        fs::create_directory(path, failure);
+        is_new = fs::create_directory(path, failure);
         if (failure)
           throw Error(fmt::format("{}: the folder cannot be made: {}", path, failure.message()));
         return path;
       },
       Abandon::kIfEmpty);
+  if (!is_new) made_ = {};
 }
 
 ReportFolder::~ReportFolder() {

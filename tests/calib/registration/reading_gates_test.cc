@@ -300,9 +300,12 @@ TEST(RejectUnregistered, NamesFramesThatShowSomethingElseWhereTheOthersFollowALa
   bench.structure.bands = model::Estimate{0.1, 0.01};
   reject();
   EXPECT_THAT(bench.frames[6].rejection, AllOf(HasSubstr("bands"), Not(HasSubstr("another part"))));
-  bench.structure.bands = model::Estimate{0.02, 0.002};
-  reject();
-  EXPECT_THAT(bench.frames[6].rejection,
+  Bench many;  // more frames than bands of 2 % cost
+  many.samples.resize(14);
+  many.law.done = true;
+  many.structure.bands = model::Estimate{0.02, 0.002};
+  RejectUnregistered(many.samples, many.Used(), 12, many.law, many.structure, &many.frames);
+  EXPECT_THAT(many.frames[20].rejection,
               AllOf(HasSubstr("bands"), HasSubstr("or it shows another part of the target")));
   bench.structure = {};
   reject();

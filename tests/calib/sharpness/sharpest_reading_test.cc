@@ -86,6 +86,9 @@ TEST(SharpestReading, SaysWhetherFramesOrEdgesAreMissing) {
   for (std::size_t i = 3; i < frames.size(); ++i) frames[i].normalised_edge_slope = 0;
   EXPECT_THAT(FindSharpestReading(frames, All(frames)).message,
               HasSubstr("3 of 31 frames have edges, 5 are needed"));
+  for (FrameMeasurement& frame : frames) frame.normalised_edge_slope = 0;
+  EXPECT_THAT(FindSharpestReading(frames, All(frames)).message, HasSubstr("no edges were measured"))
+      << "a sweep that is refused before that";
 }
 
 }  // namespace

@@ -306,6 +306,7 @@ TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNext) {
       if (!skip.empty()) return skip;
     }
     fs::create_directories(out + "/.thicklens.0123456789abcdef.part");
+    std::ofstream(out + "/.thicklens.0123456789abcdef.part/.commit-begun") << "";
     fs::create_directories(out + "/frames");
     std::ofstream(out + "/frames/half") << "x";
     std::ofstream(out + "/mine") << "x";
@@ -327,6 +328,7 @@ TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNextThatReplacesTheF
     const TemporaryFolder folder;
     const std::string out = folder / "out";
     fs::create_directories(out + "/.thicklens.0123456789abcdef.part/frames");
+    std::ofstream(out + "/.thicklens.0123456789abcdef.part/.commit-begun") << "";
     fs::create_directories(out + "/frames");
     std::ofstream(out + "/frames/old") << "x";
     if (is_whole) std::ofstream(out + "/" + kMarker) << "old";
@@ -343,6 +345,36 @@ TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNextThatReplacesTheF
     EXPECT_EQ(std::distance(fs::directory_iterator(out), {}), 2) << "marker and frames";
     EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
   }
+}
+
+// A run that was killed before it replaced anything says nothing about whose the content is.
+TEST(OutputPlace, WhatAKilledRunDidNotTouchIsKept) {
+  const TemporaryFolder folder;
+  const std::string out = folder / "out";
+  fs::create_directories(out + "/.thicklens.0123456789abcdef.part/frames");
+  fs::create_directories(out + "/frames");
+  std::ofstream(out + "/frames/photo.raw") << "mine";
+  EXPECT_THAT(ErrorOf([&] {
+                OutputFolder other(out, kMarker, {kMarker, "frames"});
+              }),
+              ::testing::HasSubstr("holds other files"));
+  EXPECT_EQ(ContentOf(out + "/frames/photo.raw"), "mine");
+  // A mount point is written in place.
+  RUN_IN_CHILD([&]() -> std::string {
+    const std::string place = folder / "place";
+    fs::create_directory(place);
+    for (const std::string& skip : {OwnMounts(), MountTmpfs(place)}) {
+      if (!skip.empty()) return skip;
+    }
+    fs::create_directories(place + "/.thicklens.0123456789abcdef.part");
+    fs::create_directories(place + "/frames");
+    std::ofstream(place + "/frames/photo.raw") << "mine";
+    const std::string refusal = ErrorOf([&] {
+      OutputFolder other(place, kMarker, {kMarker, "frames"});
+    });
+    return Unless(refusal.find("holds other files") != std::string::npos, refusal) +
+           Unless(ContentOf(place + "/frames/photo.raw") == "mine", "the photo is lost");
+  });
 }
 
 TEST(OutputPlace, AFullMountPointKeepsTheOlderContent) {
