@@ -10,53 +10,55 @@
 #include "thicklens/calib/frame_statistics.h"
 #include "thicklens/model/camera.h"
 
-// What a calibration finds.
+// These types report what a calibration finds.
 namespace thicklens::calib {
 
-// A result with both kinds of error: sigma is statistical, `systematic` an interval around it.
+// A result with both kinds of error: sigma is the statistical standard deviation, and `systematic`
+// is an interval around the value.
 struct Result {
   double value = 0;
   double sigma = 0;
   std::optional<Eigen::Vector2d> systematic;  // (lo, hi), absolute values
 };
 
-// One source of systematic error: how far each result may lie from its value because of it,
-// (lowest, highest) with lowest <= 0 <= highest, in the result's unit.
+// One source of systematic error. Each member is the interval (lowest, highest) in which the result
+// may differ from its value because of this source, with lowest <= 0 <= highest, in the result's
+// unit.
 struct SystematicPart {
   std::string name;  // "lens floor", "side of focus", "lens.front_focal_length_mm"
   Eigen::Vector2d focus_depth_mm{0, 0};
   Eigen::Vector2d image_distance_mm{0, 0};
   Eigen::Vector2d blur_ratio{0, 0};
-  std::string remedy;  // what would shrink it, said to a person at the bench
+  std::string remedy;  // action at the bench that would shrink this part
 };
 
-// What was measured on one frame. Depths are from Ap with the offset that was given or found.
+// The measurements on one frame. Depths are from Ap, and use the offset that was given or found.
 struct FrameMeasurement {
   std::string image;
   double reading_mm = 0;
   double depth_mm = 0;
   FrameStatistics statistics;
-  std::string rejection;             // empty: used
+  std::string rejection;             // empty if the frame is used
   double mean_edge_slope = 0;        // MES, linear grey per px
   double normalised_edge_slope = 0;  // MES over the frame's mean grey, per px
   int edge_count = 0;
-  double source_blur_sigma_px = 0;    // Zhuo-Sim as the source has it
-  double blur_sigma_px = 0;           // lens and defocus, pixel box and operator removed
+  double source_blur_sigma_px = 0;    // measured by the method of Zhuo and Sim, as in the paper
+  double blur_sigma_px = 0;           // of lens and defocus, without pixel box and operator
   double blur_sigma_error_px = 0;     // its standard deviation
   bool in_blur_fit = false;           // false: outside the meter's range, or rejected
-  std::string not_in_fit;             // why a frame that was not rejected is not in it
-  double blur_fit_weight = 0;         // 0 to 1, of the robust loss
+  std::string not_in_fit;             // reason why a frame that was not rejected is not in the fit
+  double blur_fit_weight = 0;         // 0 to 1, from the robust loss
   std::optional<double> image_scale;  // relative to the reference frame
   double image_scale_sigma = 0;       // its standard deviation
   bool in_scale_fit = false;
-  // Written reading minus the one that the joint fit believes, and its standard deviation; 0 in
-  // frames that are not in the fit.
+  // The written reading minus the joint fit's estimate of it, and the standard deviation of this
+  // difference. Both are 0 in frames that are not in the fit.
   double reading_error_mm = 0;
   double reading_error_sigma_mm = 0;
 };
 
-// The source's recipe: sharpest frame, then the mean of sigma/r_defocus. No error estimate: the
-// recipe has none.
+// Result of the paper's recipe: the depth of the sharpest frame, then the mean of sigma/r_defocus.
+// It has no error estimate because the recipe has none.
 struct SourceRecipe {
   bool done = false;
   std::string message = "not run";
@@ -65,12 +67,13 @@ struct SourceRecipe {
   double image_distance_mm = 0;
   double blur_ratio = 0;  // dominated by frames near focus (the ratio diverges there)
   int ratio_frames = 0;   // frames in the mean; the sharpest has r_defocus = 0 and is left out
-  // The same recipe with the index divided by the frame's mean grey.
+  // Result of the same recipe with the index divided by the frame's mean grey.
   int sharpest_normalised_frame = -1;
   double normalised_focus_depth_mm = 0;
 };
 
-// Normalised sharpness: a parabola through the logarithm over the top of the curve.
+// Peak of the normalised sharpness: a parabola is fitted to the logarithm over the top of the
+// curve.
 struct SharpnessPeak {
   bool done = false;
   std::string message = "not run";
@@ -80,65 +83,67 @@ struct SharpnessPeak {
   // [D70] log(index) = c0 + c1 x + c2 x^2, x = (1/z - 1/z0) z0, z0 = reference_depth_mm.
   Eigen::Vector3d log_parabola{0, 0, 0};
   double reference_depth_mm = 0;
-  double from_depth_mm = 0, to_depth_mm = 0;  // the frames fitted
+  double from_depth_mm = 0, to_depth_mm = 0;  // range of the fitted frames
 };
 
-// How the image scale goes with the reading.
+// Dependence of the image scale on the reading.
 enum class ScaleKind {
-  kUnknown,       // too few registrations, or none of the others
-  kInverseDepth,  // as 1/z: a camera whose pupil stands still
+  kUnknown,       // too few registrations, or none of the laws below
+  kInverseDepth,  // as 1/z: a camera whose pupil does not move
   kConstant,      // telecentric, or the sensor moves
-  kReversed,      // as 1/z with the other direction
+  kReversed,      // as 1/z with the opposite direction
 };
 
-// Bench zero from the image scale: 1/scale = (offset + direction * reading)/z_reference.
+// The bench zero from the image scale: 1/scale = (offset + direction * reading)/z_reference.
 struct ScaleLaw {
-  bool done = false;  // the offset was found; kInverseDepth alone
+  bool done = false;  // true if the offset was found; for kInverseDepth alone
   std::string message = "not run";
   ScaleKind kind = ScaleKind::kUnknown;
-  bool contradicts_readings = false;  // frames were registered, and most agree with no law at all
-  // By how much 1/scale grows over the range of the readings, relative: positive where the target
-  // looks smaller at larger readings ("away"). There whenever enough frames were registered.
+  bool contradicts_readings = false;  // most of the registered frames agree with no law at all
+  // Relative increase of 1/scale over the range of the readings: positive where the target looks
+  // smaller at larger readings ("away"). It is present whenever enough frames were registered.
   std::optional<model::Estimate> change_over_sweep;
-  bool shows_no_scale = false;  // the target looks the same at every scale (spokes): not looked for
+  bool shows_no_scale = false;  // the target (spokes) looks the same at any scale: not sought
   int reference_frame = -1;
-  Result offset_mm;  // the bench zero: where the aperture is
-  // The depth at which the size on the sensor goes to infinity, from the aperture: the light of a
-  // point off the axis spreads unevenly over the pupil (model::CentreOfPerspectiveMm, by the
-  // paper's law). It is part of offset_mm.
+  Result offset_mm;  // the bench zero: position of the aperture
+  // Depth, from the aperture, at which the size on the sensor goes to infinity. It is not 0 because
+  // the light of a point off the axis spreads unevenly over the pupil
+  // (model::CentreOfPerspectiveMm, by the paper's law). It is part of offset_mm.
   double centre_mm = 0;
   // The lowest and the highest offset_mm that the known pupil laws give.
   Eigen::Vector2d offset_of_pupil_laws_mm{0, 0};
-  // Of the reference frame, from there: 1/scale = (line_zero_mm + direction reading)/it.
+  // Depth of the reference frame from the centre of perspective:
+  // 1/scale = (line_zero_mm + direction * reading)/reference_depth_mm.
   double reference_depth_mm = 0;
   double line_zero_mm() const { return offset_mm.value - centre_mm; }
   double reading_rms_mm = 0;  // scatter of the readings about the law
   int frames_used = 0;
-  // Radial distortion that the registrations show: relative change of the image height at the
-  // corner of the region (positive: pincushion), if there were enough of them to tell.
+  // Radial distortion that the registrations show, as the relative change of the image height at
+  // the corner of the region (positive: pincushion). It is absent where too few registrations
+  // determine it.
   std::optional<model::Estimate> distortion_at_corner;
 };
 
-// What the image scale says of d1 where a length on the target is known (sweep file:
-// target_period_mm): m = f1 D/(f2 z), independent of sharpness.
+// d1 from the image scale where a length on the target is known (sweep file: target_period_mm):
+// m = f1 D/(f2 z). It does not depend on sharpness.
 struct MagnificationCheck {
   double period_px = 0;  // measured in the reference frame
   double period_mm = 0;  // as stated
   model::Estimate image_distance_mm;
 };
 
-// One frame's blur as it was measured, for the eye: an edge's profile, or the transfer relative to
-// the reference against frequency.
+// The measured blur of one frame, for plots: an edge's profile, or the transfer relative to the
+// reference against frequency.
 struct BlurExample {
   int frame = -1;  // index into frames
   bool is_edge = false;
-  std::vector<double> x;         // edge: distance from it, px; else frequency, cycles per px
-  std::vector<double> measured;  // edge: 0 dark to 1 bright; else transfer, 1 at frequency 0
-  std::vector<double> gaussian;  // the fit with a Gaussian, at x
-  std::vector<double> disc;      // the fit with a disc, at x; may be empty
+  std::vector<double> x;         // distance from the edge, px; or frequency, cycles per px
+  std::vector<double> measured;  // edge: 0 dark to 1 bright; or transfer, 1 at frequency 0
+  std::vector<double> gaussian;  // fit with a Gaussian, at x
+  std::vector<double> disc;      // fit with a disc, at x; may be empty
 };
 
-// One side of focus fitted alone.
+// Result of a fit to the frames on one side of focus.
 struct SideFit {
   bool done = false;
   std::string message = "not run";
@@ -147,9 +152,9 @@ struct SideFit {
   int frames_used = 0;
 };
 
-// Focus over the field: the same fit on each tile of a regular grid.
+// Focus over the field, from the same fit on each tile of a regular grid.
 struct FieldTile {
-  Eigen::Vector2d centre_px{0, 0};  // in the full picture
+  Eigen::Vector2d centre_px{0, 0};  // in the full image
   bool done = false;
   std::string message = "not run";
   model::Estimate focus_depth_mm;
@@ -164,16 +169,17 @@ struct FieldMap {
   std::string message = "not run";
   int columns = 0, rows = 0;
   std::vector<FieldTile> tiles;  // row by row
-  // zf(x, y) = centre + tilt + curvature; absent where too few tiles were fitted.
-  // Degrees between the target and the sensor about the vertical and the horizontal axis: positive
-  // where the target's right side, or its bottom, is nearer to the camera.
+  // The model is zf(x, y) = centre + tilt + curvature; its terms are absent where too few tiles
+  // were fitted. The tilts are the angles in degrees between the target and the sensor about the
+  // vertical and the horizontal axis: positive where the target's right side, or its bottom, is
+  // nearer to the camera.
   std::optional<model::Estimate> tilt_right_deg, tilt_down_deg;
-  std::optional<model::Estimate> curvature_mm;    // zf at the outermost tile minus at the centre
-  std::optional<model::Estimate> astigmatism_mm;  // zf of horizontal blur minus of vertical blur
-  std::vector<DepthCluster> clusters;             // one: the target is at one depth
+  std::optional<model::Estimate> curvature_mm;    // zf at the outermost tile minus zf at the centre
+  std::optional<model::Estimate> astigmatism_mm;  // zf of horizontal blur minus zf of vertical blur
+  std::vector<DepthCluster> clusters;             // a single cluster: the target is at one depth
 };
 
-// One colour channel fitted alone.
+// Result of a fit to one colour channel.
 struct ChannelFocus {
   std::string name;  // "red", "green", "blue"
   bool done = false;
@@ -181,28 +187,29 @@ struct ChannelFocus {
   model::Estimate focus_depth_mm;
 };
 
-// sigma^2 = S0 + A (1/z - 1/zf)^2, fitted by Ceres in (zf, kappa, floor); the bench zero is held
-// and its error carried into the results.
+// The fit of sigma^2 = S0 + A (1/z - 1/zf)^2 by Ceres in (zf, kappa, floor). The bench zero is
+// held, and its error is propagated to the results.
 struct BlurFit {
   bool done = false;
   std::string message = "not run";
   double chi2_per_dof = 0;
   int frames_used = 0;
   std::vector<std::string> undetermined;  // parameters that the data do not fix
-  std::string weak_direction;             // the combination of parameters that is known worst
-  double weak_correlation = 0;            // theirs
+  std::string weak_direction;             // the combination of parameters that is least certain
+  double weak_correlation = 0;            // correlation of these parameters
   std::string meter;                      // "edges" or "relative spectrum"
-  // The PSF family whose second moment the blur ratio is, and, of spectra, the band of the fit: up
-  // to this 2 pi^2 sigma^2 nu^2, with sigma the blur beyond that of the sharpest frame.
+  // The PSF family whose second moment is the blur ratio. For spectra also the band of the fit:
+  // frequencies up to this value of 2 pi^2 sigma^2 nu^2, where sigma is the blur beyond that of the
+  // sharpest frame.
   model::Psf family = model::Psf::kGaussian;
   std::optional<double> band;
-  // How the family's shape was changed, its second moment held, because the frames show it beyond
+  // Change of the family's shape at constant second moment, applied where the frames show it beyond
   // doubt: H exp(4 tails u^2), u = 2 pi^2 sigma^2 nu^2. A pupil that obeys the sine condition has
-  // about (kappa r/d1)^2/2. 0: not at all.
+  // about (kappa r/d1)^2/2. 0: no change.
   double tails = 0;
   model::Psf better_psf = model::Psf::kGaussian;       // the shape that describes the frames better
-  std::optional<double> gaussian_misfit, disc_misfit;  // chi^2 per dof of the meter with each
-  double outside_mm = 0;  // how far the focus lies outside the sweep; 0: inside
+  std::optional<double> gaussian_misfit, disc_misfit;  // chi^2 per dof of the meter with each shape
+  double outside_mm = 0;  // distance of the focus outside the sweep; 0: inside
 };
 
 enum class Outcome { kOk, kPartial, kRefused };
@@ -210,7 +217,7 @@ std::string OutcomeName(Outcome outcome);
 
 struct Calibration {
   Outcome outcome = Outcome::kRefused;
-  std::string reason = "not run";     // of anything but kOk
+  std::string reason = "not run";     // reason of an outcome other than kOk
   std::vector<std::string> warnings;  // one line each
 
   std::optional<Result> image_distance_mm;
@@ -218,16 +225,17 @@ struct Calibration {
   std::optional<Result> blur_ratio;
   std::optional<Result> blur_floor_px;
   std::optional<Result> bench_offset_mm;
-  // Of the parameters named, in their units; sigma^2 on the diagonal.
+  // Covariance of the named parameters, in their units; sigma^2 is on the diagonal.
   std::vector<std::string> covariance_order;
   Eigen::MatrixXd covariance;
 
-  // What was determined even where the rest is refused; needs neither camera nor bench zero.
+  // Results that are determined even where the rest is refused. They need neither camera nor bench
+  // zero.
   SharpestReading sharpest;
-  // The reading of the plane of focus by the blur fit, whose error does not hold the bench zero's:
-  // where focus lies in the sweep.
+  // Reading at the plane of focus by the blur fit: the position of focus in the sweep. Its error
+  // does not include that of the bench zero.
   std::optional<model::Estimate> focus_reading_mm;
-  // The symptoms whose causes were compared, with what was named.
+  // The symptoms whose causes were compared, with the causes that are named.
   std::vector<Diagnosis> diagnoses;
   FrameStructureFinding structure;
 
@@ -235,15 +243,15 @@ struct Calibration {
   SharpnessPeak sharpness;
   ScaleLaw scale;
   BlurFit blur;
-  SideFit nearer, farther;  // the frames on each side of focus alone
+  SideFit nearer, farther;  // fits of the frames on each side of focus
   FieldMap field;
   std::vector<ChannelFocus> channels;  // of colour frames
   std::optional<MagnificationCheck> magnification;
-  std::vector<SystematicPart> systematic_parts;  // largest first, by their part of d1
-  std::string advice;                            // what would shrink the largest error, and to what
-  std::vector<BlurExample> examples;             // nearest, sharpest and farthest frame
+  std::vector<SystematicPart> systematic_parts;  // sorted by their part of d1, the largest first
+  std::string advice;                            // how to shrink the largest error, and to what
+  std::vector<BlurExample> examples;             // the nearest, the sharpest and the farthest frame
   std::vector<FrameMeasurement> frames;          // in the sweep's order
-  int frames_used = 0;  // in the blur fit; before there is one, those that passed the gates
+  int frames_used = 0;  // in the blur fit, or, before the fit, the frames that passed the gates
   double seconds = 0;
 };
 

@@ -10,49 +10,51 @@
 
 namespace thicklens::calib {
 
-// One cause that may be behind a symptom, and how well it explains the samples.
+// One possible cause of a symptom, and how well it explains the samples.
 struct CauseFit {
   std::string cause;  // "the lens moves", in the words of docs/reasons.md
-  // Of the samples, with the cause's own parameters at their best; what is known of lenses (blur
-  // ratio, distortion) is one sample more.
+  // chi^2 of the samples with the best values of the cause's own parameters. Prior knowledge of
+  // lenses (blur ratio, distortion) counts as one more sample.
   double chi2 = 0;
 };
 
-// A symptom with the causes that were compared. Only what explains the samples better than every
-// other cause by kDecisive, and better than no cause at all by as much, is named alone.
+// A symptom with the causes that were compared. A cause is named alone only if it explains the
+// samples better by kDecisive than every other cause, and by as much better than no cause at all.
 struct Diagnosis {
-  static constexpr double kDecisive = 16;  // of chi^2: four standard deviations
+  static constexpr double kDecisive = 16;  // difference of chi^2: four standard deviations
 
   std::string symptom;
-  double chi2_of_none = 0;       // of the samples if there were no cause
+  double chi2_of_none = 0;       // chi^2 of the samples if there were no cause
   std::vector<CauseFit> causes;  // sorted by SortCauses: the best first
-  std::size_t named = 0;         // how many of them, from the first on, cannot be told apart
-  std::string separates;         // what would tell those apart
+  std::size_t named = 0;         // number of causes, from the first, that cannot be distinguished
+  std::string separates;         // observation that would distinguish these causes
 
-  // Whether the cause is named, and whether it is the only one.
+  // Whether the cause is named, and whether it is the only named one.
   bool Names(const std::string& cause) const;
   bool NamesOnly(const std::string& cause) const;
 };
 
-// Sorts the causes and counts those to be named: none where the best one is not significant, else
-// all within kDecisive of it.
+// Sorts the causes and counts those to be named: none where the best one is not significant;
+// otherwise all within kDecisive of it.
 void SortCauses(Diagnosis* diagnosis);
 
-// Where a sweep is sharpest: the peak of the normalised sharpness against the reading. It needs no
-// camera, no bench zero and no direction.
+// The reading at which a sweep is sharpest: the peak of the normalised sharpness against the
+// reading. It needs no camera, no bench zero and no direction.
 struct SharpestReading {
   bool done = false;
   std::string message = "not run";
   model::Estimate reading_mm;
   int frames_used = 0;
-  // Index into the frames of the sharpest one by itself, whether there is a peak or not.
+  // Index into the frames of the sharpest single frame, whether there is a peak or not.
   int sharpest_frame = -1;
 };
 
-// What of a frame's picture stays where it is on the sensor while the target changes its size, or
-// belongs to the light and not to the target. Each is there only where it could be measured.
+// Structure of the frames that stays in place on the sensor while the target changes its size, or
+// that belongs to the light and not to the target. Each value is present only where it could be
+// measured.
 struct FrameStructureFinding {
-  // What matters to registrations. Of the logarithm: what less does to a scale is below its errors.
+  // Limits, as differences of the logarithm of the light, above which the structure matters to
+  // registrations: the effect of less on an image scale is below the scale's errors.
   static constexpr double kLeastVignetting = 0.1;
   static constexpr double kLeastBands = 0.01, kLeastFixed = 0.002;
   static constexpr double kSignificant = 4;  // standard deviations
@@ -61,14 +63,15 @@ struct FrameStructureFinding {
   // ln of the light at the region's corner over that at its centre, fixed to the frame: negative
   // where the corners are darker.
   std::optional<model::Estimate> vignetting;
-  // Relative standard deviation of brightness from row to row that is another one in each frame, if
-  // it exceeds what goes from column to column; or the other way round.
+  // Relative standard deviation of the brightness between rows, in a pattern that differs from
+  // frame to frame, if it exceeds the deviation between columns; or the other way round.
   std::optional<model::Estimate> bands;
   bool bands_are_columns = false;
   // Relative standard deviation of fine structure that stays in place (dust, hot pixels, overlays).
   std::optional<model::Estimate> fixed_structure;
 
-  // Beyond four standard deviations, and large enough to matter to registrations.
+  // Whether the structure exceeds four standard deviations and is large enough to matter to
+  // registrations.
   bool HasVignetting() const;
   bool HasBands() const;
   bool HasFixedStructure() const;
