@@ -31,8 +31,8 @@ DecodeTable MakeDecodeTable(const model::TransferCurve& transfer, std::size_t le
   return table;
 }
 
-// From stored values to linear light; kept for the next frame, which mostly comes from the same
-// camera.
+// Returns the table from stored values to linear light. It is kept for the next frame, which is
+// usually from the same camera.
 std::shared_ptr<const DecodeTable> DecodeTableOf(const model::TransferCurve& transfer,
                                                  std::size_t levels) {
   struct Kept {

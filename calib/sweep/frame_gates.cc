@@ -20,10 +20,10 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr int kBlock = 16;  // px, side of the blocks in which noise and mosaic are looked for
+constexpr int kBlock = 16;  // px, side of the blocks for noise and mosaic
 
-// Standard deviation of a pixel: in 16 x 16 blocks the rms of (p00 - p10 - p01 + p11)/2, which
-// cancels any slope; of these the 25th percentile, where the target is flat.
+// Standard deviation of a pixel: the rms of (p00 - p10 - p01 + p11)/2, which cancels any slope, in
+// 16 x 16 blocks. The 25th percentile of the blocks is taken, where the target is flat.
 double NoiseSigma(const cv::Mat& grey) {
   std::vector<double> blocks;
   for (int y0 = 0; y0 + kBlock < grey.rows; y0 += kBlock) {
@@ -47,10 +47,10 @@ double NoiseSigma(const cv::Mat& grey) {
   return *quarter;
 }
 
-// How far the mean of each of the four sub-lattices of 2 x 2 px lies from the block's, relative.
+// Relative deviation of the mean of each of the four sub-lattices of 2 x 2 px from the block's.
 template <typename Value>
 std::array<double, 4> LatticeDeviations(const cv::Mat& stored, int y0, int x0, double* mean) {
-  std::array<std::array<std::uint32_t, kBlock>, 2> columns{};  // of even and odd rows
+  std::array<std::array<std::uint32_t, kBlock>, 2> columns{};  // sums of the even and the odd rows
   for (int y = 0; y < kBlock; ++y) {
     const auto* row = stored.ptr<Value>(y0 + y) + x0;
     auto& sums = columns[static_cast<std::size_t>(y % 2)];
@@ -68,12 +68,12 @@ std::array<double, 4> LatticeDeviations(const cv::Mat& stored, int y0, int x0, d
 }
 
 // A colour filter over the pixels makes one of the four sub-lattices of 2 x 2 px brighter or darker
-// all over the frame. A texture does that in one block or other, to either side; a period of
-// exactly 2 px all over the frame is beyond what a lens resolves.
+// over the whole frame. A texture does that only in single blocks, and in both directions: a lens
+// does not resolve a period of exactly 2 px over the whole frame.
 template <typename Value>
 bool HasColourFilter(const cv::Mat& stored) {
   constexpr double kLeastDeviation = 0.04;  // gains of a sensor's own columns differ by 0.01
-  constexpr double kPersistent = 0.9;       // of the blocks
+  constexpr double kPersistent = 0.9;       // share of the blocks
   const double full_scale = std::numeric_limits<Value>::max();
   std::array<std::vector<double>, 4> deviations;
   for (int y0 = 0; y0 + kBlock <= stored.rows; y0 += kBlock) {
@@ -103,8 +103,8 @@ bool IsMosaic(const cv::Mat& stored) {
                                  : HasColourFilter<std::uint16_t>(stored);
 }
 
-// Eight bytes at a time through the multiply and shift of splitmix64; the last ones of a row padded
-// with zeros.
+// Mixes eight bytes at a time by the multiply and shift of splitmix64. The last bytes of a row are
+// padded with zeros.
 std::uint64_t ContentHash(const cv::Mat& stored) {
   std::uint64_t hash = 0;
   const auto mix = [&hash](std::uint64_t word) {
@@ -127,13 +127,14 @@ std::uint64_t ContentHash(const cv::Mat& stored) {
   return hash;
 }
 
-// Gaussian smoothing by a sigma of many pixels: on the picture shrunk by whole blocks to a sigma of
-// 5 to 10 blocks, enlarged again by straight lines.
+// Gaussian smoothing by a sigma of many pixels: the image is shrunk by whole blocks, smoothed by a
+// sigma of 5 to 10 blocks, and enlarged again by linear interpolation.
 cv::Mat WidelySmoothed(const cv::Mat& grey, double sigma_px) {
   int shrink = 1;
   while (sigma_px / (2 * shrink) >= 5) shrink *= 2;
   if (shrink == 1) return Smoothed(grey, sigma_px);
-  // Mirrored as far as the kernel reaches, so that the borders are those of the whole frame.
+  // The frame is mirrored as far as the kernel reaches, so that the borders are those of the whole
+  // frame.
   const auto margin = [&](int length_px) {
     const int reach_px = std::min(static_cast<int>(std::ceil(5 * sigma_px)), length_px - 1);
     return (reach_px + shrink - 1) / shrink * shrink;
@@ -144,16 +145,17 @@ cv::Mat WidelySmoothed(const cv::Mat& grey, double sigma_px) {
   cv::copyMakeBorder(grey, padded, top, top + rest(grey.rows), left, left + rest(grey.cols),
                      cv::BORDER_REFLECT_101);
   cv::resize(padded, small, padded.size() / shrink, 0, 0, cv::INTER_AREA);
-  // [D86] The mean over a block of n px is a blur of variance (n^2 - 1)/12; straight lines between
-  // points n px apart, taken at n places between them, are on the average one of n^2/6 + 1/12.
+  // [D86] The mean over a block of n px is a blur of variance (n^2 - 1)/12. Linear interpolation
+  // between points n px apart, at n places between them, is on average a blur of variance n^2/6 +
+  // 1/12.
   const double variance_px2 = sigma_px * sigma_px - 0.25 * shrink * shrink;
   cv::resize(Smoothed(small, std::sqrt(variance_px2) / shrink), wide, padded.size(), 0, 0,
              cv::INTER_LINEAR);
   return wide(cv::Rect(left, top, grey.cols, grey.rows));
 }
 
-// White noise n, averaged over 4 x 4 px and smoothed by a Gaussian of one of those: n/4/(2
-// sqrt(pi)).
+// White noise of standard deviation n, averaged over 4 x 4 px and smoothed by a Gaussian with sigma
+// of one such block, has n/4/(2 sqrt(pi)).
 double CoarseTexture(const cv::Mat& grey, const cv::Mat& slow, double noise_sigma) {
   constexpr int kShrink = 4;
   if (grey.cols < 8 * kShrink || grey.rows < 8 * kShrink) return 0;
@@ -172,7 +174,7 @@ std::string RejectionKind(const std::string& rejection) {
   std::string kind = rejection.substr(0, rejection.find_first_of(":,0123456789"));
   const auto trim = [&kind] { kind.erase(kind.find_last_not_of(" -+.") + 1); };
   trim();
-  // What is left where the amount stands in the middle: "reading off by 15.1 mm".
+  // The preposition is left where the amount is in the middle: "reading off by 15.1 mm".
   const std::string preposition = " by";
   if (kind.size() > preposition.size() &&
       kind.compare(kind.size() - preposition.size(), preposition.size(), preposition) == 0)
@@ -203,7 +205,7 @@ FrameStatistics MeasureFrame(const cv::Mat& stored, const cv::Mat& linear_grey) 
   const cv::Mat smoothed = Smoothed(linear_grey, 1);
   result.top_gradient = Quantile(CentralGradient(smoothed).magnitude, 0.995);
   if (result.mean_linear > 0) {
-    // What a lamp, a vignette or a shadow does over a sizeable part of the field is no texture.
+    // Variation by a lamp, a vignette or a shadow over a sizeable part of the field is no texture.
     const cv::Mat slow = WidelySmoothed(
         linear_grey, std::max(4.0, std::min(linear_grey.cols, linear_grey.rows) / 25.0));
     cv::Scalar mean, deviation;
@@ -239,7 +241,8 @@ std::optional<std::string> RejectionReason(const FrameStatistics& frame, double 
         kKindBlack, 100 * frame.black_fraction, frame.black_level,
         100 * options.max_black_fraction);
   }
-  // White noise of standard deviation n, smoothed by sigma 1 px: derivative n/sqrt(8 pi) per axis.
+  // White noise of standard deviation n, smoothed by sigma 1 px, has derivatives of n/sqrt(8 pi)
+  // per axis.
   const double noise_gradient = frame.noise_sigma / std::sqrt(8 * CV_PI);
   if (!(frame.top_gradient > options.min_gradient_to_noise * noise_gradient) &&
       !(frame.coarse_texture > options.min_coarse_texture)) {

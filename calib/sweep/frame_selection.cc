@@ -14,10 +14,11 @@
 namespace thicklens::calib {
 namespace {
 
-// Fewer edges than this and a contrast below this part of the median: the target is not to be seen.
+// The target is not visible in a frame with fewer edges than this and a contrast below this part of
+// the median.
 constexpr int kFewestEdges = 12;
 constexpr double kFaintContrast = 0.5;
-// Unless it still shows where the noise is averaged out.
+// A frame of this coarse texture is kept: the target is visible where the noise is averaged out.
 constexpr double kClearTexture = 3;
 // Frames of a texture cannot be registered in a smaller region.
 constexpr int kSmallestTextureRegionPx = 64;
@@ -101,8 +102,8 @@ std::optional<std::string> FrameSelection::KeepOnly(const Reason& reason) {
   return TooFewUsable(distinct.size());
 }
 
-// "3 of 35 frames can be used, 5 are needed. Rejected: dark (30 frames), blank (2 frames), such as
-// frame_000.png: dark: ...".
+// Returns, for example, "3 of 35 frames can be used, 5 are needed. Rejected: dark (30 frames),
+// blank (2 frames), such as frame_000.png: dark: ...".
 std::string FrameSelection::TooFewUsable(std::size_t distinct_readings) const {
   struct Kind {
     int frames = 0;
@@ -136,7 +137,7 @@ std::string FrameSelection::TooFewUsable(std::size_t distinct_readings) const {
 
 std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
                            const std::function<bool()>& have_16_bits) {
-  constexpr double kClearGradient = 30;  // of the noise's own
+  constexpr double kClearGradient = 30;  // in units of the noise's gradient
   std::size_t over = 0, under = 0, clear = 0;
   std::vector<double> means;
   for (const FrameMeasurement& frame : frames) {
@@ -155,7 +156,8 @@ std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
   if (2 * over > frames.size())
     return advice(over, "over-exposed", "lower the exposure (shorter time, less light or gain)");
   constexpr double kSixteenBits = 65535;
-  // A hundred steps of the mean alone: no eight bits show so dark a picture so finely.
+  // The mean alone is more than a hundred steps of 16 bits: 8 bits do not resolve so dark an image
+  // so finely.
   if (2 * under > frames.size() && 2 * clear > under && Median(means) * kSixteenBits > 100 &&
       have_16_bits()) {
     return fmt::format(

@@ -14,33 +14,34 @@
 namespace thicklens::calib {
 
 inline constexpr std::size_t kFewestFrames = 5;
-// Edge pixels of the sharpness index: gradients above this part of the sweep's steepest.
+// Edge pixels of the sharpness index have gradients above this part of the sweep's steepest.
 inline constexpr double kEdgeThreshold = 0.25;
 
-// Files are named as the table of readings names them, not by where they lie on this machine.
+// Returns the file's name as in the table of readings, without its directory on this machine.
 std::string FileName(const std::string& image);
 
-// The frames of a sweep, of which one gate after the other throws some out.
+// The frames of a sweep that are in use; the gates reject others one after the other.
 class FrameSelection {
  public:
-  // All are in use. `frames` must outlive it.
+  // All frames are in use at first. `frames` must outlive this object.
   explicit FrameSelection(std::vector<FrameMeasurement>* frames);
 
   const std::vector<std::size_t>& used() const { return used_; }
 
-  // Each sets the `rejection` of the used frames that it throws out, and gives the reason for a
-  // refusal if too few are left.
+  // Each Keep function sets the `rejection` of the used frames that it rejects. It returns the
+  // reason for a refusal if too few are left.
 
-  // Absolute gates on the levels, then the blank gate against the median of those that passed.
+  // Applies the absolute gates on the levels, then the blank gate against the median of the frames
+  // that passed them.
   std::optional<std::string> KeepMeasurable(const GateOptions& gates);
-  // Shading alone passes the gates of contrast and gradient. What has no edge worth the name and
-  // little contrast besides does not show the target any more.
+  // Rejects frames with hardly any edge, little contrast and no clear texture: they do not show the
+  // target any more, but shading alone passes the gates of contrast and gradient.
   std::optional<std::string> KeepThoseWithEdges();
-  // Nearer than the front focal point no image forms: such a frame shows something else, such as
-  // the lens resting on the target.
+  // Rejects frames nearer than the front focal point. No image of the target forms there: such a
+  // frame shows another object, or the lens rests on the target.
   std::optional<std::string> KeepPossibleDepths(double bench_offset_mm,
                                                 double front_focal_length_mm);
-  // Leaves out those whose `rejection` was set by others.
+  // Removes the frames whose `rejection` was set elsewhere.
   std::optional<std::string> KeepUnrejected();
 
  private:
@@ -52,18 +53,19 @@ class FrameSelection {
   std::vector<std::size_t> used_;
 };
 
-// What to do about the light where most of the frames were rejected for it: "39 of 41 frames are
-// over-exposed: lower the exposure ...". Whatever else went wrong is then a consequence. Empty
-// where the light was not at fault. Dark pictures whose texture is clear are not simply
-// under-exposed where their files have 16 bits (asked only then): values of 10 or 12 bits look like
-// that, too.
+// Advice about the light where it caused the rejection of most of the frames: "39 of 41 frames are
+// over-exposed: lower the exposure ...". Any other fault is then a consequence. The advice is empty
+// where the light was not at fault. Dark images with a clear texture are not simply under-exposed
+// where their files have 16 bits (`have_16_bits` is called only then): values of 10 or 12 bits look
+// the same.
 std::string ExposureAdvice(const std::vector<FrameMeasurement>& frames,
                            const std::function<bool()>& have_16_bits);
 
-// In a region whose shorter side is less, nothing at all can be measured.
+// Nothing can be measured in a region whose shorter side is less than this.
 inline constexpr int kSmallestRegionPx = 24;
 int RegionSidePx(const FocusSweep& sweep);
-// The region's size and what is needed, where it is too small for some of the targets; else empty.
+// The region's size and the required size, if the region is too small for some of the targets;
+// otherwise empty.
 std::string RegionAdvice(const FocusSweep& sweep);
 
 }  // namespace thicklens::calib

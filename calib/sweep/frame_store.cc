@@ -10,8 +10,8 @@ cv::Mat FrameStore::Stored(std::size_t index) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!kept_[index].empty()) return kept_[index];
   }
-  // Read without the lock: decoding is what threads are there for. Two that ask for one frame at
-  // the same time both read it.
+  // The frame is read without the lock, so that threads decode in parallel. Two threads that
+  // request the same frame at the same time both read it.
   const cv::Mat stored = sweep_.read_frame(index);
   const std::size_t bytes = stored.total() * stored.elemSize();
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -10,9 +10,10 @@
 
 namespace thicklens::calib {
 
-// The frames of a sweep for steps that look at them again and again. Frames are kept as they were
-// read, first come first kept, up to a limit in all; beyond it a frame is read anew each time, so
-// that memory does not grow with the sweep. Thread safe; results do not depend on what is kept.
+// The frames of a sweep for steps that use them repeatedly. The first frames that are read are kept
+// as they were read, up to a limit of memory in all. Beyond the limit a frame is read again each
+// time, so that memory does not grow with the sweep. The store is thread safe, and results do not
+// depend on which frames are kept.
 class FrameStore {
  public:
   static constexpr std::size_t kDefaultLimit = std::size_t{128} << 20;  // bytes
@@ -20,13 +21,14 @@ class FrameStore {
   // `sweep` must outlive the store.
   explicit FrameStore(const FocusSweep& sweep, std::size_t byte_limit = kDefaultLimit);
 
-  // The whole frame as its file stores it; not to be written to. Throws what the reader throws.
+  // Returns the whole frame as its file stores it. The caller must not write to it. Throws what the
+  // reader throws.
   cv::Mat Stored(std::size_t index);
 
-  // The region of interest in linear light, CV_32F.
+  // Returns the region of interest in linear light, CV_32F.
   cv::Mat Grey(std::size_t index);
-  // One colour: 0 red, 1 green, 2 blue; of a frame with one channel 0 alone. Throws Error if the
-  // frame has no such channel.
+  // Returns one colour channel: 0 red, 1 green, 2 blue; a frame with one channel has 0 alone.
+  // Throws Error if the frame has no such channel.
   cv::Mat Channel(std::size_t index, int channel);
 
   std::size_t kept_bytes() const;
@@ -35,7 +37,7 @@ class FrameStore {
   const FocusSweep& sweep_;
   const std::size_t byte_limit_;
   mutable std::mutex mutex_;
-  std::vector<cv::Mat> kept_;  // empty where a frame is not
+  std::vector<cv::Mat> kept_;  // empty where a frame is not kept
   std::size_t kept_bytes_ = 0;
 };
 

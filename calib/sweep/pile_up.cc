@@ -16,7 +16,8 @@ using Histogram = std::vector<double>;
 
 int ColourChannels(const cv::Mat& stored) { return stored.channels() == 4 ? 3 : stored.channels(); }
 
-// Counted in turns, so that a run of one value does not wait for its own last count.
+// Counts into several tables in turn, so that the count of a repeated value does not wait for the
+// previous one.
 template <typename Value>
 Histogram CountValues(const cv::Mat& stored, int channel, std::size_t levels) {
   constexpr int kTurns = 4;
@@ -39,17 +40,17 @@ Histogram HistogramOf(const cv::Mat& stored, int channel) {
 }
 
 // [D87] The share of a plateau's pixels that have its most frequent value, where the noise is at
-// least what Believed() asks for: erf(0.5/(sqrt(2) 0.41)) = .78 for a standard deviation of .41,
-// which rounding makes .5.
+// least what Believed() requires: erf(0.5/(sqrt(2) 0.41)) = 0.78 for a standard deviation of 0.41,
+// which rounding raises to 0.5.
 constexpr double kMostOfAPlateau = 0.85;
 
-// Clipping anywhere: the brightest value that the channel uses holds many pixels while the values
-// just below hold few of them. A camera may clip below full scale (one at 240 to 248 of 255).
+// Finds clipping at any level: the brightest value that the channel uses has many pixels, and the
+// values just below it have few. A camera may clip below full scale (one at 240 to 248 of 255).
 PileUp BrightPileUp(const Histogram& histogram, double total) {
   const std::size_t top = histogram.size() - 1;
   if (histogram[top] > 0.001 * total) return {histogram[top] / total, 1};
-  // JPEG and a colour matrix smear the clipped value over some neighbours: the brightest 1/64 of
-  // the range that is in use is compared with the three stretches of that width below it.
+  // JPEG and a colour matrix smear the clipped value over some neighbours. Therefore the brightest
+  // 1/64 of the range in use is compared with the three stretches of that width below it.
   const std::size_t width = std::max<std::size_t>(1, histogram.size() / 64);
   double above = 0;
   std::size_t end = histogram.size();
@@ -62,9 +63,9 @@ PileUp BrightPileUp(const Histogram& histogram, double total) {
   const double bright = sum(end - width, end);
   const double below = sum(end - 4 * width, end - width) / 3;
   if (!(bright > 4 * below)) return {};
-  // A plateau of the target is spread by noise to both sides of its middle, over more than one
-  // value; clipping cuts the upper side off.
-  const auto value_at = [&](double fraction) {  // within a value as if it were spread evenly
+  // Noise spreads a plateau of the target to both sides of its middle, over more than one value.
+  // Clipping cuts the upper side off.
+  const auto value_at = [&](double fraction) {  // as if a value were spread evenly
     double count = 0;
     std::size_t value = end - width;
     while (value + 1 < end && count + histogram[value] < fraction * bright)
@@ -80,8 +81,8 @@ PileUp BrightPileUp(const Histogram& histogram, double total) {
   return {bright / total, static_cast<double>(end - 1) / static_cast<double>(top)};
 }
 
-// Where the noise is below the steps of the file, every plateau piles up on one value: only the end
-// of the scale counts there.
+// Where the noise is below the steps of the file, every plateau piles up on one value: only a
+// pile-up at the end of the scale counts there.
 PileUp Believed(PileUp found, double noise_levels) {
   return found.level < 1 && !(noise_levels > 0.5) ? PileUp() : found;
 }
@@ -94,7 +95,7 @@ bool IsDark(const Value* pixel, int channels, double limit) {
   return false;
 }
 
-// Marks the dark pixels, CV_8U, of every second row and column: enough for areas.
+// Marks the dark pixels, CV_8U, of every second row and column, which suffices for areas.
 template <typename Value>
 cv::Mat DarkMask(const cv::Mat& stored, double limit) {
   cv::Mat mask = cv::Mat::zeros((stored.rows + 1) / 2, (stored.cols + 1) / 2, CV_8U);
@@ -133,7 +134,8 @@ PileUps FindPileUps(const cv::Mat& stored, double noise_sigma) {
 
 bool DarkIsOneSide(const cv::Mat& stored, double level) {
   const bool bytes = stored.depth() == CV_8U;
-  // With what noise or a smeared pile-up leaves just above it.
+  // The limit includes the values just above the level, over which noise or a smeared pile-up
+  // spreads.
   const double limit = (level + 1.0 / 64) * (bytes ? 255 : 65535);
   const cv::Mat mask =
       bytes ? DarkMask<std::uint8_t>(stored, limit) : DarkMask<std::uint16_t>(stored, limit);
@@ -165,8 +167,8 @@ bool DarkIsOneSide(const cv::Mat& stored, double level) {
       black[bin] += mask.at<std::uint8_t>(y, x);
     }
   }
-  // The side that holds 98 % of the dark pixels: an edge leaves the other side free of them, and
-  // fills its own but for the noise above black.
+  // Find the side that holds 98 % of the dark pixels. An edge leaves the other side free of them,
+  // and fills its own side except for the noise above black.
   double area = 0, found = 0;
   for (std::size_t i = 0; i < all.size() && found < 0.98 * dark.count; ++i) {
     area += all[i];

@@ -5,20 +5,21 @@
 
 namespace thicklens::calib {
 
-// Pixels that gather on the outermost value in use: what a clipping camera makes of them.
+// Pixels that gather on the outermost value in use, as those of a clipping camera do.
 struct PileUp {
-  double fraction = 0;  // of a channel's pixels; 0: none
+  double fraction = 0;  // share of a channel's pixels; 0: none
   double level = 0;     // stored value, in units of full scale
 };
 
-// Of the channel that is clipped most, at either end. `noise_sigma` is that of a linear grey pixel.
+// The pile-ups at both ends, each from the channel that is clipped most. `noise_sigma` is the
+// standard deviation of a linear grey pixel.
 struct PileUps {
   PileUp bright, dark;
 };
 PileUps FindPileUps(const cv::Mat& stored, double noise_sigma);
 
 // Whether the pixels at or below `level` (in units of full scale, in any channel) fill one side of
-// a straight line: a backlit edge, whose one side is black by right.
+// a straight line: a backlit edge, of which one side is normally black.
 bool DarkIsOneSide(const cv::Mat& stored, double level);
 
 }  // namespace thicklens::calib

@@ -13,11 +13,12 @@
 
 namespace thicklens::calib {
 
-// Reads the frame of an index as its file stores it: 8 or 16 bit, 1, 3 (RGB) or 4 channels. Must be
-// callable from several threads at once. Throws Error that names the file.
+// Reads the frame of an index as its file stores it: 8 or 16 bit, 1, 3 (RGB) or 4 channels. It must
+// be callable from several threads at once. It throws an Error that names the file.
 using FrameReader = std::function<cv::Mat(std::size_t index)>;
 
-// A sweep ready to be measured: frames are streamed through `read_frame`, never all held.
+// A sweep that is ready to be measured. The frames are streamed through `read_frame`; they are
+// never all held in memory.
 struct FocusSweep {
   model::Camera camera;  // d1 and kappa need not be known
   std::vector<model::SweepFrame> frames;
@@ -27,26 +28,28 @@ struct FocusSweep {
   model::BenchDirection direction = model::BenchDirection::kAway;
   model::SweepTarget target = model::SweepTarget::kAuto;
   model::FloorKnowledge floor;
-  std::optional<double> target_period_mm;  // of a periodic target
+  std::optional<double> target_period_mm;  // period of a periodic target
   model::RegionOfInterest roi;
 
-  // True if a calibration can be attempted: frames, distinct readings, a possible camera.
+  // True if a calibration can be attempted: the camera and the values are possible. Otherwise `why`
+  // (unless it is null) receives the reason.
   bool IsValid(std::string* why) const;
 };
 
-// A FocusSweep from its description; `read_frame` is left to the caller. Throws Error if the
+// Makes a FocusSweep from its description. The caller sets `read_frame`. Throws Error if the
 // description takes its floor from the calibration of another camera.
 FocusSweep MakeFocusSweep(const model::SweepFile& file, const model::Camera& camera);
 
-// The region of interest of a frame as stored. Throws Error naming the frame if its size is not the
-// sensor's, or its depth or channels are none of those above.
+// Returns the region of interest of a stored frame. Throws an Error that names the frame if its
+// size is not the sensor's, or if its depth or channels are not those of FrameReader.
 cv::Mat RegionOf(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
 
-// The same as linear grey light in [0, 1], CV_32F (.2126 R + .7152 G + .0722 B).
+// Returns the region as linear grey light in [0, 1], CV_32F (0.2126 R + 0.7152 G + 0.0722 B).
+// Throws as RegionOf does.
 cv::Mat LinearGrey(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index);
 
-// One channel of it: 0 red, 1 green, 2 blue; of a frame with one channel 0 alone. Throws Error
-// naming the frame if it has no such channel.
+// Returns one channel of the linear light, CV_32F: 0 red, 1 green, 2 blue; a frame with one channel
+// has 0 alone. Throws as RegionOf does, and also if the frame has no such channel.
 cv::Mat LinearChannel(const cv::Mat& stored, const FocusSweep& sweep, std::size_t index,
                       int channel);
 
