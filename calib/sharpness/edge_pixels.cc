@@ -31,7 +31,7 @@ std::vector<cv::Point> EdgePixels(const Gradient& gradient, double threshold, in
   std::vector<cv::Point> edges;
   const cv::Mat& m = gradient.magnitude;
   const int margin = std::max(margin_px, 2);
-  // On a texture every branch here is a coin toss, so the neighbours are chosen without any.
+  // On a texture no branch is predictable, so the neighbours are chosen without branches.
   for (int y = margin; y < m.rows - margin; ++y) {
     ThrowIfCancelled();
     const auto* above = m.ptr<float>(y - 1);
@@ -53,7 +53,7 @@ std::vector<cv::Point> EdgePixels(const Gradient& gradient, double threshold, in
       const float straight_behind = along_x ? here[x - sx] : row_behind[x];
       const float ahead = (1 - t) * straight_ahead + t * row_ahead[x + sx];
       const float behind = (1 - t) * straight_behind + t * row_behind[x - sx];
-      // >= on one side only, so that a crest of two equal pixels counts once.
+      // The comparison is >= on one side only, so that a crest of two equal pixels counts once.
       const bool is_crest = static_cast<int>(here[x] > ahead) & static_cast<int>(here[x] >= behind);
       if (is_crest) edges.emplace_back(x, y);
     }
@@ -69,8 +69,9 @@ double Quantile(const cv::Mat& values, double fraction) {
     std::nth_element(of->begin(), of->begin() + n, of->end());
     return static_cast<double>((*of)[static_cast<std::size_t>(n)]);
   };
-  // A high quantile needs only the values at the top. Where they begin is guessed from a sample; a
-  // guess that leaves too few of them, as of one value that fills the matrix, is given up.
+  // A high quantile needs only the values at the top. A sample gives an estimate of where they
+  // begin. The estimate is discarded if it leaves too few of them, for example where one value
+  // fills the matrix.
   std::vector<float> sorted;
   if (fraction > 0.9 && count > 4096) {
     for (int y = 0; y < values.rows; y += 4) {

@@ -12,7 +12,7 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestFrames = 5;
-constexpr double kTop = 0.8, kWiderTop = 0.6;  // of the largest index
+constexpr double kTop = 0.8, kWiderTop = 0.6;  // parts of the largest index
 
 struct Sharpness {
   double reading_mm = 0, index = 0;
@@ -24,14 +24,14 @@ struct Peak {
   int frames = 0;
 };
 
-// The contiguous samples about `top` that reach a part of its index.
+// Returns the contiguous samples around `top` that reach a part of its index.
 std::pair<std::size_t, std::size_t> Around(const std::vector<Sharpness>& samples, std::size_t top,
                                            double part) {
   std::size_t first = top, last = top + 1;
   const double least = part * samples[top].index;
   while (first > 0 && samples[first - 1].index >= least) --first;
   while (last < samples.size() && samples[last].index >= least) ++last;
-  // A coarse sweep has few frames that high: the nearest ones on both sides are taken.
+  // A coarse sweep has few frames that reach this: the nearest ones on both sides are taken.
   while (last - first < kFewestFrames && last - first < samples.size()) {
     if (first > 0) --first;
     if (last < samples.size() && last - first < kFewestFrames) ++last;
@@ -68,7 +68,7 @@ std::optional<Peak> FitPeak(const std::vector<Sharpness>& samples, std::size_t f
   return Peak{{middle_mm + half_mm * x_peak, half_mm * x_sigma}, static_cast<int>(n)};
 }
 
-// Those above 0, in the order of the readings.
+// Returns the frames with an index above 0, in the order of the readings.
 template <typename Index>
 std::vector<Sharpness> SamplesOf(const std::vector<FrameMeasurement>& frames,
                                  const std::vector<std::size_t>& used, const Index& index) {

@@ -8,12 +8,13 @@
 
 namespace thicklens::calib {
 
-// A parabola through the logarithm of the normalised sharpness against the reading, over the
-// contiguous frames about the largest that reach 80 % of it (at least five). sigma is from the
-// scatter about the parabola, from how far the peak moves where frames down to 60 % are taken too,
-// because the curve is no exact parabola, and from where the steepest gradients (99.5 percentile
-// over the mean) have theirs: behind an aberrated lens each measure of sharpness has a peak of its
-// own. A curve that still rises at an end of the sweep has no peak.
+// Finds the peak of a parabola through the logarithm of the normalised sharpness against the
+// reading. The parabola is fitted to the contiguous frames around the largest index that reach 80 %
+// of it (at least five). sigma combines three parts: the scatter about the parabola; the shift of
+// the peak where frames down to 60 % are included, because the curve is no exact parabola; and the
+// distance to the peak of the steepest gradients (99.5th percentile over the mean), because behind
+// an aberrated lens each measure of sharpness has a peak of its own. A curve that still rises at an
+// end of the sweep has no peak.
 SharpestReading FindSharpestReading(const std::vector<FrameMeasurement>& frames,
                                     const std::vector<std::size_t>& used);
 

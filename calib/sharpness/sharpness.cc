@@ -32,8 +32,8 @@ class Ray {
     return x >= 0 && y >= 0 && x < image_.cols - 1 && y < image_.rows - 1;
   }
 
-  // Of `count` steps in a row, all inside; interpolated between the four pixels around. In loops
-  // over the steps, so that they become vector operations.
+  // Computes the values of `count` steps in a row, all inside the image, interpolated between the
+  // four pixels around each. The loops over the steps become vector operations.
   template <std::size_t count>
   void Values(int first_step, float* values) const {
     std::array<float, count> fx{}, fy{};
@@ -74,9 +74,9 @@ class Ray {
   double dx_, dy_;
 };
 
-// Walks from an edge pixel while the grey goes on rising (sign +1) or falling (-1). On a texture
-// every walk ends after another few steps; to guess wrongly whether it does costs more than to look
-// at some pixels in vain, so steps are looked at in groups where the frame has room for them.
+// Walks from an edge pixel while the grey rises (sign +1) or falls (-1). On a texture every walk
+// ends after a few steps. A wrong branch prediction costs more than the values of some unused
+// pixels, so steps are computed in groups where the frame has room for them.
 Extremum Walk(const Ray& ray, float start, float sign, int max_px) {
   constexpr int kGroup = 4;
   int step = 0;

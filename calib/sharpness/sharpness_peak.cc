@@ -31,7 +31,7 @@ SharpnessPeak FitSharpnessPeak(std::vector<SharpnessSample> samples) {
   auto first = top, last = top + 1;
   while (first != samples.begin() && (first - 1)->index >= floor_index) --first;
   while (last != samples.end() && last->index >= floor_index) ++last;
-  // A coarse sweep has few frames that high: take the nearest ones on both sides.
+  // A coarse sweep has few frames that reach this: the nearest ones on both sides are taken.
   while (static_cast<std::size_t>(last - first) < kFewestFrames) {
     if (first != samples.begin()) --first;
     if (last != samples.end() && static_cast<std::size_t>(last - first) < kFewestFrames) ++last;
@@ -46,7 +46,7 @@ SharpnessPeak FitSharpnessPeak(std::vector<SharpnessSample> samples) {
     design.row(i) << 1, x, x * x;
     logs[i] = std::log(s.index);
   }
-  // Columns of very different size: scaled before the decomposition.
+  // The columns differ greatly in size, so they are scaled before the decomposition.
   const Eigen::Vector3d scale = design.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = design * scale.cwiseInverse().asDiagonal();
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);

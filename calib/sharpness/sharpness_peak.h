@@ -13,8 +13,9 @@ struct SharpnessSample {
   double index = 0;
 };
 
-// A parabola through the logarithm of the index against 1/z, over the contiguous frames around the
-// largest that reach 80 % of it (at least five). sigma is from the scatter about the parabola.
+// Finds the peak of a parabola through the logarithm of the index against 1/z. The parabola is
+// fitted to the contiguous frames around the largest index that reach 80 % of it (at least five).
+// sigma follows from the scatter about the parabola.
 SharpnessPeak FitSharpnessPeak(std::vector<SharpnessSample> samples);
 
 }  // namespace thicklens::calib

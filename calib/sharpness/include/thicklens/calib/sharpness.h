@@ -7,11 +7,12 @@
 namespace thicklens::calib {
 
 struct SharpnessOptions {
-  double smoothing_sigma_px = 1;  // of the frame in which edges and extrema are looked for
-  // Gradient magnitude, grey per px, above which a gradient maximum is an edge pixel. One value for
-  // a whole sweep: an edge set that adapts to each frame would hide the blur it is to measure.
+  double smoothing_sigma_px = 1;  // smoothing before edges and extrema are sought
+  // Gradient magnitude, grey per px, above which a maximum of the gradient is an edge pixel. One
+  // value serves a whole sweep: an edge set that adapts to each frame would hide the blur that is
+  // to be measured.
   double edge_threshold = 0;
-  int max_search_px = 64;  // how far an extremum is looked for on each side
+  int max_search_px = 64;  // range on each side in which an extremum is sought
 };
 
 struct SharpnessIndex {
@@ -19,15 +20,15 @@ struct SharpnessIndex {
   int edge_count = 0;
 };
 
-// MES, read as "mean edge slope" [D69]: over the edge pixels, |I(e+) - I(e-)| / distance(e+, e-)
-// with e+ and e- the nearest extrema on both sides along the gradient, averaged. The paper that the
-// source cites (Wang, Tian, Liang & Shi 2008) could not be had: this reading is inferred from the
-// name. `grey` is CV_32F.
+// MES, interpreted as "mean edge slope" [D69]: the mean over the edge pixels of |I(e+) -
+// I(e-)| / distance(e+, e-), where e+ and e- are the nearest extrema on both sides along the
+// gradient. The work that the paper cites (Wang, Tian, Liang & Shi 2008) was not available: this
+// interpretation is inferred from the name. `grey` is CV_32F.
 SharpnessIndex MeanEdgeSlope(const cv::Mat& grey, const SharpnessOptions& options);
 
-// The same for several thresholds at once, in the time that the lowest takes;
-// options.edge_threshold is not looked at. The index of a frame divided by its mean m at a
-// threshold t is the frame's own at t m, divided by m.
+// Returns the index for each of several thresholds, in the time that the lowest one takes.
+// options.edge_threshold is not used. The index of a frame divided by its mean m, at a threshold t,
+// is the index of the frame itself at t m, divided by m.
 std::vector<SharpnessIndex> MeanEdgeSlopes(const cv::Mat& grey, const SharpnessOptions& options,
                                            const std::vector<double>& thresholds);
 
