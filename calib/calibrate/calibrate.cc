@@ -33,9 +33,9 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kZeroReach = 2;    // standard deviations of a zero that contradicts another
-constexpr double kZeroMoves = 0.1;  // of the zero's standard deviation, and what moves it matters
-constexpr double kFewRegistered = 0.8;  // of the used frames: below, the light may be the reason
+constexpr double kZeroReach = 2;        // sigmas by which one zero contradicts another
+constexpr double kZeroMoves = 0.1;      // share of the zero's sigma above which a shift matters
+constexpr double kFewRegistered = 0.8;  // share of the used frames; below it the light is checked
 
 class Calibrator {
  public:
@@ -78,7 +78,7 @@ class Calibrator {
     result_.reason = reason;
     return false;
   }
-  // Of a gate: whether it let enough frames pass.
+  // Returns whether a gate let enough frames pass.
   bool Passed(const std::optional<std::string>& refusal) { return !refusal || Refuse(*refusal); }
 
   void Measure() {
@@ -96,7 +96,7 @@ class Calibrator {
     NamePlainCause();
   }
 
-  // Even of a sweep that is refused, from the frames that the gates of light let pass.
+  // Runs also for a sweep that is refused, on the frames that passed the gates of the light.
   void FindSharpest() {
     const SharpestReading found = FindSharpestReading(result_.frames, used());
     if (found.done || !result_.sharpest.done) result_.sharpest = found;
@@ -114,7 +114,7 @@ class Calibrator {
     result_.reason = "the blur was not to be fitted";
   }
 
-  // What the frames that are left fail for is often only the consequence of something plainer.
+  // The reason of a refusal is often only the consequence of a simpler cause.
   void NamePlainCause() {
     const std::string exposure =
         ExposureAdvice(result_.frames, [this] { return store_.Stored(0).depth() == CV_16U; });
@@ -129,7 +129,7 @@ class Calibrator {
           UnitAdvice(sweep_, result_.frames, result_.scale, causes_),
           RegistrationAdvice(sweep_, result_.frames, used(), result_.scale, result_.structure)}) {
       if (cause.empty()) continue;
-      // What is missing because of the light is not to be advised on.
+      // No advice is given on what is missing because of the light.
       result_.reason = cause == exposure ? cause : cause + "; as it is, " + result_.reason;
       return;
     }
@@ -154,7 +154,8 @@ class Calibrator {
 
   cv::Mat Grey(std::size_t frame) { return store_.Grey(frame); }
 
-  // Absolute gates on every frame, then the blank gate against the median of those that passed.
+  // Applies the absolute gates to every frame, then the blank gate against the median of the frames
+  // that passed them.
   bool MeasureAndGate() {
     ParallelFor(static_cast<int>(sweep_.frames.size()), options_.threads, [&](int i) {
       const auto index = static_cast<std::size_t>(i);
@@ -198,7 +199,7 @@ class Calibrator {
     });
   }
 
-  // The bench zero, given or from the image scale; then every frame's depth.
+  // Determines the bench zero (given, or from the image scale), then every frame's depth.
   bool FindDepths() {
     std::optional<double> known_mm;
     if (sweep_.offset_mm) known_mm = sweep_.offset_mm->value;
@@ -250,7 +251,7 @@ class Calibrator {
     return PlacedWithinReach();
   }
 
-  // Compares what may be behind the scales as they are.
+  // Compares the possible causes of the measured scales.
   bool ScalesAllowAResult(const std::vector<ScaleSample>& samples) {
     const ScaleKind kind = result_.scale.kind;
     if (static_cast<double>(samples.size()) < kFewRegistered * static_cast<double>(used().size()))
@@ -277,7 +278,7 @@ class Calibrator {
             : "; so many are not explained by that: others may show another part of the target"));
   }
 
-  // The given bench zero and the readings as they are.
+  // Takes the given bench zero and the readings as they are.
   bool BelieveDepths() {
     TakeGivenOffset();
     return PlacedWithinReach();
@@ -300,9 +301,9 @@ class Calibrator {
       frame.depth_mm = result_.bench_offset_mm->value + sign * frame.reading_mm;
   }
 
-  // The image scale's zero is the centre of perspective. How far from the aperture it lies depends
-  // on the blur and on how the light spreads over the pupil, which nobody knows of a real lens: the
-  // paper's law gives the value, the others an interval about it.
+  // The image scale's zero is the centre of perspective. Its distance from the aperture depends on
+  // the blur and on how the light spreads over the pupil, which is unknown for a real lens: the
+  // paper's law gives the value, and the other laws give an interval around it.
   void ReckonWithFalloff(double blur_ratio, double focus_depth_mm, ScaleLaw* law) const {
     const model::Camera& camera = sweep_.camera;
     law->offset_of_pupil_laws_mm.setConstant(law->offset_mm.value);
@@ -322,8 +323,8 @@ class Calibrator {
     }
   }
 
-  // The sharpest frame may be the one whose reading is wrong: the next sharpest takes its place,
-  // and what was registered to the one is said of the other.
+  // The sharpest frame may be the one with the wrong reading. Then the next sharpest takes its
+  // place, and the registrations to the old reference are converted to the new one.
   void ReplaceReference() {
     if (result_.frames[reference_].rejection.empty()) return;
     const ScaleSample* next = nullptr;
@@ -344,7 +345,8 @@ class Calibrator {
     result_.sharpness = FitSharpnessPeak(samples);
   }
 
-  // Flat and defocused frames show the noise alone; a fine texture in focus passes for noise.
+  // Flat and defocused frames show the noise alone, but a fine texture in focus resembles noise: a
+  // low quantile of the frames is taken.
   double SweepNoise() const {
     std::vector<double> noises;
     for (const std::size_t i : used()) noises.push_back(result_.frames[i].statistics.noise_sigma);
@@ -367,7 +369,7 @@ class Calibrator {
     task.reading_sigma_mm = sweep_.reading_sigma_mm;
     task.reading_sigma_is_known = sweep_.reading_sigma_mm > 0;
     if (!task.reading_sigma_is_known && result_.scale.done) {
-      // Nobody stated it, but the scale law has measured it.
+      // No sigma was stated, but the scale law has measured it.
       task.reading_sigma_mm = result_.scale.reading_rms_mm;
     }
     const auto [nearest, farthest] = DepthRange();
@@ -387,7 +389,7 @@ class Calibrator {
     if (options_.map_field) MapField(sweep_, evidence, fit, &store_, &result_);
   }
 
-  // What the checks found, as far as it moves the results.
+  // Widens the systematic intervals by the findings of the checks, as far as they move the results.
   void WidenByContradictions(const BlurFitSetup& setup, const BlurFitResult& fit) {
     if (!sweep_.offset_mm && result_.scale.done) {
       const Eigen::Vector2d& offsets_mm = result_.scale.offset_of_pupil_laws_mm;
@@ -397,7 +399,7 @@ class Calibrator {
                     WithOffsets(setup, {offsets_mm.x(), offsets_mm.y()}), fit, &result_);
     }
     if (conflicting_offset_mm_) {
-      // Believing it is believing its error too.
+      // If the other zero is assumed, its error must be assumed too.
       const model::Estimate& zero = *conflicting_offset_mm_;
       const double reach_mm = kZeroReach * zero.sigma;
       const Eigen::Vector2d& laws_mm = result_.scale.offset_of_pupil_laws_mm;
@@ -418,8 +420,8 @@ class Calibrator {
     }
   }
 
-  // Everything was measured against the reference; if its blur turns out not to follow the others',
-  // the next sharpest takes its place.
+  // Everything was measured relative to the reference. If its blur does not follow the others', the
+  // next sharpest frame takes its place.
   bool ReplaceRejectedReference(const Calibration& before) {
     if (result_.frames[reference_].rejection.empty()) return false;
     std::vector<std::pair<std::string, double>> rejections;
@@ -439,8 +441,8 @@ class Calibrator {
     return true;
   }
 
-  // The bench zero of the image scale was found with a usual blur ratio; once more where the one
-  // that was found moves it by a part of its error.
+  // The bench zero of the image scale was found with a usual blur ratio. It is found once more if
+  // the fitted ratio moves it by more than a part of its error.
   bool MovesZero(const Calibration& before) {
     if (sweep_.offset_mm || zero_is_settled_ || !result_.blur_ratio) return false;
     zero_is_settled_ = true;
@@ -470,11 +472,11 @@ class Calibrator {
   FrameSelection selection_{&result_.frames};  // frames that passed the gates
   std::size_t reference_ = 0;                  // the sharpest of them, normalised
   std::vector<ScaleSample> scales_;            // registered frames
-  ScaleCauses causes_;                         // what may be behind the scales
+  ScaleCauses causes_;                         // possible causes of the scales
   std::optional<Slip> slip_;
   std::optional<Bend> bend_;
   bool zero_is_settled_ = false;
-  // What the image scale says of a given bench zero.
+  // The zero from the image scale where it contradicts the given one.
   std::optional<model::Estimate> conflicting_offset_mm_;
   std::mutex progress_mutex_;
   int steps_done_ = 0;

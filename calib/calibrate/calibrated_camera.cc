@@ -7,7 +7,7 @@
 namespace thicklens::calib {
 namespace {
 
-// Files are named as the table of readings names them, not by where they lie on this machine.
+// Returns the file's name as in the table of readings, without its directory on this machine.
 std::string FileName(const std::string& image) {
   return std::filesystem::path(image).filename().string();
 }

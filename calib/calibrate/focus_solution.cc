@@ -19,12 +19,12 @@
 namespace thicklens::calib {
 namespace {
 
-// Weight of the robust loss below which a frame is told.
+// A frame whose weight in the robust loss is below this is reported.
 constexpr double kOutlierWeight = 0.6;
-// chi^2 per degree of freedom above which the law itself is in doubt.
+// Above this chi^2 per degree of freedom the law itself is in doubt.
 constexpr double kLargeMisfit = 2;
 constexpr double kSmallestRatio = 0.2, kLargestRatio = 0.8;
-// Beyond these a lens is unusual: the full aperture gives .5 by second moment.
+// A lens with a ratio beyond these is unusual: the full aperture gives 0.5 by second moment.
 constexpr double kLowRatio = 0.35, kHighRatio = 0.65;
 class Solution {
  public:
@@ -68,7 +68,7 @@ class Solution {
     result_.blur_floor_px.reset();
   }
 
-  // A floor that is stated too large leaves nothing of the blur, whatever else may be wrong.
+  // A stated floor that is too large leaves none of the blur, whatever else may be wrong.
   std::string StatedFloor() const {
     if (!sweep_.floor.given_px) return "";
     return fmt::format(" (blur_floor_px is stated as {:.3g}, which may be too large)",
@@ -80,7 +80,7 @@ class Solution {
   }
   double DepthMm(std::size_t fit_frame) { return Frame(fit_frame).depth_mm; }
 
-  // Readings in the fit, nearest and farthest, as depths.
+  // The smallest and the largest depth of the frames that are not rejected.
   std::pair<double, double> DepthRange() {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
@@ -140,7 +140,8 @@ class Solution {
             std::max(0.0, (meter.variances_px2[row] - fit_.softness_px2[m]) * s2);
         const double error = std::sqrt(std::max(0.0, meter.covariance(row, row))) * s2;
         frame.blur_sigma_px = std::sqrt(variance);
-        // Near 0 the root's derivative grows without bound; the variance's own root bounds it.
+        // Near 0 the derivative of the root grows without bound; the root of the variance's error
+        // limits it.
         frame.blur_sigma_error_px =
             std::min(error / (2 * std::max(frame.blur_sigma_px, 1e-9)), std::sqrt(error));
         frame.in_blur_fit = true;
@@ -165,7 +166,7 @@ class Solution {
     std::string names;
     for (std::size_t i = 0; i < std::min<std::size_t>(light.size(), 3); ++i) {
       const FrameMeasurement& frame = Frame(light[i]);
-      // Readings that are stated to be exact have no error that could be told.
+      // Readings that are stated to be exact have no error to report.
       const std::string why =
           evidence_.setup.reading_sigma_mm > 0
               ? fmt::format("off by {:.2f} mm or damaged", frame.reading_error_mm)
@@ -212,7 +213,7 @@ class Solution {
     const auto [nearest, farthest] = DepthRange();
     const double outside_mm = std::max({0.0, nearest - zf, zf - farthest});
     const char* side = zf < nearest ? "nearer" : "farther";
-    // What the blur itself leaves open, the bench zero apart.
+    // These errors are from the blur alone, with the bench zero held.
     const double own_kappa_sigma = std::sqrt(at_held_zero_.covariance(kBlurRatio, kBlurRatio));
     const double own_zf_sigma = result_.focus_reading_mm->sigma;
     if (!(kappa > 3 * own_kappa_sigma)) {
@@ -267,8 +268,8 @@ class Solution {
     return true;
   }
 
-  // The blur fixes where focus lies in the sweep, and the bench zero does not fix where the sweep
-  // lies.
+  // The reason where the blur determines the reading at focus, but the bench zero does not
+  // determine the depths of the sweep.
   std::string ReasonOfZero(double nearest_mm, double farthest_mm) const {
     const model::Estimate& zero_mm = evidence_.setup.offset_mm;
     const std::string from =
@@ -292,7 +293,7 @@ class Solution {
     const double floor_px2 = fit_.values[kFloorVariance];
     const double error_px2 = std::sqrt(fit_.covariance(kFloorVariance, kFloorVariance));
     if (choice.interval_px2) {
-      // Only the interval is known; any value in it would be made up.
+      // Only the interval is known; any value in it would be arbitrary.
       constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
       result_.blur_floor_px =
           Result{kUnknown, kUnknown, Eigen::Vector2d(choice.interval_px2->cwiseSqrt())};
@@ -306,8 +307,8 @@ class Solution {
     }
   }
 
-  // From (zf, kappa, S0, offset) to the parameters of the camera file; what is left open has no
-  // row.
+  // Converts the covariance from (zf, kappa, S0, offset) to the parameters of the camera file. An
+  // undetermined floor has no row.
   void FillCovariance() {
     std::vector<int> rows = {kFocusDepth, kBlurRatio};
     result_.covariance_order = {"image_distance_mm", "blur_ratio"};
@@ -330,7 +331,7 @@ class Solution {
     result_.covariance = full(rows, rows);
   }
 
-  // Frames that passed every gate and still say nothing of the blur.
+  // Reports the frames that passed every gate and still do not constrain the blur.
   void NameUnused() {
     for (std::size_t f = 0; f < evidence_.frames.size(); ++f) {
       FrameMeasurement& frame = Frame(f);
@@ -354,7 +355,7 @@ class Solution {
   const FocusSweep& sweep_;
   BlurEvidence& evidence_;
   BlurFitResult& fit_;
-  BlurFitResult at_held_zero_;  // the same fit, whose errors do not hold the bench zero's
+  BlurFitResult at_held_zero_;  // the same fit; its errors exclude the bench zero's
   Calibration& result_;
 };
 

@@ -7,11 +7,11 @@
 
 namespace thicklens::calib {
 
-// From the blur of the frames to the results: throws out frames that do not follow (named in their
-// `rejection`), chooses what is known of the floor, fits, takes the systematic interval from what
-// is not known, and decides the outcome. Reads gates, depths and sharpness out of `calibration` and
-// fills in the rest. On return `evidence` holds the frames that were used, the floor that was
-// assumed and, in `fit`, the answer.
+// Derives the results from the blur of the frames. It rejects frames that do not follow the others
+// (they are named in their `rejection`), chooses the floor's constraint, fits, estimates the
+// systematic interval from the unknown quantities, and decides the outcome. It reads gates, depths
+// and sharpness from `calibration` and fills in the rest. On return `evidence` holds the used
+// frames and the assumed floor, and `fit` holds the fit.
 void SolveFocus(const FocusSweep& sweep, BlurEvidence* evidence, BlurFitResult* fit,
                 Calibration* calibration);
 

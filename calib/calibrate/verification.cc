@@ -19,10 +19,11 @@ constexpr char kBlurRatio[] = "blur_ratio";
 constexpr char kFloor[] = "blur_floor_px";
 constexpr char kOffset[] = "bench_offset_mm";
 
-// Standard normal deviate that is exceeded in 5 % of the cases: a change is found in the others.
+// Standard normal deviate that is exceeded in 5 % of the cases: a change is found in the other 95
+// %.
 constexpr double kPower95 = 1.645;
 
-// The covariance of two of the parameters that a calibration names; 0 where it names none.
+// Returns the covariance of two parameters that a calibration names; 0 if it does not name both.
 double CovarianceOf(const std::vector<std::string>& order, const Eigen::MatrixXd& covariance,
                     const std::string& a, const std::string& b) {
   const auto place = [&](const std::string& name) {
@@ -70,7 +71,7 @@ class Verifier {
     return std::sqrt(variance);
   }
 
-  // `why_not`: empty if it is to be counted.
+  // `why_not` is empty if the parameter is to be counted.
   void Take(const char* name, const std::optional<model::Estimate>& stored,
             const std::optional<Result>& found, double systematic, const std::string& why_not) {
     if (!stored || !found || !std::isfinite(found->value)) return;
@@ -186,7 +187,7 @@ class Verifier {
                     stored_.evidence.method, names));
   }
 
-  // An error of the zero moves all depths, and zf with them.
+  // An error of the bench zero moves all depths, including zf.
   void WarnOfBenchZero() {
     const ComparedParameter* focus = Find(kFocusDepth);
     if (focus == nullptr || sweep_.offset_mm || !found_.bench_offset_mm) return;
@@ -205,8 +206,9 @@ class Verifier {
               "smaller change shows"));
   }
 
-  // A change of d1 adds to the blur sigma(z) = kappa r |c(z)|/p, c(z) = f1 D/(f2 z) - (D - f2)/f2,
-  // so that d c/d d1 = -(1 - f1/z)/f2; derived here [D89], taken at z = zf.
+  // A change of d1 adds to the blur sigma(z) = kappa r |c(z)|/p, where
+  // c(z) = f1 D/(f2 z) - (D - f2)/f2, so that d c/d d1 = -(1 - f1/z)/f2; derived here [D89],
+  // evaluated at z = zf.
   double BlurPxOf(double d1_change_mm, double blur_ratio) const {
     const model::ThickLens& lens = camera_.lens;
     const double zf = camera_.focus_depth_mm();
@@ -261,7 +263,7 @@ class Verifier {
     return text;
   }
 
-  // Why agreement would say nothing; empty: it says something.
+  // Returns the reason why agreement would prove nothing; empty if it is meaningful.
   std::string TooCoarse(const ComparedParameter* d1, const ComparedParameter* kappa) const {
     if (d1 == nullptr || !d1->counted) {
       return "the sweep does not determine image_distance_mm, of which a calibration consists "
@@ -327,8 +329,8 @@ Verification VerifyCalibration(const model::Camera& stored, const FocusSweep& sw
   return Verifier(stored, sweep, found, options).Run();
 }
 
-// [L10] Q(1) = erfc(sqrt(x/2)), Q(2) = exp(-x/2), Q(n + 2) = Q(n) + (x/2)^(n/2) exp(-x/2)/Gamma(n/2
-// + 1).
+// [L10] Q(1) = erfc(sqrt(x/2)), Q(2) = exp(-x/2),
+// Q(n + 2) = Q(n) + (x/2)^(n/2) exp(-x/2)/Gamma(n/2 + 1).
 double ChiSquareTail(double x, int degrees_of_freedom) {
   if (!(x > 0)) return 1;
   const double half = x / 2;

@@ -13,28 +13,29 @@ namespace thicklens::calib {
 
 struct CalibrationOptions {
   GateOptions gates;
-  // False: the source's recipe and the sharpness peak alone. Where the bench zero is given they
-  // need no image scale, and no frame is registered then: a wrong reading is not noticed.
+  // If false, only the paper's recipe and the sharpness peak are computed. Where the bench zero is
+  // given they need no image scale, and no frame is registered: a wrong reading is not noticed.
   bool fit_blur = true;
-  bool map_field = true;  // tiles and colour channels too; needs the fit
+  bool map_field = true;  // includes tiles and colour channels; needs the fit
   int threads = 0;        // 0: one per core
-  // Called now and then with (steps done, steps in all); false stops the run (Interrupted).
+  // Called from time to time with (steps done, steps in all). The result false stops the run, which
+  // then throws Interrupted.
   std::function<bool(int done, int total)> progress;
 
   bool IsValid(std::string* why) const;
 };
 
-// Whether a calibration can be attempted at all: frames and different readings, without opening
-// any.
+// Whether a calibration can be attempted at all: counts the frames and the different readings,
+// without opening a frame. If not, `why` receives the reason.
 bool HasEnoughFrames(const FocusSweep& sweep, std::string* why);
 
-// Runs the gates, the meters and both methods. Bad data end in a Calibration whose outcome is
-// kRefused or kPartial with the reason; a wrong file or setting throws Error.
+// Runs the gates, the meters and both methods. Bad data give a Calibration whose outcome is
+// kRefused or kPartial, with the reason. A wrong file or setting throws Error.
 Calibration Calibrate(const FocusSweep& sweep, const CalibrationOptions& options);
 
-// The camera with what was found, as it is written. Manufacturer's values stay as they are. With
-// `use_source_recipe` its d1 and kappa are taken instead; their sigmas are 0, because
-// the recipe has no error estimate, not because they are exact.
+// Returns the camera with the calibrated values, as it is written to a file. The manufacturer's
+// values are unchanged. With `use_source_recipe`, d1 and kappa are those of the paper's recipe;
+// their sigmas are 0 because the recipe has no error estimate, not because they are exact.
 model::Camera CalibratedCamera(const model::Camera& camera, const Calibration& calibration,
                                bool use_source_recipe);
 
