@@ -12,11 +12,12 @@
 
 namespace thicklens::calib {
 
-// What Ceres makes small: all residuals of a fit of the blur, with the readings' errors eliminated.
-// Blocks: global, c of each meter, the scale's law if there are scales (Blocks puts them in order).
+// The cost that Ceres minimises: all residuals of a fit of the blur, with the readings' errors
+// eliminated. Its blocks are global, c of each meter, and the scale's law if there are scales;
+// Blocks puts them in this order.
 class BlurCost : public ceres::CostFunction {
  public:
-  // The errors in `start` are where the first search for the best errors begins.
+  // The errors in `start` are the start of the first search for the best errors.
   BlurCost(const BlurResiduals& residuals, BlurParameters start);
 
   static std::vector<double*> Blocks(const BlurResiduals& residuals, BlurParameters* parameters);
@@ -27,13 +28,13 @@ class BlurCost : public ceres::CostFunction {
   BlurParameters At(double const* const* blocks) const;
 
   const BlurResiduals& residuals_;
-  // Derivatives are asked for at points that were accepted: from there the next errors are sought,
-  // not from those of a step that failed.
+  // Ceres requests derivatives at accepted points. The next errors are sought from there, not from
+  // the errors of a step that failed.
   mutable BlurParameters accepted_;
-  mutable BlurParameters last_;  // Ceres asks for the values of a step and then for derivatives
+  mutable BlurParameters last_;  // Ceres requests the values of a step and then its derivatives
 };
 
-// (S0 - value)/sigma of a floor that is given. Block: global.
+// The residual (S0 - value)/sigma of a given floor. Its block is global.
 class FloorCost : public ceres::CostFunction {
  public:
   explicit FloorCost(const model::Estimate& floor_variance_px2);

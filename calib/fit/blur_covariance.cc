@@ -13,11 +13,11 @@ namespace {
 
 constexpr std::array<const char*, kBlurParameters> kNames = {"focus_depth_mm", "blur_ratio",
                                                              "blur_floor_px", "bench_offset_mm"};
-// Singular values below this part of the largest: the data leave that combination free.
+// Singular values below this part of the largest: the data do not determine that combination.
 constexpr double kLeastSingular = 1e-7;
 
-// chi^2 per degree of freedom that chance exceeds once in a hundred (Wilson and Hilferty 1931)
-// [L9].
+// Returns the chi^2 per degree of freedom that chance exceeds once in a hundred (Wilson and
+// Hilferty 1931) [L9].
 double LargestByChance(double freedom) {
   const double spread = 2 / (9 * freedom);
   return std::pow(1 - spread + 2.326 * std::sqrt(spread), 3);
@@ -32,7 +32,8 @@ void NameWeak(const std::vector<BlurParameter>& free, const Eigen::VectorXd& dir
   if (weak->empty()) *weak = "the nuisance of the target";
 }
 
-// The longest axis of the correlation matrix: what is known worst once units are taken out.
+// Names the longest axis of the correlation matrix: the least certain combination, independent of
+// units.
 void NameWorst(const std::vector<BlurParameter>& free, BlurFitResult* result) {
   const Eigen::Matrix4d& covariance = result->covariance;
   const auto correlation = [&](std::size_t a, std::size_t b) {
@@ -66,7 +67,7 @@ std::optional<Eigen::MatrixXd> FillCovariance(const BlurJacobian& jacobian,
   }
   result->chi2_per_dof = jacobian.residuals.squaredNorm() / freedom;
 
-  // In units of the parameters' own size, singular values tell what the data leave free.
+  // In units of the parameters' own size, singular values show what the data leave free.
   const Eigen::VectorXd norms = jacobian.values.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = jacobian.values * norms.cwiseInverse().asDiagonal();
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled, Eigen::ComputeThinV);

@@ -9,18 +9,19 @@
 
 namespace thicklens::calib {
 
-// The weighted residuals at a fit's end with their derivatives, the readings' errors eliminated.
+// The weighted residuals at the end of a fit with their derivatives; the readings' errors are
+// eliminated.
 struct BlurJacobian {
-  std::vector<BlurParameter> free;  // what the first columns stand for; nuisances follow
+  std::vector<BlurParameter> free;  // parameters of the first columns; nuisances follow
   Eigen::MatrixXd values;
   Eigen::VectorXd residuals;
-  Eigen::Index eliminated = 0;  // parameters that were
-  double lost_weight = 0;       // of the residuals: what loses all its weight is no datum
+  Eigen::Index eliminated = 0;  // number of parameters that were eliminated
+  double lost_weight = 0;       // sum of 1 - weight: a residual of weight 0 is no datum
 };
 
 // Fills in the covariance by SVD, chi^2, the factor by which the errors are widened and the
-// direction that is known worst. Returns the covariance of all columns, not widened; nothing where
-// the data do not tell the parameters apart, or are too few: then the message says so.
+// direction that is least certain. Returns the covariance of all columns, not widened. Returns
+// nothing where the data do not separate the parameters, or are too few; the message then says so.
 std::optional<Eigen::MatrixXd> FillCovariance(const BlurJacobian& jacobian,
                                               bool reading_sigma_is_known, BlurFitResult* result);
 

@@ -8,9 +8,9 @@
 namespace thicklens::calib {
 namespace {
 
-// How many of a frame's features are looked at for a straight edge.
+// Number of a frame's features in which a straight edge is sought.
 constexpr int kMostFeatures = 8;
-// How much of an edge's profile is shown on each side.
+// Part of an edge's profile that is shown on each side.
 constexpr double kShownSigmas = 4, kShownBeyondPx = 1.5;
 
 BlurExample TransferExample(model::Psf stated, const FittedRegion& other,
@@ -22,7 +22,7 @@ BlurExample TransferExample(model::Psf stated, const FittedRegion& other,
   const auto in_other =
       std::find(other.region.frames.begin(), other.region.frames.end(), region.frames[i]);
   const bool has_other = other.blur.done && in_other != other.region.frames.end();
-  // Of the fitted frame over that of the reference.
+  // Returns the transfer of the fitted frame over that of the reference.
   const auto ratio = [&](model::Psf psf, double variance, double reference_variance, double nu) {
     const RelativeBlurOptions options = SpectralOptions(psf, evidence.assumed_floor_px2, 1);
     return BlurTransfer(options, variance, scale, nu) /
@@ -52,7 +52,8 @@ BlurExample TransferExample(model::Psf stated, const FittedRegion& other,
   return example;
 }
 
-// The fitted profile at a distance, straight between its points, which are in rising order.
+// Returns the fitted profile at a distance by linear interpolation between its points, which are in
+// rising order.
 double FittedAt(const EdgeSpreadFit& fit, double distance_px) {
   const auto after = std::lower_bound(fit.distance_px.begin(), fit.distance_px.end(), distance_px);
   if (after == fit.distance_px.begin()) return fit.fitted.front();
@@ -96,7 +97,7 @@ std::optional<EdgeComparison> EdgeExample(const cv::Mat& grey, std::size_t frame
     const double sigma_px = fit->across_x ? fit->across_x->sigma_px : fit->across_y->sigma_px;
     for (std::size_t i = 0; i < fit->distance_px.size(); ++i) {
       const double distance_px = fit->distance_px[i];
-      // The plateaus farther out tell nothing.
+      // The plateaus farther out give no information.
       if (std::abs(distance_px) > kShownSigmas * sigma_px + kShownBeyondPx) continue;
       const double by_other = has_other ? FittedAt(*other, distance_px) : fit->fitted[i];
       example.x.push_back(distance_px);

@@ -8,15 +8,15 @@
 
 namespace thicklens::calib {
 
-// Curves of single frames with both shapes of the blur fitted, for the eye.
+// Curves of single frames with both fitted shapes of the blur, for plots.
 
-// The transfer of the nearest, the sharpest and the farthest frame of the spectral meter; `other`
-// is the fit with the shape that is not stated (left out where it is not done, or without the
-// frame).
+// Adds the transfer of the nearest, the sharpest and the farthest frame of the spectral meter.
+// `other` is the fit with the shape that is not stated. Its curve is omitted where this fit is not
+// done or lacks the frame.
 void AddTransferExamples(model::Psf stated, const FittedRegion& other, BlurEvidence* evidence);
 
 // The profile of a frame's strongest straight edge, with chi^2 per degree of freedom of each shape
-// where it can be fitted; nothing where there is no such edge.
+// that can be fitted. EdgeExample returns nothing where there is no such edge.
 struct EdgeComparison {
   BlurExample curves;
   std::optional<double> gaussian_chi2, disc_chi2;

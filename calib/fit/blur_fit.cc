@@ -26,7 +26,7 @@ double HuberWeight(double standardised) {
 
 class Fit {
  public:
-  // `information`: of each meter.
+  // There is one `information` for each meter.
   Fit(const BlurFitSetup& setup, const std::vector<MeterInformation>& information)
       : setup_(setup),
         information_(information),
@@ -40,7 +40,7 @@ class Fit {
           Eigen::VectorXd::Ones(static_cast<Eigen::Index>(meter.frames.size())));
   }
 
-  // Without frames: no more than the parameters and their covariance.
+  // Without frames, only the parameters and their covariance are computed.
   BlurFitResult Run(const BlurFitResult* start, bool wants_frames) {
     if (!Start(start)) return result_;
     for (int round = 0; round < kRounds; ++round) {
@@ -178,7 +178,7 @@ class Fit {
     return rest;
   }
 
-  // Iteratively reweighted least squares; false where no weight changes.
+  // Does one step of iteratively reweighted least squares. Returns false where no weight changes.
   bool Reweight() {
     double change = 0;
     const auto set = [&change](double* weight, double value) {
@@ -189,7 +189,7 @@ class Fit {
       const Eigen::ArrayXd off = (MeterResiduals(m).array() /
                                   (setup_.meters[m].covariance.diagonal().array() + 1e-12).sqrt())
                                      .abs();
-      // Where a lens follows the law only roughly, that is no fault of single frames.
+      // Where a lens follows the law only roughly, single frames are not at fault.
       const double scatter =
           std::max(1.0, 1.4826 * Median(std::vector<double>(off.begin(), off.end())));
       for (Eigen::Index i = 0; i < off.size(); ++i)
@@ -252,7 +252,8 @@ class Fit {
     return true;
   }
 
-  // Residuals with the readings as written, against the errors of meter and reading together.
+  // Computes the residuals with the readings as written, relative to the errors of meter and
+  // reading together.
   void FillFrames() {
     const auto n = static_cast<Eigen::Index>(setup_.frames.size());
     result_.reading_errors_mm = parameters_.errors_mm;
@@ -301,9 +302,9 @@ BlurFitResult FitBlur(const BlurFitSetup& setup, const BlurFitResult* start) {
   BlurFitResult result = Fit(setup, information).Run(start, true);
   const double offset_sigma_mm = setup.offset_mm.sigma;
   if (!result.done || !(offset_sigma_mm > 0)) return result;
-  // How the answer moves with the bench zero, by central differences over its own uncertainty.
-  // The depths move with the zero, and the focus with them: started where it was, a fit of a sweep
-  // that is short against that error would begin outside the sweep.
+  // The change of the results with the bench zero, by central differences over its own uncertainty.
+  // The depths move with the zero, and the focus with them. If it started at the old focus, a fit
+  // of a sweep that is short against that error would start outside the sweep.
   const auto moved_by = [&](double move_mm) {
     BlurFitSetup moved = setup;
     moved.offset_mm.value += move_mm;

@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::size_t kFewestFrames = 5;
 constexpr int kFewestModesOfFrame = 16;
-constexpr double kUsualFloor = 0.25;  // S0 to start with, px^2
+constexpr double kUsualFloor = 0.25;  // S0 at the start, px^2
 constexpr double kWholeField = 0.98;
 constexpr std::size_t kFramesForBound = 9;
 constexpr double kModesOfAll = 30000;  // per ring, times frames
 constexpr int kPasses = 3;
-// A pass is the last if no frame's blur was expected farther off than this part of the largest.
+// No further pass follows if every frame's blur was predicted to within this part of the largest.
 constexpr double kExpectedWell = 0.3;
 
 double FloorToStartWith(const model::FloorKnowledge& floor) {
@@ -72,7 +72,7 @@ class Measurement {
            model::DirectionSign(task_.sweep.direction) * task_.sweep.frames[frame].reading_mm;
   }
 
-  // From where the image scale has its zero.
+  // Returns the depth from the zero of the image scale.
   double FromCentreMm(std::size_t frame) const { return DepthMm(frame) - task_.scale_centre_mm; }
 
   FitFrame PlaceOf(std::size_t frame) const {
@@ -82,7 +82,7 @@ class Measurement {
                       ? FromCentreMm(task_.reference) / FromCentreMm(frame)
                       : 1.0;
     if (const ScaleSample* sample = Registered(frame)) {
-      // A lone edge registers badly along itself; then the readings know the scale better.
+      // A lone edge registers poorly along itself; the readings then give a better scale.
       if (std::abs(sample->scale / place.scale - 1) < 0.05) place.scale = sample->scale;
       if (task_.scale_follows_readings && frame != task_.reference)
         place.scale_sigma = sample->registration.scale_sigma;
@@ -91,9 +91,9 @@ class Measurement {
   }
 
   // ---- edges ----
-  // Edges that nobody stated may be a texture's own, and a printed edge says nothing that the
-  // relative spectra do not say better, but for what the floor cannot exceed: where there are
-  // spectra, the frames about focus are enough for that.
+  // Unstated edges may belong to a texture, and the relative spectra measure a printed edge's blur
+  // better. Such edges only limit the floor: where there are spectra, the frames around focus
+  // suffice for that.
   void MeasureEdges() {
     if (task_.sweep.target == model::SweepTarget::kTexture) return;
     const bool is_sharp = task_.sweep.target == model::SweepTarget::kKnifeEdge;
@@ -127,7 +127,7 @@ class Measurement {
     evidence_.setup.meters.push_back(std::move(*samples));
   }
 
-  // Of the chosen of the task's frames, with one shape of the blur.
+  // Measures the edges of the chosen frames of the task, with one shape of the blur.
   std::optional<BlurSamples> EdgeSamples(const std::vector<std::size_t>& chosen, model::Psf psf) {
     const double floor_px = std::sqrt(evidence_.assumed_floor_px2);
     std::vector<std::optional<FrameEdgeSpread>> found(task_.frames.size());
@@ -155,8 +155,8 @@ class Measurement {
     return samples;
   }
 
-  // The nearest, the sharpest and the farthest of the measured frames; on them both shapes of the
-  // blur are compared.
+  // Adds the nearest, the sharpest and the farthest of the measured frames, and compares both
+  // shapes of the blur on them.
   void AddEdgeExamples(const std::vector<std::size_t>& measured) {
     const auto depth_mm = [this](std::size_t i) { return DepthMm(task_.frames[i]); };
     const auto [nearest, farthest] = std::minmax_element(
@@ -227,7 +227,7 @@ class Measurement {
                                   : Eigen::Vector2d(sensor.width_px, sensor.height_px);
     meter.psf = task_.sweep.camera.psf;
     meter.threads = task_.threads;
-    // The fit takes time with the square of the frames: of many, each needs fewer modes.
+    // The time of the fit grows with the square of the frames: with many, each needs fewer modes.
     meter.modes_per_ring = std::clamp(
         static_cast<int>(kModesOfAll / static_cast<double>(task_.frames.size())), 24, 200);
     meter.tick = task_.tick;
@@ -253,8 +253,8 @@ class Measurement {
     }
   }
 
-  // Whether the blur came out so different from what the windows and bands were laid out for that
-  // they must be laid out again; then with what was found.
+  // Whether the blur differs so much from the prediction for which the windows and bands were
+  // chosen that they must be chosen again, with the measured blur.
   bool ExpectationWasFarOff(const RelativeBlur& blur, double* ratio) {
     BlurFitSetup setup = evidence_.setup;
     setup.meters = {FitSamples(evidence_, blur, region_)};

@@ -1,4 +1,4 @@
-// The robust parabola that a sweep's blur follows on the target, and what follows from it.
+// The robust parabola that a sweep's blur follows on the target, and the start of the fit from it.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -12,11 +12,11 @@ namespace thicklens::calib {
 namespace {
 
 constexpr int kTriplets = 400;
-constexpr double kTrimmed = 0.7;  // part of the samples that a candidate is judged by
+constexpr double kTrimmed = 0.7;  // part of the samples by which a candidate is judged
 // A parabola passes three samples exactly and a fourth by chance.
 constexpr std::ptrdiff_t kFewestJudged = 5;
 constexpr double kFarOff = 6;          // standard deviations
-constexpr double kModelError = 0.002;  // of the range of V: no lens follows the law better
+constexpr double kModelError = 0.002;  // part of the range of V: no lens follows the law better
 
 using Line = Eigen::Vector3d;
 
@@ -102,7 +102,7 @@ class Search {
     return sum;
   }
 
-  // Weighted least squares on the samples that follow, until the set stays.
+  // Repeats weighted least squares on the samples that follow until their set does not change.
   void Refine(Line line) {
     for (int round = 0; round < 10; ++round) {
       const Eigen::VectorXd sigmas = Sigmas(line);
@@ -158,8 +158,7 @@ Parabola FitParabola(const Eigen::VectorXd& depths_mm, const Eigen::VectorXd& va
   return Search(depths_mm, variances_px2, errors_px2, reading_sigma_mm).Run();
 }
 
-// [D73] V = S0 z^2/zr^2 + A (1 - z/zf)^2/zr^2 + c, so that with a the coefficient of z^2 times
-// zr^2:
+// [D73] V = S0 z^2/zr^2 + A (1 - z/zf)^2/zr^2 + c. With a the coefficient of z^2 times zr^2:
 //   A/zf^2 = a - S0, zf = vertex a/(a - S0). Telecentric: V = S0 + A ((z - zf)/zf^2)^2 + c.
 std::optional<FocusAndRatio> FromParabola(const Parabola& parabola, const BlurFitSetup& setup,
                                           double reference_depth_mm, double floor_variance_px2) {

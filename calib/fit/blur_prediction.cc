@@ -3,11 +3,10 @@
 namespace thicklens::calib {
 namespace {
 
-// R, px, with its sign (positive nearer than focus, for a telecentric pupil farther) and its
-// derivatives: the radius of the blur on the sensor, [S25], [S26] with
-// K = f1 zf/(zf - f1):
+// R is the radius of the blur on the sensor, px, with its sign (positive nearer than focus; for a
+// telecentric pupil farther) and its derivatives, [S25], [S26] with K = f1 zf/(zf - f1):
 //   perspective: R = (r/p) K (1/z - 1/zf);  telecentric: R = (r/p) K (z - zf)/zf^2.
-// The derivatives are derived here [D72]. Valid for zf > f1, z > 0; 0 at z = zf.
+// The derivatives are derived here [D72]. Valid for zf > f1, z > 0; R is 0 at z = zf.
 struct Radius {
   double value = 0, by_focus = 0, by_depth = 0, by_depth_twice = 0;
 };

@@ -10,11 +10,11 @@ namespace thicklens::calib {
 // V of a frame by the blur law, px^2 of the target and without the meter's c, with its derivatives.
 struct BlurPrediction {
   double value = 0;
-  Eigen::Vector4d by_global{0, 0, 0, 0};  // in the order of BlurParameter
+  Eigen::Vector4d by_global{0, 0, 0, 0};  // derivatives in the order of BlurParameter
   double by_depth = 0, by_depth_twice = 0;
 };
 
-// `global` in the order of BlurParameter; what it says of the bench zero is in the depth already.
+// `global` is in the order of BlurParameter. `depth_mm` already includes its bench zero.
 BlurPrediction PredictBlur(const BlurFitSetup& setup, const Eigen::Vector4d& global,
                            double depth_mm, double scale);
 

@@ -10,7 +10,7 @@
 namespace thicklens::calib {
 namespace {
 
-// A law of three terms needs more than three frames to say anything of their errors.
+// A law of three terms needs more than three frames to constrain their errors.
 constexpr std::size_t kFewestScales = 6;
 
 Eigen::Index Size(std::size_t size) { return static_cast<Eigen::Index>(size); }

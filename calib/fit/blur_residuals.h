@@ -10,7 +10,7 @@
 
 namespace thicklens::calib {
 
-// Everything that is fitted. Readings' errors e: the bench stood at reading - e.
+// All fitted quantities. The errors e of the readings mean: the bench was at reading - e.
 struct BlurParameters {
   Eigen::Vector4d global{0, 0, 0, 0};  // in the order of BlurParameter
   std::vector<double> softness_px2;    // c of each meter
@@ -18,32 +18,31 @@ struct BlurParameters {
   Eigen::VectorXd errors_mm;
 };
 
-// Of a sample's residual squared, 0 to 1.
+// Weights, 0 to 1, of the squared residuals.
 struct BlurWeights {
-  std::vector<Eigen::VectorXd> meters;  // of each sample
-  Eigen::VectorXd readings, scales;     // of each frame
+  std::vector<Eigen::VectorXd> meters;  // one for each sample
+  Eigen::VectorXd readings, scales;     // one for each frame
 };
 
-// The residuals that FitBlur makes small [D74], each in its standard deviations, one below the
-// other:
-//   of a meter:   B f (V_model + c - V), B its covariance's inverse root, f the weights' factors;
-//   of a scale:   sqrt(w) (scale (l0 + l1 x + l2 x^2) - 1)/sigma, x by the believed reading;
-//   of a reading: sqrt(w) e/sigma; none, and e = 0, where the readings are exact.
-// Their Jacobian by the errors is never written down: it is B with its columns scaled, and diagonal
-// below.
+// The residuals that FitBlur minimises [D74], each in its standard deviations, stacked:
+//   meter:   B f (V_model + c - V), B its covariance's inverse root, f the weights' factors;
+//   scale:   sqrt(w) (scale (l0 + l1 x + l2 x^2) - 1)/sigma, x from the corrected reading;
+//   reading: sqrt(w) e/sigma; none, and e = 0, where the readings are exact.
+// Their Jacobian by the errors is never stored as a matrix: its part of the meters is B with scaled
+// columns, and the parts below are diagonal.
 class BlurResiduals {
  public:
-  // `setup` and `information` (of each meter) must outlive this.
+  // `setup` and `information` (one for each meter) must outlive this object.
   BlurResiduals(const BlurFitSetup& setup, const std::vector<MeterInformation>& information,
                 const BlurWeights& weights);
 
-  // Frames whose scale tells something of their reading's error.
+  // Returns the frames whose scale constrains their reading's error.
   static std::vector<std::size_t> ScaleFrames(const BlurFitSetup& setup);
   bool has_scales() const { return !scale_frames_.empty(); }
   bool readings_are_exact() const { return readings_.size() == 0; }
   Eigen::Index rows() const { return rows_; }
-  // Of the parameters but the errors: global, a softness for each meter, the scale's law if there
-  // are scales.
+  // Number of parameters without the errors: global, a softness for each meter, and the scale's law
+  // if there are scales.
   Eigen::Index columns() const;
 
   // A sample's or a scale's residual before B, with its derivatives by its reading's error.
@@ -52,25 +51,26 @@ class BlurResiduals {
   };
   using Rows = std::vector<Row>;
   struct Terms {
-    std::vector<Rows> meters;  // of each sample
+    std::vector<Rows> meters;  // one for each sample
     Rows scales;
     Eigen::VectorXd readings;
   };
-  // Nothing where a depth is not positive.
+  // Returns nothing where a depth is not positive.
   std::optional<Terms> At(const BlurParameters& parameters) const;
   double ScaleRest(const BlurParameters& parameters, std::size_t frame) const;
 
   Eigen::VectorXd Values(const Terms& terms) const;
-  // By the parameters but the errors.
+  // Returns the derivatives of the residuals by the parameters without the errors.
   Eigen::MatrixXd Jacobian(const BlurParameters& parameters) const;
 
-  // J x and J^T y of columns, J the Jacobian by the errors, and J^T J.
+  // J x and J^T y for columns, and J^T J, where J is the Jacobian by the errors.
   Eigen::MatrixXd TimesErrors(const Terms& terms, const Eigen::MatrixXd& x) const;
   Eigen::MatrixXd TransposeTimesErrors(const Terms& terms, const Eigen::MatrixXd& y) const;
   Eigen::MatrixXd ErrorNormal(const Terms& terms) const;
-  // Diagonal of J^T J without the meters' part: what is known of each error beforehand.
+  // Diagonal of J^T J without the meters' part: the prior information on each error.
   Eigen::VectorXd OwnInformation(const Terms& terms) const;
-  // Diagonal of the second derivative of half the residuals' squares by the errors, less J^T J's.
+  // Diagonal of the second derivative of half the squared residuals by the errors, minus that of
+  // J^T J.
   Eigen::VectorXd ErrorCurvature(const Terms& terms, const Eigen::VectorXd& values) const;
 
  private:
@@ -87,9 +87,9 @@ class BlurResiduals {
 
   const BlurFitSetup& setup_;
   const std::vector<MeterInformation>& information_;
-  std::vector<Eigen::VectorXd> factors_;  // f of each meter's samples
+  std::vector<Eigen::VectorXd> factors_;  // f for each meter's samples
   std::vector<std::size_t> scale_frames_;
-  Eigen::VectorXd scale_weights_;  // of each frame
+  Eigen::VectorXd scale_weights_;  // one for each frame
   Eigen::VectorXd readings_;       // sqrt(w)/sigma
   double sign_ = 1, middle_mm_ = 0, half_range_mm_ = 1;
   Eigen::Index rows_ = 0;

@@ -8,9 +8,10 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kReach = 2;      // standard deviations
-constexpr double kDoubtless = 4;  // the same, of what is beyond doubt
+constexpr double kDoubtless = 4;  // standard deviations of tails that are beyond doubt
 
-// What the known laws make, less what the family has already; nothing where there is no such blur.
+// Returns the tails of the known laws minus those that the family has already; nothing where such a
+// blur is impossible.
 std::optional<Eigen::Vector2d> LawsLeft(model::Psf psf, const BlurFitResult& fit,
                                         const BlurEvidence& evidence) {
   const double kappa = fit.values[kBlurRatio], zf_mm = fit.values[kFocusDepth];
@@ -49,7 +50,7 @@ std::optional<Eigen::Vector2d> TailsLeft(model::Psf psf, const BlurFitResult& fi
   const model::Estimate& tails = evidence.blur.tails;
   Eigen::Vector2d range(std::min(0.0, std::max(tails.value - kReach * tails.sigma, laws->x())),
                         std::max(0.0, std::min(tails.value + kReach * tails.sigma, laws->y())));
-  // One step of a fit says too little of tails as large as they are beyond doubt.
+  // One step of a fit is too inaccurate for tails that are so large beyond doubt.
   if (tails.value < -kDoubtless * tails.sigma) range.x() = std::min(tails.value, laws->x());
   if (tails.value > kDoubtless * tails.sigma) range.y() = std::max(tails.value, laws->y());
   if (evidence.taken_tails > 0) range.y() = std::max(range.y(), laws->y());

@@ -8,16 +8,18 @@
 
 namespace thicklens::calib {
 
-// The tails of RelativeBlur: how the shape of the blur departs from the family's while its second
-// moment stays. Pupil laws make them.
+// The tails of RelativeBlur: the departure of the blur's shape from the family's at constant second
+// moment. Pupil laws cause them.
 
-// Where the frames show beyond doubt tails that a pupil law gives, the family gets them: the
-// measured variances answer, and the fit is to be run again. At most those of the laws are taken.
-// False: nothing was changed. `fit` gives zf and kappa, on which the laws depend.
+// Applies tails to the family where the frames show beyond doubt tails that a pupil law gives, but
+// never more than the laws give. The measured variances are corrected for them, and the fit must
+// then be repeated. Returns false if nothing was changed. `fit` gives zf and kappa, on which the
+// laws depend.
 bool TakeTails(model::Psf psf, const BlurFitResult& fit, BlurEvidence* evidence);
 
-// How far the tails may still depart from those of the family: to what the frames ask for, as far
-// as a pupil law makes that; beyond where they ask for it beyond doubt. Nothing without spectra.
+// Returns the interval (lowest, highest) by which the tails may still depart from those of the
+// family. It reaches as far as the frames allow and a pupil law gives; where the frames show larger
+// tails beyond doubt, it reaches to these. Returns nothing without spectra.
 std::optional<Eigen::Vector2d> TailsLeft(model::Psf psf, const BlurFitResult& fit,
                                          const BlurEvidence& evidence);
 

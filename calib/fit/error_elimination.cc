@@ -11,15 +11,15 @@ namespace {
 
 constexpr int kMostSteps = 50;
 constexpr int kMostHalvings = 40;
-// The cost is as low as it can be when a step promises less than this part of it.
+// The cost is at its minimum when a step would lower it by less than this part of it.
 constexpr double kEnough = 1e-16;
-// Promises below this part of the cost are lost in its rounding: nothing can be compared.
+// Changes below this part of the cost are lost in its rounding: no comparison is possible.
 constexpr double kRounding = 1e-11;
-// How much of a reading's own information a curvature may take away: Newton's matrix stays
+// Maximum part of a reading's own information that a curvature may remove: Newton's matrix remains
 // positive definite.
 constexpr double kMostLost = 0.9;
 
-// Newton's matrix: the second derivatives of half the cost.
+// Returns Newton's matrix: the second derivatives of half the cost.
 Eigen::MatrixXd NewtonMatrix(const BlurResiduals& residuals, const BlurResiduals::Terms& terms,
                              const Eigen::VectorXd& values) {
   Eigen::MatrixXd matrix = residuals.ErrorNormal(terms);
@@ -74,7 +74,8 @@ ReducedProblem Reduce(const BlurResiduals& residuals, const BlurParameters& para
   const Eigen::LLT<Eigen::MatrixXd> normal(residuals.ErrorNormal(*terms));
   reduced.error_response =
       Eigen::MatrixXd::Zero(parameters.errors_mm.size(), reduced.jacobian.cols());
-  // Twice: what rounding leaves of the errors' span the first time is gone after the second.
+  // The projection runs twice: the second pass removes the part of the errors' span that rounding
+  // leaves after the first.
   for (int pass = 0; pass < 2; ++pass) {
     const Eigen::MatrixXd response =
         -normal.solve(residuals.TransposeTimesErrors(*terms, reduced.jacobian));

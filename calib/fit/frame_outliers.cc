@@ -11,10 +11,10 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestFrames = 5;
-// A frame whose spectrum scatters by so much more than the others' shows something else.
+// A frame whose spectrum scatters more than the others' by this factor shows another object.
 constexpr double kScatterOfDamage = 30;
 
-// The same blur lies on both sides of focus.
+// There may be two errors because both sides of focus have the same blur.
 std::string InWords(const std::vector<double>& errors_mm) {
   if (errors_mm.empty()) return "frame damaged";
   if (errors_mm.size() == 1)
@@ -62,8 +62,8 @@ class Outliers {
     }
   }
 
-  // On the target any blur follows a parabola in depth, whatever floor and texture: what lies far
-  // off it has a wrong reading or is damaged.
+  // On the target any blur follows a parabola in depth, whatever floor and texture. A frame that is
+  // far off the parabola has a wrong reading or is damaged.
   void RejectOffParabola(const BlurSamples& meter) {
     const auto n = static_cast<Eigen::Index>(meter.frames.size());
     Eigen::VectorXd depths(n);
@@ -79,7 +79,7 @@ class Outliers {
       FrameMeasurement& frame = Frame(meter.frames[s]);
       if (parabola.follows[s] || !frame.rejection.empty()) continue;
       const double off = parabola.residuals_px2[i] / parabola.sigmas_px2[i];
-      // Written minus believed.
+      // The written reading minus that of the parabola.
       std::vector<double> errors_mm;
       for (const double depth_mm : parabola.DepthsOf(meter.variances_px2[i], depths[i])) {
         if (std::abs(depths[i] - depth_mm) < range_mm)

@@ -8,10 +8,11 @@
 
 namespace thicklens::calib {
 
-// Takes out of the meters' samples the frames that do not follow the others: whose spectrum
-// scatters far more than theirs, or whose blur lies off the law that any target follows. They are
-// named in `calibration->frames` by their `rejection`, with the reading's error (written minus
-// believed, mm) where the law tells one. Returns why nothing can be fitted, if too few are left.
+// Removes from the meters' samples the frames that do not follow the others: their spectrum
+// scatters far more, or their blur is far from the law that any target follows. They are named in
+// `calibration->frames` by their `rejection`, with the reading's error (the written reading minus
+// that of the law, mm) where the law gives one. Returns the reason if too few frames are left for a
+// fit.
 std::optional<std::string> ThrowOutFrames(model::BenchDirection direction, BlurEvidence* evidence,
                                           Calibration* calibration);
 

@@ -11,10 +11,10 @@ namespace thicklens::calib {
 namespace {
 
 constexpr double kSignificant = 4;
-constexpr double kMatters = 0.02;       // of the sweep's length
-constexpr double kAsStated = 1.5;       // of the stated error of the readings
-constexpr double kClearlyBetter = 1.1;  // of chi^2 with the other shape of the blur
-// Parts of the field are known worse than the whole, and their textures differ.
+constexpr double kMatters = 0.02;       // part of the sweep's length
+constexpr double kAsStated = 1.5;       // times the stated error of the readings
+constexpr double kClearlyBetter = 1.1;  // ratio of chi^2 with the two shapes of the blur
+// Parts of the field are less certain than the whole, and their textures differ.
 constexpr double kReach = 1.5;
 
 double SweepLengthMm(const Calibration& calibration) {
@@ -36,7 +36,7 @@ std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence
   if (calibration.structure.HasFixedStructure())
     causes.emplace_back("structure that stays on the sensor");
   const ScaleLaw& scale = calibration.scale;
-  // The image scale sees the readings' errors without the blur.
+  // The image scale shows the readings' errors without the blur.
   const bool readings_are_as_stated = scale.done && sweep.reading_sigma_mm > 0 &&
                                       scale.reading_rms_mm < kAsStated * sweep.reading_sigma_mm;
   if (!readings_are_as_stated) causes.emplace_back("readings worse than stated");

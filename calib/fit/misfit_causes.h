@@ -9,21 +9,23 @@
 
 namespace thicklens::calib {
 
-// What may lie behind frames that follow the blur law worse than their errors say. What the sweep
-// itself excludes (readings whose scatter about the image scale is as small as stated; a shape of
-// the blur that fits better than the other) is left out; the rest cannot be told apart by it.
+// Describes the possible causes of frames that follow the blur law worse than their errors say.
+// Causes that the sweep itself excludes are omitted (readings whose scatter about the image scale
+// is as small as stated; a shape of the blur that fits better than the other). The sweep cannot
+// distinguish the remaining causes.
 std::string CausesOfMisfit(const FocusSweep& sweep, const BlurEvidence& evidence,
                            const Calibration& calibration);
 
-// Whether the blur along x and along y is least at depths that differ beyond their errors, by an
-// amount that matters to the sweep.
+// Whether the blur along x and the blur along y are smallest at depths that differ beyond their
+// errors, by an amount that matters to the sweep.
 bool IsAstigmatic(const Calibration& calibration);
 
-// The warning of it; empty where there is none.
+// Returns the warning about astigmatism; empty where there is none.
 std::string AstigmatismInWords(const Calibration& calibration);
 
-// Whether depths of parts of the field that differ by so much may as well come from astigmatism,
-// which moves a part's focus by up to its half either way, by the texture that it shows.
+// Whether astigmatism may also explain depths of parts of the field that differ by `spread_mm`: it
+// moves a part's focus by up to half of itself in either direction, depending on the part's
+// texture.
 bool AstigmatismExplains(double spread_mm, const Calibration& calibration);
 
 }  // namespace thicklens::calib

@@ -11,7 +11,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kEdgeReach = 5;  // sigmas
 constexpr int kEdgeSteps = 200;
 
-// Per axis, of a blur of sigma 1: E A_x^4 = 3/8 E A^4.
+// Returns the value per axis for a blur of sigma 1: E A_x^4 = 3/8 E A^4.
 double ExcessKurtosis(const model::PupilProfile& profile) {
   double fourth = 0;
   for (const model::PupilProfile::Ring& ring : profile.rings())
@@ -19,7 +19,7 @@ double ExcessKurtosis(const model::PupilProfile& profile) {
   return 3.0 / 8 * fourth - 3;
 }
 
-// A step seen through the blur, at multiples of the step from its middle to the reach. A ring of
+// Returns a step seen through the blur, at equal steps from its middle to the reach. A ring of
 // radius R gives 1/2 + asin(x/R)/pi.
 std::vector<double> Edge(const model::PupilProfile& profile) {
   std::vector<double> edge;
@@ -51,7 +51,7 @@ double SquaredDifference(const std::vector<double>& law, const std::vector<doubl
   return sum;
 }
 
-// By golden sections; the difference has one minimum there.
+// Finds the ratio by golden sections; the difference has one minimum there.
 double NearestRatio(const std::vector<double>& law, const std::vector<double>& family) {
   const double golden = (std::sqrt(5.0) - 1) / 2;
   double low = 0.7, high = 1.3;
