@@ -9,8 +9,8 @@
 namespace thicklens::calib {
 namespace {
 
-constexpr double kNarrowPart = 0.5;     // of the usual band
-constexpr double kLeakageMargin = 1.4;  // of the largest sigma expected
+constexpr double kNarrowPart = 0.5;     // part of the usual band
+constexpr double kLeakageMargin = 1.4;  // factor on the largest sigma expected
 
 // Disc and Gaussian are compared over the disc's band, the narrower one.
 double CommonPart(model::Psf psf) { return UsualBand(model::Psf::kDisc) / UsualBand(psf); }
@@ -41,7 +41,7 @@ class Choices {
     return FitRegion(evidence_.region, SpectralOptions(psf, evidence_.assumed_floor_px2, part));
   }
 
-  // False where the reference itself was thrown out: everything refers to it.
+  // Returns false where the reference itself was rejected, because everything refers to it.
   bool LeaveOutRejected() {
     MeterRegion& region = evidence_.region;
     if (!IsKept(region.frames[region.reference])) return false;
@@ -62,7 +62,7 @@ class Choices {
     return true;
   }
 
-  // Both shapes over the same band, each with its own leakage.
+  // Compares both shapes over the same band, each with its own leakage.
   void CompareShapes() {
     const RelativeBlur as_stated = Fit(stated_, CommonPart(stated_)).blur;
     const FittedRegion other = FitOtherShape();
@@ -80,7 +80,7 @@ class Choices {
     AddTransferExamples(stated_, other, &evidence_);
   }
 
-  // Real and imaginary part of each mode of each frame, less the texture's.
+  // Counts the real and the imaginary part of each mode of each frame, minus those of the texture.
   static double DegreesOfFreedom(const RelativeBlur& blur) {
     const double used = std::accumulate(blur.modes_used.begin(), blur.modes_used.end(), 0.0);
     return std::max(0.0, 2 * (used - static_cast<double>(blur.texture.size())));

@@ -5,12 +5,11 @@
 
 namespace thicklens::calib {
 
-// What the spectra of the frames that are left in the spectral meter's samples say, without those
-// that were thrown out, which would have had a say in the texture: the samples are renewed where
-// any was. Then with the other choices that could have been made: half the band, and the other
-// shape of the blur over the band that both can be fitted in, so that the two can be compared;
-// and the curves of three frames for the eye. Does nothing where there is no spectral meter; a
-// choice that cannot be fitted is left out.
+// Fits the spectra again where frames of the spectral meter were rejected, because these had
+// influenced the texture, and replaces the meter's samples. Then fits with the other possible
+// choices: half the band, and the other shape of the blur over the band in which both can be
+// fitted, so that the two can be compared. Adds the curves of three frames for plots. Does nothing
+// where there is no spectral meter. A choice that cannot be fitted is omitted.
 void CompareChoices(model::Psf stated, BlurEvidence* evidence);
 
 }  // namespace thicklens::calib

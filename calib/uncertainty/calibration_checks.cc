@@ -13,7 +13,7 @@
 namespace thicklens::calib {
 namespace {
 
-// A given bench zero that lies farther off than this part of the depth is no error of measurement.
+// A given bench zero that is off by more than this part of the depth is no error of measurement.
 constexpr double kGrossOffset = 0.1;
 
 // m = f1 D/(f2 z) [D5] on the sensor over the target, so D = m z f2/f1.
@@ -42,7 +42,7 @@ OffsetCheck CheckGivenOffset(const FocusSweep& sweep, const std::string& unit_th
     calibration->warnings.push_back("the given offset_mm could not be checked: " + law.message);
     return check;
   }
-  // No pupil law is known to hold: the zero may lie anywhere between those that they give.
+  // No pupil law is known to hold: the zero may lie anywhere in the interval of the laws.
   const double given_mm = sweep.offset_mm->value;
   const double apart_mm =
       std::clamp(given_mm, law.offset_of_pupil_laws_mm.x(), law.offset_of_pupil_laws_mm.y()) -

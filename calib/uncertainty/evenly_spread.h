@@ -6,8 +6,8 @@
 
 namespace thicklens::calib {
 
-// At most `most` of the indices below `count`, in order, every n-th counted from `kept`,
-// which is always among them (`kept` < `count`).
+// Returns at most `most` of the indices below `count`, in order. They are every n-th index, counted
+// from `kept`, which is always included (`kept` < `count`).
 inline std::vector<std::size_t> EvenlySpread(std::size_t count, std::size_t kept,
                                              std::size_t most) {
   const std::size_t step = (count + most - 1) / most;

@@ -19,15 +19,15 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kWholeField = 0.98;
-constexpr double kSmallField = 240;  // px; below, three tiles a side, above, five
+constexpr double kSmallField = 240;  // px; three tiles per side below, five above
 constexpr int kModesPerRing = 48;
 constexpr std::size_t kFewestTiles = 5;
-constexpr double kSpreadOverErrors = 4;  // squares; below, the tiles agree
+constexpr double kSpreadOverErrors = 4;  // ratio of squares; below it the tiles agree
 constexpr double kApart = 6;             // standard deviations between depths of a target
 constexpr double kRoughSurface = 4;  // chi^2 per dof of a smooth field above which depths differ
-constexpr double kColourDifference = 0.01;  // of the mean: below, the channels are copies
-// Of a longer sweep at most so many frames are mapped, evenly spread: the fit of one part takes
-// time with the square of its frames, and all parts' spectra are held at once.
+constexpr double kColourDifference = 0.01;  // part of the mean; below it the channels are copies
+// At most this many frames of a longer sweep are mapped, evenly spread: the time to fit one part
+// grows with the square of its frames, and all parts' spectra are in memory at once.
 constexpr std::size_t kMostFrames = 128;
 
 class Field {
@@ -47,7 +47,7 @@ class Field {
       return;
     }
     setup_.read_grey = [this](std::size_t frame) { return store_.Grey(frame); };
-    // First: it may be what lets parts of the field come into focus at different depths.
+    // Astigmatism comes first, because it may cause different depths of focus over the field.
     MeasureAstigmatism();
     const std::string astigmatism = AstigmatismInWords(result_);
     if (!astigmatism.empty()) result_.warnings.push_back(astigmatism);
@@ -56,7 +56,7 @@ class Field {
   }
 
  private:
-  // Without the frames that were thrown out, with the blur that was found.
+  // Keeps the frames that are in the fit, and updates them with the fitted blur.
   void KeepUsedFrames() {
     const std::size_t reference = setup_.frames.empty() ? 0 : setup_.frames[setup_.reference].frame;
     std::vector<MeterFrame> kept;
@@ -71,7 +71,7 @@ class Field {
       kept.push_back(entry);
     }
     setup_.frames = std::move(kept);
-    // The reference itself may have been thrown out; without it there is nothing to refer to.
+    // The reference itself may have been rejected; without it there is nothing to refer to.
     if (setup_.frames.empty() || setup_.frames[setup_.reference].frame != reference)
       setup_.frames.clear();
     else
@@ -97,7 +97,7 @@ class Field {
            model::DirectionSign(sweep_.direction) * BelievedReading(frame);
   }
 
-  // zf of one region; the readings as believed, the floor as fitted.
+  // Returns zf of one region, with the corrected readings and the fitted floor.
   std::optional<model::Estimate> FocusOf(const MeterRegion& region, std::string* message) const {
     if (region.frames.size() < 5 || region.modes.size() < 8) {
       *message = "too little texture, or too few frames see it";
@@ -113,8 +113,7 @@ class Field {
     setup.frames.clear();
     setup.offset_mm.sigma = 0;
     setup.reading_sigma_mm = 0;
-    setup.reading_sigma_is_known =
-        false;  // errors from the scatter: there is more than noise in it
+    setup.reading_sigma_is_known = false;  // errors from the scatter: it is more than noise
     setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
     for (const MeterFrame& frame : setup_.frames)
       setup.frames.push_back({BelievedReading(frame.frame), frame.place.scale, std::nullopt});
@@ -174,8 +173,9 @@ class Field {
     if (map.done) DescribeSurface(fitted);
   }
 
-  // [D85] zf = c + gx X + gy Y + q R^2, X and Y mm on the target. Tilt is seen only beside the
-  // curvature: without the quadratic term an off-centre field would pass for a tilted one.
+  // [D85] zf = c + gx X + gy Y + q R^2, X and Y mm on the target. Tilt can be measured only
+  // together with curvature: without the quadratic term an off-centre field would resemble a tilted
+  // one.
   void DescribeSurface(const std::vector<std::size_t>& fitted) {
     FieldMap& map = result_.field;
     const bool with_curvature = fitted.size() >= 6;
@@ -184,7 +184,7 @@ class Field {
     const double mm_per_px = TargetPixelMm();
     Eigen::MatrixXd design(n, terms);
     Eigen::VectorXd value(n), weight(n);
-    double farthest2 = 0;  // mm^2 on the target, of the outermost tile
+    double farthest2 = 0;  // of the outermost tile, mm^2 on the target
     for (Eigen::Index i = 0; i < n; ++i) {
       const FieldTile& tile = map.tiles[fitted[static_cast<std::size_t>(i)]];
       const Eigen::Vector2d x_mm =
@@ -221,7 +221,7 @@ class Field {
     WidenBySpread(fitted);
   }
 
-  // Size of a reference pixel on the target: p z f2/(f1 D).
+  // Returns the size of a reference pixel on the target: p z f2/(f1 D).
   double TargetPixelMm() const {
     const model::ThickLens& lens = sweep_.camera.lens;
     const double zf = fit_.values[kFocusDepth];
@@ -231,8 +231,8 @@ class Field {
            std::abs(model::ChiefRayMagnification(lens, d1_mm, depth_mm));
   }
 
-  // Depths of a target in steps: where no smooth surface describes the tiles, they are parted at
-  // the gaps between their depths.
+  // Finds the depths of a stepped target: where no smooth surface describes the tiles, they are
+  // divided at the gaps between their depths.
   void FindClusters(std::vector<std::size_t> fitted, double chi2) {
     FieldMap& map = result_.field;
     std::sort(fitted.begin(), fitted.end(), [&](std::size_t a, std::size_t b) {
@@ -247,7 +247,7 @@ class Field {
         const double gap_mm = here.value - before.value;
         const double range_mm = map.tiles[fitted.back()].focus_depth_mm.value -
                                 map.tiles[fitted.front()].focus_depth_mm.value;
-        // A gap that holds a third of the whole range stands out of any smooth field.
+        // A gap of a third of the whole range exceeds any in a smooth field.
         if (gap_mm > kApart * std::hypot(here.sigma, before.sigma) && gap_mm > range_mm / 3)
           groups.emplace_back();
       }
@@ -310,8 +310,8 @@ class Field {
         map.tilt_down_deg->sigma));
   }
 
-  // One zf for a field that has several is wrong by as much as they differ beyond their own errors;
-  // where the target stands at several depths, by all of it.
+  // One zf for a field that has several is wrong by the spread beyond their own errors; where the
+  // target has several depths, by the largest difference.
   void WidenBySpread(const std::vector<std::size_t>& fitted) {
     const FieldMap& map = result_.field;
     const double zf = fit_.values[kFocusDepth];
@@ -333,7 +333,7 @@ class Field {
                sweep_.camera.lens, &result_);
   }
 
-  // zf from the blur along x alone and along y alone.
+  // Measures zf from the blur along x alone and along y alone.
   void MeasureAstigmatism() {
     const TargetWindow& window = evidence_.region.window;
     const auto along = [&](int axis) {
@@ -354,7 +354,7 @@ class Field {
                                                    std::hypot(along_x->sigma, along_y->sigma)};
   }
 
-  // Of a frame of the evidence's own set-up among those that are used here.
+  // Returns the index, among the frames used here, of a frame of the evidence's own set-up.
   std::optional<std::size_t> NewIndex(std::size_t evidence_index) const {
     const std::size_t frame = evidence_.spectral.frames[evidence_index].frame;
     for (std::size_t f = 0; f < setup_.frames.size(); ++f) {

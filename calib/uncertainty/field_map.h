@@ -8,11 +8,11 @@
 
 namespace thicklens::calib {
 
-// The same fit on parts of the field, on the blur along x and along y, and on the colour channels:
-// tilt, field curvature, depths of the target, astigmatism, axial colour. All with the readings
-// that the whole field's fit believes, so that what the parts share does not blur how they differ.
-// Fills `field` and `channels` of the calibration, warns of what one plane of focus does not
-// describe and widens the systematic interval by it.
+// Runs the same fit on parts of the field, on the blur along x and along y, and on the colour
+// channels: tilt, field curvature, depths of the target, astigmatism, axial colour. All fits use
+// the readings as the whole field's fit corrected them, so that errors that the parts share do not
+// hide their differences. Fills `field` and `channels` of the calibration, warns of properties that
+// one plane of focus does not describe, and widens the systematic interval by them.
 void MapField(const FocusSweep& sweep, const BlurEvidence& evidence, const BlurFitResult& fit,
               FrameStore* store, Calibration* calibration);
 

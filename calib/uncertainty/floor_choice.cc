@@ -11,8 +11,8 @@
 namespace thicklens::calib {
 namespace {
 
-// A lens floor that nobody measured: between a perfect lens and a soft one, px; up to the softest
-// one that a sharp picture may come from where the target does not exclude it.
+// Interval of a lens floor that was not measured, px: from a perfect lens to a soft one. If the
+// target does not exclude it, the interval extends to the softest lens that gives a sharp image.
 constexpr double kUnknownFloorFromPx = 0;
 constexpr double kUnknownFloorToPx = 1.0;
 constexpr double kSoftestLensPx = 3.0;
@@ -20,11 +20,13 @@ constexpr double kSoftestLensPx = 3.0;
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kRings = 14;
 constexpr double kLowestFrequency = 0.03, kHighestFrequency = 0.33;  // cycles per px
-// Where a soft picture holds noise alone; what a sharp one still has there makes the bound larger.
+// The range where a soft image has noise alone; remaining detail of a sharp image makes the bound
+// larger.
 constexpr double kNoiseFrom = 0.40, kNoiseTo = 0.49;
-constexpr int kFewestModes = 8;  // in a ring
+constexpr int kFewestModes = 8;  // per ring
 
-// sigma^2 of the target's edges in the plane of focus, lens and ink together, if it has edges.
+// Returns sigma^2 of the target's edges in the plane of focus, of lens and ink together, if it has
+// edges.
 std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
   BlurFitSetup setup = evidence.setup;
   if (evidence.edges >= 0) {
@@ -55,7 +57,7 @@ std::optional<double> EdgeSoftness(const BlurEvidence& evidence) {
 
 Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::string>* warnings) {
   if (const std::optional<double> softness_px2 = EdgeSoftness(evidence)) {
-    // From none of the edge's softness to all of it.
+    // The interval is from none of the edge's softness to all of it.
     warnings->push_back(fmt::format(
         "the edges are {:.2f} px soft at focus; how much of it is the lens and how much the "
         "target is not known: photograph a knife edge, or state blur_floor_px",
@@ -80,10 +82,10 @@ Eigen::Vector2d UnknownFloor(const BlurEvidence& evidence, std::vector<std::stri
 }
 
 struct Ring {
-  double nu = 0, power = 0, sigma = 0;  // |nu| as root mean square; mean power and its error
+  double nu = 0, power = 0, sigma = 0;  // |nu| as rms; mean power and its error
 };
 
-// Mean power of a mode before the pixel's box was taken out.
+// Returns the mean noise power of a mode, with the pixel's box still in it.
 double NoisePower(const SpectralMeterSetup& meter, const MeterRegion& region) {
   const MeterFrame& frame = meter.frames[meter.reference];
   const std::vector<Mode> modes = ModesBetween(region.window, kNoiseFrom, kNoiseTo);
@@ -126,7 +128,7 @@ std::vector<Ring> MeasureRings(const SpectralMeterSetup& meter, const MeterRegio
     Ring ring = rings[r];
     ring.nu = std::sqrt(ring.nu / counts[r]);
     ring.power /= counts[r];
-    // The power of a random texture, noise included, has its own mean as standard deviation.
+    // The standard deviation of a random texture's power, noise included, is equal to its mean.
     ring.sigma = raw[r] / counts[r] / std::sqrt(counts[r]);
     kept.push_back(ring);
   }

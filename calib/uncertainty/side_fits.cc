@@ -1,4 +1,4 @@
-// Each side of focus alone.
+// Fits each side of focus alone.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,11 +11,12 @@ namespace {
 
 constexpr std::size_t kFewestOnASide = 6;
 
-// The samples on one side of focus, the target's softness held as the whole sweep has it.
+// Returns the samples on one side of focus, with the target's softness held at the value of the
+// whole sweep.
 std::optional<BlurFitSetup> SideOf(const BlurEvidence& evidence, const BlurFitResult& fit,
                                    bool nearer, std::size_t* frames) {
   BlurFitSetup setup = evidence.setup;
-  setup.offset_mm.sigma = 0;  // moves both sides alike
+  setup.offset_mm.sigma = 0;  // it moves both sides alike
   if (!setup.floor_variance_px2)
     setup.floor_variance_px2 = model::Estimate{fit.values[kFloorVariance], 0};
   *frames = 0;

@@ -10,7 +10,7 @@ namespace {
 
 double Width(const Eigen::Vector2d& interval) { return interval.y() - interval.x(); }
 
-// A shape that is plain wrong makes kappa another one, whatever the shares of d1 are.
+// A clearly wrong shape changes kappa, whatever the shares of d1 are.
 std::optional<std::string> WrongShape(const Calibration& calibration) {
   for (const SystematicPart& part : calibration.systematic_parts) {
     if (part.name == kShapePart && Width(part.blur_ratio) > 0) return part.remedy;

@@ -9,22 +9,22 @@
 
 namespace thicklens::calib {
 
-// What the part is called that another shape of the blur makes; it moves kappa only where the
-// stated shape is plain wrong.
+// Name of the part that another shape of the blur causes. It moves kappa only where the stated
+// shape is clearly wrong.
 inline constexpr const char* kShapePart = "shape of the blur";
 
-// The largest part first; then the advice: what would shrink what takes the largest share of the
-// error of d1, the statistical part at its 95 %, what the bench zero brings into it apart (nothing,
-// where there is no zero). A wrong shape of the blur comes before all shares.
+// Sorts the parts, the largest first, and gives the advice: how to shrink the largest share of the
+// error of d1. The statistical part counts at its 95 %, without the share of the bench zero, which
+// counts separately (0 without a zero). A wrong shape of the blur has priority over all shares.
 void SortAndAdvise(Calibration* calibration);
 
-// Adds a part that moves zf by up to `move_mm` either way, to the table and to the intervals of zf
-// and d1, linearly: these are no errors that average out.
+// Adds a part that moves zf by up to `move_mm` in either direction to the table and to the
+// intervals of zf and d1. It is added linearly because such errors do not average out.
 void WidenFocus(const std::string& name, double move_mm, const std::string& remedy,
                 const model::ThickLens& lens, Calibration* calibration);
 
-// Adds a part by fitting again with each of `setups` in place of what was assumed, to the table and
-// to the intervals of zf, d1, kappa and the bench zero.
+// Adds a part to the table and to the intervals of zf, d1, kappa and the bench zero: the fit is
+// repeated with each of `setups` instead of the assumed one.
 void WidenByTrials(const std::string& name, const std::string& remedy,
                    const std::vector<BlurFitSetup>& setups, const BlurFitResult& fit,
                    Calibration* calibration);

@@ -17,11 +17,11 @@ constexpr double kShapesDiffer = 1.1;  // ratio of chi^2 of the frames
 // Difference of chi^2 of the frames, 4 standard deviations, beyond which a family is ruled out.
 constexpr double kRuledOut = 16;
 constexpr double kLawFails = 2;       // chi^2 per degree of freedom of the blur law
-constexpr double kSidesDisagree = 3;  // of their standard deviations
-// What the meters themselves are good for, relative to kappa: measured on simulated sweeps.
+constexpr double kSidesDisagree = 3;  // times their standard deviations
+// Accuracy of the meters themselves, relative to kappa: measured on simulated sweeps.
 constexpr double kMeterRatioError = 0.003;
 
-// A choice that was tried: what it is called, the fit with it, and the lens that it is for.
+// An alternative choice: the fit with it, and the lens that it is for.
 struct Trial {
   BlurFitResult fit;
   model::ThickLens lens;
@@ -57,7 +57,7 @@ class Parts {
   }
 
  private:
-  // Widens a part by a trial's answer.
+  // Widens a part by a trial's result.
   void Include(const Trial& trial, SystematicPart* part) const {
     if (!trial.fit.done) return;
     const auto widen = [](double move, Eigen::Vector2d* interval) {
@@ -86,7 +86,7 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // Only where the two sides contradict each other.
+  // Adds a part only where the two sides contradict each other.
   void AddSides() {
     const SideFit& nearer = result_.nearer;
     const SideFit& farther = result_.farther;
@@ -121,7 +121,7 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // Another set of samples in a meter's place. Frames that were thrown out stay out.
+  // Fits with other samples in place of a meter's. Rejected frames remain excluded.
   std::optional<Trial> With(const std::optional<BlurSamples>& samples, int meter) const {
     if (!samples || meter < 0) return std::nullopt;
     BlurFitSetup setup = evidence_.setup;
@@ -153,8 +153,8 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // The other shape is right beyond doubt: the frames themselves say so, or the law holds with it
-  // and not with the stated one.
+  // Whether the other shape is right beyond doubt: the frames themselves show it, or the law holds
+  // with it and not with the stated one.
   bool OtherShapeIsRight(const Trial& other) const {
     if (!other.fit.done) return false;
     if (evidence_.gaussian_misfit && evidence_.disc_misfit) {
@@ -167,8 +167,8 @@ class Parts {
            fit_.chi2_per_dof > 2 * other.fit.chi2_per_dof;
   }
 
-  // The stated family describes the frames better beyond doubt. Another family's kappa says nothing
-  // then: it is the second moment of a shape that the blur does not have.
+  // Whether the stated family describes the frames better beyond doubt. Another family's kappa is
+  // then meaningless: it is the second moment of a shape that the blur does not have.
   bool OtherShapeIsRuledOut() const {
     if (!evidence_.gaussian_misfit || !evidence_.disc_misfit) return false;
     const bool is_gaussian = sweep_.camera.psf == model::Psf::kGaussian;
@@ -178,7 +178,7 @@ class Parts {
     return other > kShapesDiffer * stated;
   }
 
-  // The spread over the families that the frames do not rule out. The depth is compared in any
+  // Adds the spread over the families that the frames do not rule out. The depth is compared in any
   // case.
   void AddShape() {
     const std::optional<Trial> trial =
@@ -204,7 +204,7 @@ class Parts {
         fit_.chi2_per_dof, trial->fit.values[kBlurRatio], model::PsfName(other)));
   }
 
-  // What the shape of the blur's tails does to its second moment: pupil laws differ by it.
+  // Adds the effect of the blur's tails, in which pupil laws differ, on its second moment.
   void AddTails() {
     const double kappa = fit_.values[kBlurRatio];
     const double zf_mm = fit_.values[kFocusDepth];
@@ -233,7 +233,7 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // Each meter alone, where there are two.
+  // Tries each meter alone, where there are two.
   void AddMeter() {
     if (evidence_.setup.meters.size() < 2) return;
     SystematicPart part;
@@ -242,7 +242,7 @@ class Parts {
     for (std::size_t m = 0; m < evidence_.setup.meters.size(); ++m) {
       BlurFitSetup setup = evidence_.setup;
       setup.meters = {evidence_.setup.meters[m]};
-      // What one meter says of the floor holds for the other too.
+      // The floor that one meter determines also holds for the other.
       if (!setup.floor_variance_px2)
         setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
       Include(Try(setup), &part);
@@ -250,7 +250,7 @@ class Parts {
     result_.systematic_parts.push_back(part);
   }
 
-  // The numbers of the camera file that state a tolerance.
+  // Tries the numbers of the camera file that state a tolerance.
   void AddTolerances() {
     for (const auto& [field, statement] : sweep_.camera.statements) {
       if (!(statement.tolerance > 0)) continue;
@@ -268,8 +268,8 @@ class Parts {
     }
   }
 
-  // Moves a number of the camera file; false for those that the fit does not use, or an impossible
-  // value.
+  // Changes a number of the camera file. Returns false if the fit does not use the number, or if
+  // its value is impossible.
   static bool Change(const std::string& field, double change, BlurFitSetup* setup) {
     double* number = field == "lens.front_focal_length_mm"  ? &setup->lens.front_focal_length_mm
                      : field == "lens.rear_focal_length_mm" ? &setup->lens.rear_focal_length_mm
@@ -282,7 +282,8 @@ class Parts {
     return setup->lens.IsValid(nullptr) && setup->pixel_pitch_mm > 0;
   }
 
-  // The floor's ends are as likely as its middle, so they add; the rest adds in quadrature.
+  // The floor's ends are as likely as its middle, so they add linearly; the rest adds in
+  // quadrature.
   void SetIntervals(const FloorInterval& floor) {
     const auto total = [&](Eigen::Vector2d SystematicPart::*of) {
       Eigen::Vector2d ends(0, 0), squares(0, 0);

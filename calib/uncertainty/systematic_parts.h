@@ -10,15 +10,16 @@
 
 namespace thicklens::calib {
 
-// What is not known of the floor: an interval of S0, px^2, or nothing.
+// The uncertainty of the floor: an interval of S0, px^2, or nothing.
 using FloorInterval = std::optional<Eigen::Vector2d>;
 
-// Fits each side of focus alone, with what the target's softness came out as: the self-test.
+// Fits each side of focus alone, with the target's softness held at the fit's value, as a
+// self-test.
 void FitSides(const BlurEvidence& evidence, const BlurFitResult& fit, Calibration* calibration);
 
-// Tries every choice that another person might have made (floor, side, band, shape, meter, the
-// camera's stated tolerances) and notes how far it moves each result; fills in the systematic
-// intervals, the table of parts and the advice.
+// Tries every alternative choice (floor, side, band, shape, meter, the camera's stated tolerances)
+// and records how far it moves each result. Fills in the systematic intervals, the table of parts
+// and the advice.
 void AddSystematicParts(const FocusSweep& sweep, const BlurEvidence& evidence,
                         const BlurFitResult& fit, const FloorInterval& floor,
                         Calibration* calibration);
