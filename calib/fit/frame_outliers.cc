@@ -11,7 +11,8 @@ namespace thicklens::calib {
 namespace {
 
 constexpr std::size_t kFewestFrames = 5;
-// A frame whose spectrum scatters more than the others' by this factor shows another object.
+// A frame whose spectrum scatters more than the others' by this factor, in power, does not show
+// what the others show.
 constexpr double kScatterOfDamage = 30;
 
 // There may be two errors because both sides of focus have the same blur.

@@ -113,7 +113,7 @@ class Field {
     setup.frames.clear();
     setup.offset_mm.sigma = 0;
     setup.reading_sigma_mm = 0;
-    setup.reading_sigma_is_known = false;  // errors from the scatter: it is more than noise
+    setup.reading_sigma_is_known = false;  // errors from the scatter, not noise alone
     setup.floor_variance_px2 = model::Estimate{fit_.values[kFloorVariance], 0};
     for (const MeterFrame& frame : setup_.frames)
       setup.frames.push_back({BelievedReading(frame.frame), frame.place.scale, std::nullopt});
