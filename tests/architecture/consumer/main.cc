@@ -1,11 +1,24 @@
 #include <cmath>
 #include <cstdio>
+#include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
 #include "thicklens/calib/calibrate.h"
+#include "thicklens/estimator/estimate_input.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/light_field_io.h"
 #include "thicklens/model/thick_lens.h"
 
-int main() {
+namespace {
+
+bool Fail(const std::string& what) {
+  std::fprintf(stderr, "%s\n", what.c_str());
+  return false;
+}
+
+bool LensIsRight() {
   thicklens::model::ThickLens lens;
   lens.front_focal_length_mm = 50;
   lens.rear_focal_length_mm = 50;
@@ -13,16 +26,51 @@ int main() {
   lens.aperture_radius_mm = 10;
   // D = 105 - 5 = 100 = 2 f, so that the plane in focus is at 2 f, too.
   const double focus_depth_mm = thicklens::model::FocusDepthMm(lens, 105);
-  if (!(std::abs(focus_depth_mm - 100) < 1e-9)) {
-    std::fprintf(stderr, "focus depth %.17g mm, not 100\n", focus_depth_mm);
-    return 1;
-  }
-  // From calib, so that everything it uses inside has to be found by the linker.
+  return std::abs(focus_depth_mm - 100) < 1e-9 ||
+         Fail("focus depth " + std::to_string(focus_depth_mm) + " mm, not 100");
+}
+
+// From calib, so that everything it uses inside has to be found by the linker.
+bool OptionsAreValid() {
   const thicklens::calib::CalibrationOptions options;
   std::string why;
-  if (!options.IsValid(&why)) {
-    std::fprintf(stderr, "default options: %s\n", why.c_str());
+  return options.IsValid(&why) || Fail("default options: " + why);
+}
+
+// One blue pixel of a bitmap, which the library beside the installed program decodes.
+bool BitmapIsRead() {
+  const std::string bitmap(
+      "BM\x3A\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0"
+      "\0\0\0\0\x04\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xFF\0\0\0",
+      58);
+  const cv::Mat image = thicklens::io::DecodePicture(bitmap, "one pixel");
+  const auto pixel = image.at<cv::Vec3b>(0, 0);
+  return (pixel[0] == 0 && pixel[2] == 255) || Fail("the pixel is not blue");
+}
+
+// The photograph, warped by its depth, as a light field in a folder that is read again.
+bool LightFieldIsWritten() {
+  thicklens::estimator::EstimateInput input;
+  input.picture = {8, 8, 1, std::vector<float>(64, 0.5F)};
+  input.disparity.width_px = input.disparity.height_px = 8;
+  input.disparity.disparity.assign(64, 0.5F);
+  input.weights = Eigen::ArrayXXd::Constant(3, 3, 1.0 / 9);
+  const auto light_field = thicklens::estimator::WarpedLightField(input, true, 1);
+  thicklens::OutputFolder folder("light_field", thicklens::io::kLightFieldMarker,
+                                 thicklens::io::LightFieldEntries());
+  thicklens::io::WriteLightField(light_field, thicklens::io::ViewFormat::kPng, &folder);
+  folder.Commit();
+  const auto read = thicklens::io::ReadLightField("light_field", {});
+  return (read.u_count == 3 && read.v_count == 3) || Fail("not all views were read");
+}
+
+}  // namespace
+
+int main() {
+  try {
+    return LensIsRight() && OptionsAreValid() && BitmapIsRead() && LightFieldIsWritten() ? 0 : 1;
+  } catch (const thicklens::Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
     return 1;
   }
-  return 0;
 }

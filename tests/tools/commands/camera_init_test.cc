@@ -121,7 +121,7 @@ TEST(DescribedCamera, PrefersWhatIsGivenToThePhotograph) {
   EXPECT_THAT(assumed, Contains("sensor.pixel_pitch_mm"));
 }
 
-TEST(io::ReadPhotoExif, ReadsLensAndPitch) {
+TEST(ReadPhotoExif, ReadsLensAndPitch) {
   const io::PhotoExif photo = io::ReadPhotoExif(WritePhoto("typical.png", TypicalExif()), 32, 24);
   ASSERT_TRUE(photo.focal_length_mm && photo.f_number && photo.pixel_pitch_mm);
   EXPECT_NEAR(*photo.focal_length_mm, 25, 1e-6);
@@ -130,7 +130,7 @@ TEST(io::ReadPhotoExif, ReadsLensAndPitch) {
   EXPECT_EQ(photo.model, "Bench 1");
 }
 
-TEST(io::ReadPhotoExif, TakesInchesWhereNoUnitIsGiven) {
+TEST(ReadPhotoExif, TakesInchesWhereNoUnitIsGiven) {
   Exiv2::ExifData exif = TypicalExif();
   exif.erase(exif.findKey(Exiv2::ExifKey("Exif.Photo.FocalPlaneResolutionUnit")));
   const io::PhotoExif photo = io::ReadPhotoExif(WritePhoto("inches.png", exif), 32, 24);
@@ -139,7 +139,7 @@ TEST(io::ReadPhotoExif, TakesInchesWhereNoUnitIsGiven) {
 }
 
 // The resolution is that of the picture out of the camera; a smaller copy keeps the number.
-TEST(io::ReadPhotoExif, TakesNoPitchFromAScaledOrCutPicture) {
+TEST(ReadPhotoExif, TakesNoPitchFromAScaledOrCutPicture) {
   Exiv2::ExifData exif = TypicalExif();
   exif["Exif.Photo.PixelXDimension"] = std::uint32_t{64};
   exif["Exif.Photo.PixelYDimension"] = std::uint32_t{48};
@@ -148,13 +148,13 @@ TEST(io::ReadPhotoExif, TakesNoPitchFromAScaledOrCutPicture) {
   EXPECT_THAT(photo.why_no_pitch, AllOf(HasSubstr("32 x 24"), HasSubstr("64 x 48")));
 }
 
-TEST(io::ReadPhotoExif, KnowsNothingOfAPictureWithoutExif) {
+TEST(ReadPhotoExif, KnowsNothingOfAPictureWithoutExif) {
   const io::PhotoExif photo = io::ReadPhotoExif(WritePhoto("bare.png", Exiv2::ExifData()), 32, 24);
   EXPECT_FALSE(photo.focal_length_mm || photo.f_number || photo.pixel_pitch_mm);
   EXPECT_THAT(photo.why_no_pitch, HasSubstr("FocalPlaneXResolution"));
 }
 
-TEST(io::ReadPhotoExif, UsesNoZeroDenominator) {
+TEST(ReadPhotoExif, UsesNoZeroDenominator) {
   Exiv2::ExifData exif = TypicalExif();
   exif["Exif.Photo.FocalLength"] = Exiv2::Rational(25, 0);
   exif["Exif.Photo.FNumber"] = Exiv2::Rational(0, 1);

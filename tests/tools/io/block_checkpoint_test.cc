@@ -24,6 +24,8 @@
 namespace thicklens::io {
 namespace {
 
+using tools::ChildProgram;
+using tools::ProgramResult;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;

@@ -21,6 +21,7 @@
 namespace thicklens::io {
 namespace {
 
+using tools::Encoded;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;

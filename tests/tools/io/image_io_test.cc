@@ -19,6 +19,7 @@
 namespace thicklens::io {
 namespace {
 
+using tools::Encoded;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
