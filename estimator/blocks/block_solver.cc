@@ -11,14 +11,14 @@
 #include <string>
 #include <utility>
 
-#include "estimator/base/residual_guard.h"
-#include "estimator/base/run_cost.h"
 #include "estimator/blocks/block_system.h"
 #include "estimator/blocks/linear_solver.h"
 #include "estimator/views/input_checks.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/residual_guard.h"
+#include "thicklens/base/run_cost.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/block_store.h"
 

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/base/residual_guard.h"
-#include "estimator/base/run_cost.h"
 #include "estimator/views/input_checks.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/residual_guard.h"
+#include "thicklens/base/run_cost.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -7,9 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/base/iteration_progress.h"
-#include "estimator/base/residual_guard.h"
-#include "estimator/base/run_cost.h"
 #include "estimator/cpu/aperture_prior.h"
 #include "estimator/functional/conjugate_gradients.h"
 #include "estimator/functional/functional_run.h"
@@ -17,7 +14,10 @@
 #include "estimator/projection/scene_rays.h"
 #include "estimator/views/input_checks.h"
 #include "estimator/views/ray_landing.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/residual_guard.h"
+#include "thicklens/base/run_cost.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::estimator {

@@ -8,9 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/base/iteration_progress.h"
-#include "estimator/base/residual_guard.h"
-#include "estimator/base/run_cost.h"
 #include "estimator/functional/conjugate_gradients.h"
 #include "estimator/functional/functional_run.h"
 #include "estimator/functional/grid_links.h"
@@ -20,7 +17,10 @@
 #include "estimator/views/ray_landing.h"
 #include "estimator/views/warped_views.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/residual_guard.h"
+#include "thicklens/base/run_cost.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::estimator {

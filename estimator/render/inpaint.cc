@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/base/run_cost.h"
 #include "estimator/render/shown_views.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/run_cost.h"
 
 namespace thicklens::estimator {
 namespace {

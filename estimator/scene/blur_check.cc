@@ -7,14 +7,14 @@
 #include <cstddef>
 #include <utility>
 
-#include "estimator/base/iteration_progress.h"
-#include "estimator/base/run_cost.h"
 #include "estimator/scene/blur_picture.h"
 #include "estimator/scene/blur_trials.h"
 #include "estimator/scene/scene_radiance.h"
 #include "estimator/views/input_checks.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/run_cost.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::estimator {

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
-#include "estimator/base/run_cost.h"
 #include "estimator/scene/coarse_start.h"
 #include "estimator/scene/scene_bands.h"
 #include "estimator/scene/scene_memory.h"
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/run_cost.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::estimator {

@@ -7,11 +7,11 @@
 #include <cstddef>
 #include <utility>
 
-#include "estimator/base/residual_guard.h"
-#include "estimator/base/run_cost.h"
 #include "estimator/scene/scene_relief.h"
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/residual_guard.h"
+#include "thicklens/base/run_cost.h"
 
 namespace thicklens::estimator {
 namespace {

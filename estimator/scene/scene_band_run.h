@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/base/iteration_progress.h"
 #include "estimator/scene/scene_bands.h"
 #include "estimator/scene/scene_memory.h"
 #include "estimator/scene/scene_radiance.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::estimator {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstdint>
 
-#include "estimator/base/run_cost.h"
 #include "estimator/projection/view_fan.h"
 #include "estimator/scene/scene_relief.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/run_cost.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/picture_filter.h"
 

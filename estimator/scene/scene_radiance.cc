@@ -7,11 +7,11 @@
 #include <numeric>
 #include <utility>
 
-#include "estimator/base/run_cost.h"
 #include "estimator/scene/coarse_start.h"
 #include "estimator/scene/scene_patches.h"
 #include "estimator/scene/scene_strength.h"
 #include "estimator/scene/stored_slope.h"
+#include "thicklens/base/run_cost.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -5,13 +5,13 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/base/iteration_progress.h"
 #include "estimator/projection/scene_projection.h"
 #include "estimator/scene/scene_bands.h"
 #include "estimator/scene/scene_data.h"
 #include "estimator/scene/scene_memory.h"
 #include "estimator/scene/scene_priors.h"
 #include "estimator/scene/scene_system.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/estimator/scene_solver.h"
 
 namespace thicklens::estimator {

@@ -7,8 +7,6 @@
 #include <cstddef>
 #include <utility>
 
-#include "estimator/base/iteration_progress.h"
-#include "estimator/base/run_cost.h"
 #include "estimator/scene/scene_band_run.h"
 #include "estimator/scene/scene_bands.h"
 #include "estimator/scene/scene_memory.h"
@@ -16,7 +14,9 @@
 #include "estimator/views/input_checks.h"
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/run_cost.h"
 
 namespace thicklens::estimator {
 namespace {

@@ -1,8 +1,8 @@
 #ifndef THICKLENS_ESTIMATOR_SCENE_SCENE_VIEWS_H_
 #define THICKLENS_ESTIMATOR_SCENE_SCENE_VIEWS_H_
 
-#include "estimator/base/iteration_progress.h"
 #include "estimator/scene/scene_band_run.h"
+#include "thicklens/base/iteration_progress.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/kernels/device.h"
 

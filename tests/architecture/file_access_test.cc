@@ -38,7 +38,7 @@ const std::set<std::string>& Known() {
       "tools/io/picture_kind.cc",              // libtiff, from memory
       "tools/system/standard_descriptors.cc",  // the null device
       "kernels/opencl/guarded_child.cc",       // the null device
-      "estimator/base/run_cost.cc",            // files of /proc
+      "model/base/run_cost.cc",                // files of /proc
       "tools/system/machine.cc",               //
       "tools/io/block_checkpoint.cc",          //
       "model/base/memory_available.cc",        //

@@ -150,7 +150,7 @@ void HostileTest::ExpectRefused(const Outcome& outcome, int exit_code,
   EXPECT_EQ(errors.size(), 1U) << outcome.err.substr(0, kLongestMessageBytes);
   for (const std::string& error : errors) {
     EXPECT_LE(error.size(), kLongestMessageBytes);
-    EXPECT_EQ(PrintableUtf8(error), error);
+    EXPECT_EQ(thicklens::PrintableUtf8(error), error);
     for (const std::string& text : told)
       EXPECT_THAT(error.substr(0, kLongestMessageBytes), HasSubstr(text));
   }

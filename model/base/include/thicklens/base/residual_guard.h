@@ -1,13 +1,13 @@
-#ifndef THICKLENS_ESTIMATOR_BASE_RESIDUAL_GUARD_H_
-#define THICKLENS_ESTIMATOR_BASE_RESIDUAL_GUARD_H_
+#ifndef THICKLENS_BASE_RESIDUAL_GUARD_H_
+#define THICKLENS_BASE_RESIDUAL_GUARD_H_
 
 #include <cmath>
 #include <string>
 
-namespace thicklens::estimator {
+namespace thicklens {
 
 // Throws Error if the final relative residual [D118] |N x - b|/|b| of the iterations is 10 or more,
-// or NaN: x = 0 would then have been far better, and the light field may be anything. During their
+// or NaN: x = 0 would then have been far better, and the solution may be anything. During their
 // iterations conjugate gradients may be above 1 with an iterate that is better than their start.
 // Below 10 an unconverged solution is usable, and its summary reports it. `advice` says how to make
 // the iterations converge.
@@ -17,6 +17,6 @@ void RequireProgress(const std::string& solver, double relative_residual, int it
 // Returns the larger residual; NaN counts as larger than every number.
 inline double LargerResidual(double a, double b) { return a >= b || std::isnan(a) ? a : b; }
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens
 
-#endif  // THICKLENS_ESTIMATOR_BASE_RESIDUAL_GUARD_H_
+#endif  // THICKLENS_BASE_RESIDUAL_GUARD_H_

@@ -1,10 +1,10 @@
-#include "estimator/base/residual_guard.h"
+#include "thicklens/base/residual_guard.h"
 
 #include <fmt/format.h>
 
 #include "thicklens/base/error.h"
 
-namespace thicklens::estimator {
+namespace thicklens {
 
 void RequireProgress(const std::string& solver, double relative_residual, int iterations,
                      const std::string& advice) {
@@ -16,4 +16,4 @@ void RequireProgress(const std::string& solver, double relative_residual, int it
                   solver, iterations, relative_residual, kLost, advice));
 }
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens

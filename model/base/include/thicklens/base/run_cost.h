@@ -1,10 +1,10 @@
-#ifndef THICKLENS_ESTIMATOR_BASE_RUN_COST_H_
-#define THICKLENS_ESTIMATOR_BASE_RUN_COST_H_
+#ifndef THICKLENS_BASE_RUN_COST_H_
+#define THICKLENS_BASE_RUN_COST_H_
 
 #include <chrono>
 #include <optional>
 
-namespace thicklens::estimator {
+namespace thicklens {
 
 // Time and memory that a run has used so far, for its summary and its limit.
 constexpr double kBytesPerMib = 1024.0 * 1024.0;
@@ -17,6 +17,6 @@ void ReturnFreedMemory(const std::optional<double>& limit_mib);
 // Memory that stays with the process in any case; infinite without a limit.
 double StayingBytes(const std::optional<double>& limit_mib);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens
 
-#endif  // THICKLENS_ESTIMATOR_BASE_RUN_COST_H_
+#endif  // THICKLENS_BASE_RUN_COST_H_

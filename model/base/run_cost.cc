@@ -1,4 +1,4 @@
-#include "estimator/base/run_cost.h"
+#include "thicklens/base/run_cost.h"
 
 #include <malloc.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <fstream>
 #include <limits>
 
-namespace thicklens::estimator {
+namespace thicklens {
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -32,4 +32,4 @@ double StayingBytes(const std::optional<double>& limit_mib) {
   return kHardlyMissed * *limit_mib * kBytesPerMib;
 }
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens

@@ -1,11 +1,11 @@
-#ifndef THICKLENS_ESTIMATOR_BASE_ITERATION_PROGRESS_H_
-#define THICKLENS_ESTIMATOR_BASE_ITERATION_PROGRESS_H_
+#ifndef THICKLENS_BASE_ITERATION_PROGRESS_H_
+#define THICKLENS_BASE_ITERATION_PROGRESS_H_
 
 #include <algorithm>
 #include <functional>
 #include <mutex>
 
-namespace thicklens::estimator {
+namespace thicklens {
 
 // Progress over views and iterations, counted together from any thread. There may be fewer or more
 // iterations than expected.
@@ -33,6 +33,6 @@ class IterationProgress {
   int done_ = 0;
 };
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens
 
-#endif  // THICKLENS_ESTIMATOR_BASE_ITERATION_PROGRESS_H_
+#endif  // THICKLENS_BASE_ITERATION_PROGRESS_H_

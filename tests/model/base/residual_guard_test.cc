@@ -1,5 +1,5 @@
 // Iterations that led nowhere are no answer.
-#include "estimator/base/residual_guard.h"
+#include "thicklens/base/residual_guard.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 #include "thicklens/base/error.h"
 
-namespace thicklens::estimator {
+namespace thicklens {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -37,4 +37,4 @@ TEST(ResidualGuard, NoNumberIsTheLargestResidual) {
 }
 
 }  // namespace
-}  // namespace thicklens::estimator
+}  // namespace thicklens
