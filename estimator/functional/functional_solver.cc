@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/cpu/aperture_prior.h"
 #include "estimator/functional/conjugate_gradients.h"
 #include "estimator/functional/functional_run.h"
 #include "estimator/projection/scene_projection.h"
@@ -18,6 +17,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/residual_guard.h"
 #include "thicklens/base/run_cost.h"
+#include "thicklens/kernels/aperture_prior.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::estimator {
@@ -35,7 +35,7 @@ int ExpectedIterations(const FunctionalOptions& options, double ridge, double vi
 template <typename Real>
 class FunctionalSystem {
  public:
-  FunctionalSystem(SceneRays<Real>* rays, AperturePrior<Real>* prior, int threads)
+  FunctionalSystem(SceneRays<Real>* rays, kernels::AperturePrior<Real>* prior, int threads)
       : rays_(*rays),
         prior_(*prior),
         threads_(threads),
@@ -78,7 +78,7 @@ class FunctionalSystem {
   // Sets all planes to A^-1 H^T x, where x is `picture`.
   void SpreadOverAperture(const std::vector<Real>& picture) {
     rays_.ApplyTransposed(picture.data(), planes_.data());
-    constexpr std::size_t kPacket = AperturePrior<Real>::kPacket;
+    constexpr std::size_t kPacket = kernels::AperturePrior<Real>::kPacket;
     const std::size_t points = (size_ + kPacket - 1) / kPacket;
     prior_.ApplyInverse(points * kPacket, rays_.plane_stride(), threads_, planes_.data());
   }
@@ -97,7 +97,7 @@ class FunctionalSystem {
   }
 
   SceneRays<Real>& rays_;
-  AperturePrior<Real>& prior_;
+  kernels::AperturePrior<Real>& prior_;
   const int threads_;
   const std::size_t size_;
   std::vector<Real> planes_;      // one for each aperture sample
@@ -165,8 +165,9 @@ model::LightField SolveFunctional(const EstimateInput& input, const FunctionalOp
       falloff ? WithoutFalloff(input.picture, *input.grid, input.camera_of_falloff(), input.weights,
                                threads)
               : input.picture;
-  AperturePrior<Real> prior(static_cast<int>(input.weights.cols()),
-                            static_cast<int>(input.weights.rows()), options.gamma, summary->ridge);
+  kernels::AperturePrior<Real> prior(static_cast<int>(input.weights.cols()),
+                                     static_cast<int>(input.weights.rows()), options.gamma,
+                                     summary->ridge);
   FunctionalSystem<Real> system(&rays, &prior, threads);
   model::LightField light_field = FrameOf(input);
   summary->setup_seconds = SecondsSince(start);

@@ -4,15 +4,15 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/cpu/grid_loops.h"
 #include "estimator/projection/grid_photograph.h"
 #include "estimator/views/same_point.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/kernels/grid_loops.h"
 
 namespace thicklens::estimator {
 namespace {
 
-constexpr std::size_t kBandSamples = kLongestRun;
+constexpr std::size_t kBandSamples = kernels::kLongestRun;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
@@ -108,7 +108,7 @@ void GridLinks::AddBand(Axis axis, int view, int t, std::size_t band, Real gamma
     // A negative `whole` wraps around, and the sum is still correct.
     const std::size_t near =
         at + to_next + static_cast<std::size_t>(run.whole) * (across ? 1 : width);
-    LinkRun<Real> loop;
+    kernels::LinkRun<Real> loop;
     loop.count = Index(run.count);
     loop.disparity = disparity_[Index(view)].data() + at;
     loop.slope = static_cast<Real>(-(across ? map_.step.x() : map_.step.y()));
@@ -119,7 +119,7 @@ void GridLinks::AddBand(Axis axis, int view, int t, std::size_t band, Real gamma
     loop.sum_here = sum_here + at;
     loop.sum_near = sum_here + near;
     loop.sum_far = run.is_single ? nullptr : sum_here + near + to_far;
-    AddLinks(gamma, loop);
+    kernels::AddLinks(gamma, loop);
   }
 }
 

@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "estimator/blocks/block_system.h"
-#include "estimator/cpu/aperture_prior.h"
 #include "estimator/projection/scene_projection.h"
 #include "estimator/projection/scene_rays.h"
 #include "estimator/views/input_checks.h"
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
+#include "thicklens/kernels/aperture_prior.h"
 #include "thicklens/kernels/kernels.h"
 
 namespace thicklens::estimator {
@@ -118,10 +118,11 @@ Conditioning ConditioningOfSceneRays(const EstimateInput& input, const Functiona
   SceneRays<double> rays(PhotographDisparity(input.disparity, landing_step_px), input.weights, 1,
                          [] {});
   const double ridge = options.ridge.value_or(1e-2 / static_cast<double>(input.weights.size()));
-  AperturePrior<double> prior(static_cast<int>(input.weights.cols()),
-                              static_cast<int>(input.weights.rows()), options.gamma, ridge);
+  kernels::AperturePrior<double> prior(static_cast<int>(input.weights.cols()),
+                                       static_cast<int>(input.weights.rows()), options.gamma,
+                                       ridge);
   const std::size_t pixels = rays.pixels(), stride = rays.plane_stride();
-  constexpr std::size_t kPacket = AperturePrior<double>::kPacket;
+  constexpr std::size_t kPacket = kernels::AperturePrior<double>::kPacket;
   const std::size_t points = (pixels + kPacket - 1) / kPacket * kPacket;
   std::vector<double> planes(stride * rays.view_count()), unit(stride), column(stride);
   Eigen::MatrixXd matrix(static_cast<Index>(pixels), static_cast<Index>(pixels));

@@ -5,12 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/cpu/product_row.h"
 #include "estimator/projection/view_fan.h"
 #include "estimator/views/catmull_rom.h"
 #include "estimator/views/surface_taps.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/kernels/product_row.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -57,7 +57,7 @@ std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
   std::vector<unsigned char> is_product(disparity.disparity.size());
   ParallelFor(fan.height_px, threads, [&](int y) {
     const std::size_t begin = Index(y) * Index(fan.width_px);
-    ProductRow row;
+    kernels::ProductRow row;
     row.y = y;
     row.width_px = fan.width_px;
     row.height_px = fan.height_px;
@@ -78,7 +78,7 @@ std::vector<unsigned char> IsProduct(const ViewFan& fan, const FanAxes& axes,
       for (const Stretch& stretch : unknown) {
         row.first_x = stretch.first;
         row.last_x = stretch.last;
-        CheckProducts(row, all.data());
+        kernels::CheckProducts(row, all.data());
       }
     }
     for (std::size_t x = 0; x < all.size(); ++x)

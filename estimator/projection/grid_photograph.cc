@@ -134,7 +134,7 @@ void GridPhotograph<Real>::SetTaps() {
     column_ends_.push_back(column.end);
     shares_of_columns.push_back(SharesOf(column, picture_.u_count));
     for (int l = 0; l < picture_.v_count; ++l) {
-      std::vector<PixelTap<Real>>& taps = taps_[Index(l)].emplace_back();
+      std::vector<kernels::PixelTap<Real>>& taps = taps_[Index(l)].emplace_back();
       for (const Reach& reach : column.reaches) {
         const int k = reach.of_views, view = l * picture_.u_count + k;
         const auto weight = static_cast<Real>(picture_.view_weight[Index(view)] * reach.tap.share);
@@ -183,7 +183,7 @@ void GridPhotograph<Real>::AddViews(int l, int first, int last, const Real* rays
   const int begin = std::max(inside.y_begin, first - 1);  // first pixel that rays land nearest to
   const int end = std::min(inside.y_end, last + 1);
   for (int ray_y = begin; ray_y < end; ++ray_y) {
-    std::array<PixelRow<Real>, 2> rows;
+    std::array<kernels::SharedRow<Real>, 2> rows;
     for (std::size_t i = 0; i < taps.size(); ++i) {
       const int y = ray_y - taps[i].offset;
       if (!(taps[i].share > 0) || y < first || y >= last) continue;
@@ -195,7 +195,8 @@ void GridPhotograph<Real>::AddViews(int l, int first, int last, const Real* rays
         Index(ray_y - picture_.t_shift[Index(l)]) * Index(picture_.s_count);
     int x = 0;
     for (std::size_t run = 0; run < column_ends_.size(); ++run) {
-      AddTaps(taps_[Index(l)][run], of_views, row_start, Index(x), Index(column_ends_[run]), rows);
+      kernels::AddTaps(taps_[Index(l)][run], of_views, row_start, Index(x),
+                       Index(column_ends_[run]), rows);
       x = column_ends_[run];
     }
   }
@@ -224,7 +225,7 @@ void GridPhotograph<Real>::AddToView(int view, int first, int last, const Real* 
   const int begin = std::max(first, inside.y_begin - t_shift);
   const int end = std::min(last, inside.y_end - t_shift);
   if (begin >= end || inside.x_begin >= inside.x_end) return;
-  std::vector<RayPixel<Real>> pixels;  // pixels of the first ray in a row
+  std::vector<kernels::RayPixel<Real>> pixels;  // pixels of the first ray in a row
   for (const RayTap& in_y : TapsOf(picture_.t_fraction[Index(l)])) {
     for (const RayTap& in_x : TapsOf(picture_.s_fraction[Index(k)])) {
       const double weight = picture_.view_weight[Index(view)] * in_y.share * in_x.share;
@@ -237,9 +238,10 @@ void GridPhotograph<Real>::AddToView(int view, int first, int last, const Real* 
   if (pixels.empty()) return;
   for (int t = begin; t < end; ++t) {
     const std::size_t sample = Index(t) * Index(picture_.s_count) + Index(inside.x_begin - s_shift);
-    AddPixels(pixels, irradiance_.empty() ? nullptr : irradiance_[Index(view)].data() + sample,
-              Index(inside.x_end - inside.x_begin), rays + Index(view) * view_size() + sample);
-    for (RayPixel<Real>& pixel : pixels) pixel.pixel += framed_width();
+    kernels::AddPixels(
+        pixels, irradiance_.empty() ? nullptr : irradiance_[Index(view)].data() + sample,
+        Index(inside.x_end - inside.x_begin), rays + Index(view) * view_size() + sample);
+    for (kernels::RayPixel<Real>& pixel : pixels) pixel.pixel += framed_width();
   }
 }
 

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "estimator/cpu/photograph_loops.h"
 #include "thicklens/kernels/kernels.h"
+#include "thicklens/kernels/photograph_loops.h"
 
 namespace thicklens::estimator {
 
@@ -69,7 +69,7 @@ class GridPhotograph {
   // They are therefore stored for each run of columns and every row of views, and for each run of
   // rows.
   std::vector<int> column_ends_;
-  std::vector<std::vector<std::vector<PixelTap<Real>>>> taps_;
+  std::vector<std::vector<std::vector<kernels::PixelTap<Real>>>> taps_;
   std::vector<std::vector<Real>> inverse_sums_;
   std::vector<std::size_t> run_of_row_;
 };

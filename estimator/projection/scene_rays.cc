@@ -115,7 +115,7 @@ void ViewRays<Real>::AddMixed(const DisparityMap& map, double tolerance,
 }
 
 template <typename Real>
-RayRow<Real> ViewRays<Real>::RowOf(int row) const {
+kernels::RayRow<Real> ViewRays<Real>::RowOf(int row) const {
   return {disparity_.data() + Index(row) * Index(width_px_),
           shift_x_,
           shift_y_,
@@ -126,7 +126,7 @@ RayRow<Real> ViewRays<Real>::RowOf(int row) const {
 
 template <typename Real>
 void ViewRays<Real>::Warp(int row, const Real* picture, Real* warped) const {
-  WarpRow(RowOf(row), picture + Index(row) * Index(width_px_), warped);
+  kernels::WarpRow(RowOf(row), picture + Index(row) * Index(width_px_), warped);
   for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
     const OddRay& ray = odd_[n];
     Real sum = 0;
@@ -149,7 +149,7 @@ void ViewRays<Real>::Spread(int row, Real* values, Real* picture) const {
       picture[other.pixel[t]] += other.weight[t] * values[other.x];
     values[other.x] *= mixed_[n].rest;
   }
-  SpreadRow(RowOf(row), values, picture + Index(row) * Index(width_px_));
+  kernels::SpreadRow(RowOf(row), values, picture + Index(row) * Index(width_px_));
   for (std::size_t n = odd_start_[Index(row)]; n < odd_start_[Index(row) + 1]; ++n) {
     const OddRay& ray = odd_[n];
     for (std::size_t t = 0; t < 4; ++t) picture[ray.pixel[t]] += ray.weight[t] * values[ray.x];
@@ -158,10 +158,10 @@ void ViewRays<Real>::Spread(int row, Real* values, Real* picture) const {
 
 template <typename Real>
 double ViewRays<Real>::bytes() const {
-  return static_cast<double>(disparity_.capacity() * sizeof(Real) +
-                             runs_.capacity() * sizeof(RayRun) + odd_.capacity() * sizeof(OddRay) +
-                             mixed_.capacity() * sizeof(MixedRay) +
-                             3 * run_start_.capacity() * sizeof(std::size_t));
+  return static_cast<double>(
+      disparity_.capacity() * sizeof(Real) + runs_.capacity() * sizeof(kernels::RayRun) +
+      odd_.capacity() * sizeof(OddRay) + mixed_.capacity() * sizeof(MixedRay) +
+      3 * run_start_.capacity() * sizeof(std::size_t));
 }
 
 template <typename Real>

@@ -8,8 +8,8 @@
 #include <functional>
 #include <vector>
 
-#include "estimator/cpu/ray_loops.h"
 #include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/ray_loops.h"
 
 namespace thicklens::estimator {
 
@@ -24,7 +24,7 @@ class ViewRays {
            const std::vector<float>& highest, const ViewDisparity& view, double a, double b);
 
   // Count of extra numbers that a row of values, and an image, needs after its last one.
-  static constexpr std::size_t kMargin = 2 * kLanes;
+  static constexpr std::size_t kMargin = 2 * kernels::kRaysTogether;
 
   // Computes warped(x) = sum_taps t(x, p) picture(p) of one row, by the taps of SurfaceTaps.
   void Warp(int row, const Real* picture, Real* warped) const;
@@ -48,12 +48,12 @@ class ViewRays {
   OddRay OddRayOf(const DisparityMap& map, double tolerance, std::size_t sample,
                   const kernels::HiddenSample& source) const;
   void AddMixed(const DisparityMap& map, double tolerance, const ViewDisparity& view);
-  RayRow<Real> RowOf(int row) const;
+  kernels::RayRow<Real> RowOf(int row) const;
 
   int width_px_ = 0;
   Real shift_x_ = 0, shift_y_ = 0;
   std::vector<Real> disparity_;
-  std::vector<RayRun> runs_;
+  std::vector<kernels::RayRun> runs_;
   std::vector<OddRay> odd_;
   std::vector<MixedRay> mixed_;
   std::vector<std::size_t> run_start_, odd_start_, mixed_start_;  // start of each row, and the end

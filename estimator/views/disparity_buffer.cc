@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/cpu/cell_row.h"
+#include "thicklens/kernels/cell_row.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 // A triangle is seen edge-on, as a line, if twice its area is less than this.
 constexpr double kEdgeOnPx2 = 1e-9;
 
-constexpr double kTolerancePx = kEdgeTolerancePx;
+constexpr double kTolerancePx = kernels::kEdgeTolerancePx;
 
 // Twice the signed area of the triangle p, q, (x, y).
 double Edge(const Vertex& p, const Vertex& q, double x, double y) {

@@ -10,13 +10,13 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/cpu/cell_row.h"
 #include "estimator/views/disparity_buffer.h"
 #include "estimator/views/hole_filler.h"
 #include "estimator/views/mixed_samples.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/view_geometry.h"
+#include "thicklens/kernels/cell_row.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -46,14 +46,14 @@ void CheckMap(const DisparityMap& map) {
   }
 }
 
-Vertex VertexOf(const PixelRow& row, int x, int y) {
+Vertex VertexOf(const kernels::PixelRow& row, int x, int y) {
   const std::size_t i = Index(x);
   return {x + static_cast<double>(row.offset_x[i]), y + static_cast<double>(row.offset_y[i]),
           row.disparity[i]};
 }
 
 // Paints the cell at x of the row between `upper` and `lower`, whatever its kind.
-void PaintCell(const PixelRow& upper, const PixelRow& lower, int x, int y,
+void PaintCell(const kernels::PixelRow& upper, const kernels::PixelRow& lower, int x, int y,
                DisparityBuffer* buffer) {
   const Vertex p00 = VertexOf(upper, x, y);
   const Vertex p11 = VertexOf(lower, x + 1, y + 1);
@@ -62,14 +62,14 @@ void PaintCell(const PixelRow& upper, const PixelRow& lower, int x, int y,
 }
 
 // Paints such a cell if it is not odd.
-void PaintRegularCell(const PixelRow& upper, const PixelRow& lower, int x, int y,
+void PaintRegularCell(const kernels::PixelRow& upper, const kernels::PixelRow& lower, int x, int y,
                       DisparityBuffer* buffer) {
-  const ViewRow row{y, buffer->width_px(), buffer->height_px()};
-  const Rectangle around = RectangleOf(upper.bounds(), lower.bounds(), row, x);
+  const kernels::ViewRow row{y, buffer->width_px(), buffer->height_px()};
+  const kernels::Rectangle around = kernels::RectangleOf(upper.bounds(), lower.bounds(), row, x);
   for (float dy = around.above; dy <= around.below; ++dy) {
     for (float dx = around.left; dx <= around.right; ++dx) {
       buffer->Put(x + static_cast<int>(dx), y + static_cast<int>(dy),
-                  CellDisparity(upper.corners(), lower.corners(), x, dx, dy));
+                  kernels::CellDisparity(upper.corners(), lower.corners(), x, dx, dy));
     }
   }
 }
@@ -77,32 +77,33 @@ void PaintRegularCell(const PixelRow& upper, const PixelRow& lower, int x, int y
 void PaintSurfaces(const DisparityMap& map, const std::vector<char>& is_surface,
                    const Eigen::Vector2d& shift, DisparityBuffer* buffer) {
   const int width = map.width_px;
-  PixelRow upper(Index(width));
-  PixelRow lower(Index(width));
-  CellRow cells(Index(width));
+  kernels::PixelRow upper(Index(width));
+  kernels::PixelRow lower(Index(width));
+  kernels::CellRow cells(Index(width));
   const auto shift_x = static_cast<float>(std::clamp(shift.x(), -kLargestShift, kLargestShift));
   const auto shift_y = static_cast<float>(std::clamp(shift.y(), -kLargestShift, kLargestShift));
-  PlacePixels(map.disparity.data(), shift_x, shift_y, kFarAwayPx, &upper);
+  kernels::PlacePixels(map.disparity.data(), shift_x, shift_y, kFarAwayPx, &upper);
   for (int y = 0; y + 1 < map.height_px; ++y) {
     ThrowIfCancelled();
-    PlacePixels(map.disparity.data() + Index(y + 1) * Index(width), shift_x, shift_y, kFarAwayPx,
-                &lower);
-    SampleCells(upper, lower, {y, width, map.height_px}, &cells);
+    kernels::PlacePixels(map.disparity.data() + Index(y + 1) * Index(width), shift_x, shift_y,
+                         kFarAwayPx, &lower);
+    kernels::SampleCells(upper, lower, {y, width, map.height_px}, &cells);
     const char* const is_cell = is_surface.data() + Index(y) * Index(width);
     float* const row = buffer->row(y);
     float nowhere = 0;
     for (int x = 0; x + 1 < width; ++x) {
       const std::size_t i = Index(x);
-      const CellSamples samples = is_cell[i] ? cells.samples[i] : CellSamples::kNone;
-      if (samples <= CellSamples::kTwo) {
+      const kernels::CellSamples samples =
+          is_cell[i] ? cells.samples[i] : kernels::CellSamples::kNone;
+      if (samples <= kernels::CellSamples::kTwo) {
         // None, one (the first is the last) and two samples alternate on a slope; the code avoids a
         // branch.
-        const bool any = samples != CellSamples::kNone;
+        const bool any = samples != kernels::CellSamples::kNone;
         float* const first = any ? row + x + cells.first[i] : &nowhere;
-        *first = Most(*first, cells.first_disparity[i]);
+        *first = kernels::Most(*first, cells.first_disparity[i]);
         float* const last = any ? row + x + cells.last[i] : &nowhere;
-        *last = Most(*last, cells.last_disparity[i]);
-      } else if (samples == CellSamples::kSeveral) {
+        *last = kernels::Most(*last, cells.last_disparity[i]);
+      } else if (samples == kernels::CellSamples::kSeveral) {
         PaintRegularCell(upper, lower, x, y, buffer);
       } else {
         PaintCell(upper, lower, x, y, buffer);

@@ -1,6 +1,7 @@
 #include "kernels/cpu/filter_loops.h"
 
 #include "kernels/cpu/filter_loops_body.h"
+#include "kernels/cpu/processor.h"
 
 namespace thicklens::kernels {
 
@@ -9,15 +10,11 @@ FilterLoops<Real> PlainFilterLoops() {
   return LoopsOfThisFile<Real>();
 }
 
-#if defined(__x86_64__)
-bool HasAvx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
-#endif
-
 template <typename Real>
 const FilterLoops<Real>& BestFilterLoops() {
 #if defined(__x86_64__)
   static const FilterLoops<Real> loops =
-      HasAvx2() ? Avx2FilterLoops<Real>() : PlainFilterLoops<Real>();
+      HasAvx2AndFma() ? Avx2FilterLoops<Real>() : PlainFilterLoops<Real>();
 #else
   static const FilterLoops<Real> loops = PlainFilterLoops<Real>();
 #endif

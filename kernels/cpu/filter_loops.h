@@ -54,7 +54,6 @@ FilterLoops<Real> PlainFilterLoops();
 // The loops with AVX2 and FMA.
 template <typename Real>
 FilterLoops<Real> Avx2FilterLoops();
-bool HasAvx2();
 #endif
 // The fastest of these loops that this processor can run.
 template <typename Real>

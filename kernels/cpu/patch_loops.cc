@@ -1,7 +1,7 @@
 #include "kernels/cpu/patch_loops.h"
 
-#include "kernels/cpu/filter_loops.h"
 #include "kernels/cpu/patch_loops_body.h"
+#include "kernels/cpu/processor.h"
 
 namespace thicklens::kernels {
 
@@ -14,7 +14,7 @@ template <typename Real>
 const PatchLoops<Real>& BestPatchLoops() {
 #if defined(__x86_64__)
   static const PatchLoops<Real> loops =
-      HasAvx2() ? Avx2PatchLoops<Real>() : PlainPatchLoops<Real>();
+      HasAvx2AndFma() ? Avx2PatchLoops<Real>() : PlainPatchLoops<Real>();
 #else
   static const PatchLoops<Real> loops = PlainPatchLoops<Real>();
 #endif

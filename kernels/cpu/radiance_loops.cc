@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "kernels/cpu/prior_rows.h"
+#include "kernels/cpu/processor.h"
 
 namespace thicklens::kernels {
 namespace {
@@ -136,8 +137,6 @@ THICKLENS_INLINE void Touch(const Real* slope_squared, const Real* squares, Real
 
 #if defined(__x86_64__)
 
-bool HasFma() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
-
 #define THICKLENS_FMA __attribute__((target("avx2,fma")))
 
 template <typename Real>
@@ -172,7 +171,7 @@ THICKLENS_FMA void TouchFma(const Real* slope_squared, const Real* squares, Real
   Touch(slope_squared, squares, half, floor, count, smoothness);
 }
 #define THICKLENS_BEST(fma, plain) \
-  if (HasFma()) return fma;        \
+  if (HasAvx2AndFma()) return fma; \
   return plain
 
 #else

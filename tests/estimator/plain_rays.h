@@ -15,9 +15,6 @@ Eigen::MatrixXd ViewMatrix(const DisparityMap& map, double a, double b);
 // From planes R(., k), one after the other, to the photograph: ViewMatrix of each, weighted.
 Eigen::MatrixXd PhotographMatrix(const DisparityMap& map, const Eigen::ArrayXXd& weights);
 
-// Differences of neighbouring aperture samples, ends free: rows across, then down.
-Eigen::MatrixXd DifferenceMatrix(int u_count, int v_count);
-
 }  // namespace thicklens::estimator::testing
 
 #endif  // THICKLENS_TESTS_ESTIMATOR_PLAIN_RAYS_H_

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "support/difference_matrix.h"
 #include "support/error_message.h"
 #include "tests/estimator/plain_rays.h"
 #include "thicklens/model/light_field.h"
@@ -20,10 +21,10 @@
 namespace thicklens::estimator {
 namespace {
 
-using testing::DifferenceMatrix;
 using ::testing::HasSubstr;
 using testing::PhotographMatrix;
 using testing::ViewMatrix;
+using thicklens::testing::DifferenceMatrix;
 using thicklens::testing::ErrorOf;
 
 constexpr double kPi = 3.14159265358979323846;

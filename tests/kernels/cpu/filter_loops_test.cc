@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "kernels/cpu/processor.h"
 #include "support/picture_planes.h"
 
 namespace thicklens::kernels {
@@ -23,7 +24,7 @@ template <typename Real>
 class FilterLoopsTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!HasAvx2()) GTEST_SKIP() << "this processor has one kind of loops";
+    if (!HasAvx2AndFma()) GTEST_SKIP() << "this processor has one kind of loops";
   }
   static constexpr double kTolerance = sizeof(Real) == sizeof(float) ? 5e-6 : 1e-14;
 };

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "kernels/cpu/filter_loops.h"
 #include "kernels/cpu/patch_loops.h"
+#include "kernels/cpu/processor.h"
 
 namespace thicklens::kernels {
 namespace {
@@ -208,7 +208,7 @@ TYPED_TEST(PatchFilterTest, LooksNoFartherThanAPatch) {
 
 #if defined(__x86_64__)
 TYPED_TEST(PatchFilterTest, LoopsForAllProcessorsAgree) {
-  if (!HasAvx2()) GTEST_SKIP() << "this processor has one kind of loops";
+  if (!HasAvx2AndFma()) GTEST_SKIP() << "this processor has one kind of loops";
   constexpr int kWidth = 70, kStride = 2 * kPatchChunkPx + 16;
   std::vector<TypeParam> from(kPatchPx * kStride);
   const auto picture = Sample<TypeParam>(kWidth, kPatchPx, 1, 0.02, 7);

@@ -2,12 +2,12 @@
 #define THICKLENS_ESTIMATOR_VIEW_GEOMETRY_H_
 
 #include <Eigen/Core>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "thicklens/kernels/row_warper.h"
 #include "thicklens/kernels/view_warp.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
@@ -166,34 +166,9 @@ class PictureWarper {
   void Warp(const CompactView& view, model::LinearPicture* warped) const;
 
  private:
-  struct Range {
-    float lowest, highest;
-  };
-  struct TapRow;
-
-  void MixIn(const std::vector<kernels::MixedSample>& mixed, model::LinearPicture* warped) const;
-  void CopyPixels(const model::LinearPicture& picture);
-  void FindRanges();
-  void WarpRow(const TapRow& row, float* warped) const;
-  template <int kChannels>
-  void WarpRow(const TapRow& row, float* warped) const;
-  template <int kChannels>
-  void WarpRowAvx2(const TapRow& row, float* warped) const;
-  template <int kChannels>
-  void WarpRowOf(const TapRow& row, float* warped) const;
-  void Bilinear(int x0, int y0, float fraction_x, float fraction_y, float disparity,
-                float* value) const;
-  bool Agrees(float tap_disparity, float disparity) const {
-    return std::abs(tap_disparity - disparity) <= tolerance_;
-  }
-  const float* Tap(int x, int y) const;
-
   const DisparityMap& map_;
   const int channels_;
-  const float tolerance_;      // in the unit of the map; infinite where the steps are 0
-  std::vector<float> pixels_;  // planes of four channels each (a single channel is stored alone),
-                               // with repeated borders
-  std::vector<Range> ranges_;  // minimum and maximum disparity of the 16 taps of each pixel
+  kernels::RowWarper rows_;
 };
 
 }  // namespace thicklens::estimator

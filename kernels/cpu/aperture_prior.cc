@@ -1,15 +1,16 @@
-#include "estimator/cpu/aperture_prior.h"
+#include "thicklens/kernels/aperture_prior.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/cpu/lanes.h"
+#include "kernels/cpu/lanes.h"
+#include "kernels/cpu/processor.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -177,7 +178,7 @@ template <typename Real>
 void InvertPacketsHere(const PacketJob<Real>& job, std::size_t first, std::size_t last,
                        Real* planes) {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+  if (HasAvx2AndFma()) {
     return InvertPacketsAvx2(job, first, last, planes);
   }
 #endif
@@ -239,4 +240,4 @@ void AperturePrior<Real>::ApplyInverse(std::size_t points, std::size_t stride, i
 template class AperturePrior<float>;
 template class AperturePrior<double>;
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels

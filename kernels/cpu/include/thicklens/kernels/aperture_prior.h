@@ -1,10 +1,10 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_APERTURE_PRIOR_H_
-#define THICKLENS_ESTIMATOR_CPU_APERTURE_PRIOR_H_
+#ifndef THICKLENS_KERNELS_APERTURE_PRIOR_H_
+#define THICKLENS_KERNELS_APERTURE_PRIOR_H_
 
 #include <cstddef>
 #include <vector>
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 
 // A = gamma D^T D + mu over the U x V aperture samples of one scene point. D takes the differences
 // of neighbouring samples across and down, with free ends. The eigenvectors of A are those of the
@@ -32,6 +32,6 @@ class AperturePrior {
   std::vector<Real> work_;
 };
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_APERTURE_PRIOR_H_
+#endif  // THICKLENS_KERNELS_APERTURE_PRIOR_H_

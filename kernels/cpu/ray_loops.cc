@@ -1,7 +1,12 @@
-#include "estimator/cpu/ray_loops.h"
+#include "thicklens/kernels/ray_loops.h"
 
-namespace thicklens::estimator {
+#include "kernels/cpu/lanes.h"
+#include "kernels/cpu/processor.h"
+
+namespace thicklens::kernels {
 namespace {
+
+static_assert(kRaysTogether == kLanes);
 
 template <typename Real>
 inline __attribute__((always_inline)) void AddTo(const Lanes<Real>& more, Real* to) {
@@ -93,8 +98,6 @@ inline __attribute__((always_inline)) void Spread(const RayRow<Real>& rays, cons
 
 #if defined(__x86_64__)
 
-bool HasAvx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
-
 template <typename Real>
 __attribute__((target("avx2,fma"))) void WarpAvx2(const RayRow<Real>& rays, const Real* row,
                                                   Real* warped) {
@@ -114,7 +117,7 @@ __attribute__((target("avx2,fma"))) void SpreadAvx2(const RayRow<Real>& rays, co
 template <typename Real>
 void WarpRow(const RayRow<Real>& rays, const Real* row, Real* warped) {
 #if defined(__x86_64__)
-  if (HasAvx2()) return WarpAvx2(rays, row, warped);
+  if (HasAvx2AndFma()) return WarpAvx2(rays, row, warped);
 #endif
   Warp(rays, row, warped);
 }
@@ -122,7 +125,7 @@ void WarpRow(const RayRow<Real>& rays, const Real* row, Real* warped) {
 template <typename Real>
 void SpreadRow(const RayRow<Real>& rays, const Real* values, Real* row) {
 #if defined(__x86_64__)
-  if (HasAvx2()) return SpreadAvx2(rays, values, row);
+  if (HasAvx2AndFma()) return SpreadAvx2(rays, values, row);
 #endif
   Spread(rays, values, row);
 }
@@ -132,4 +135,4 @@ template void WarpRow(const RayRow<double>&, const double*, double*);
 template void SpreadRow(const RayRow<float>&, const float*, float*);
 template void SpreadRow(const RayRow<double>&, const double*, double*);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels

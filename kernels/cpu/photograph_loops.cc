@@ -1,6 +1,8 @@
-#include "estimator/cpu/photograph_loops.h"
+#include "thicklens/kernels/photograph_loops.h"
 
-namespace thicklens::estimator {
+#include "kernels/cpu/processor.h"
+
+namespace thicklens::kernels {
 namespace {
 
 // Size of a register of AVX2. kVectors sums stay in registers over all taps: each ray is read once,
@@ -41,7 +43,7 @@ struct Taps {
   const std::vector<PixelTap<Real>>& taps;
   const Real* rays;
   std::size_t row_start;
-  const std::array<PixelRow<Real>, 2>& rows;
+  const std::array<SharedRow<Real>, 2>& rows;
 };
 
 // Sums the taps of the pixels from x on: `count` values of the type Value, which is Real or a
@@ -72,7 +74,7 @@ inline __attribute__((always_inline)) void AddStrip(const Taps<Real>& of, std::s
   constexpr std::size_t kStep = sizeof(Value) / sizeof(Real);
   Value sums[count];
   SumTaps<kHasIrradiance>(of, x, sums);
-  for (const PixelRow<Real>& row : of.rows) {
+  for (const SharedRow<Real>& row : of.rows) {
     if (row.pixels == nullptr) continue;
     for (std::size_t i = 0; i < count; ++i) {
       Value pixel;
@@ -93,7 +95,7 @@ inline __attribute__((always_inline)) void AddRest(const Taps<Real>& of, std::si
   SumTaps<kHasIrradiance>(of, end - kOfStrip, sums);
   Real numbers[kOfStrip];
   Store(sums, numbers);
-  for (const PixelRow<Real>& row : of.rows) {
+  for (const SharedRow<Real>& row : of.rows) {
     if (row.pixels == nullptr) continue;
     for (std::size_t i = 1; i <= rest; ++i) {
       row.pixels[end - i] += row.share * numbers[kOfStrip - i];
@@ -186,8 +188,6 @@ inline __attribute__((always_inline)) void AllPixels(const std::vector<RayPixel<
 
 #if defined(__x86_64__)
 
-bool HasAvx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
-
 template <typename Real>
 __attribute__((target("avx2,fma"))) void AllTapsAvx2(const Taps<Real>& taps, std::size_t begin,
                                                      std::size_t end) {
@@ -207,11 +207,11 @@ __attribute__((target("avx2,fma"))) void AllPixelsAvx2(const std::vector<RayPixe
 
 template <typename Real>
 void AddTaps(const std::vector<PixelTap<Real>>& taps, const Real* rays, std::size_t row_start,
-             std::size_t begin, std::size_t end, const std::array<PixelRow<Real>, 2>& rows) {
+             std::size_t begin, std::size_t end, const std::array<SharedRow<Real>, 2>& rows) {
   if (taps.empty()) return;
   const Taps<Real> all{taps, rays, row_start, rows};
 #if defined(__x86_64__)
-  if (HasAvx2()) return AllTapsAvx2(all, begin, end);
+  if (HasAvx2AndFma()) return AllTapsAvx2(all, begin, end);
 #endif
   AllTaps(all, begin, end);
 }
@@ -220,16 +220,16 @@ template <typename Real>
 void AddPixels(const std::vector<RayPixel<Real>>& pixels, const float* irradiance,
                std::size_t count, Real* rays) {
 #if defined(__x86_64__)
-  if (HasAvx2()) return AllPixelsAvx2(pixels, irradiance, count, rays);
+  if (HasAvx2AndFma()) return AllPixelsAvx2(pixels, irradiance, count, rays);
 #endif
   AllPixels(pixels, irradiance, count, rays);
 }
 
 template void AddTaps(const std::vector<PixelTap<float>>&, const float*, std::size_t, std::size_t,
-                      std::size_t, const std::array<PixelRow<float>, 2>&);
+                      std::size_t, const std::array<SharedRow<float>, 2>&);
 template void AddTaps(const std::vector<PixelTap<double>>&, const double*, std::size_t, std::size_t,
-                      std::size_t, const std::array<PixelRow<double>, 2>&);
+                      std::size_t, const std::array<SharedRow<double>, 2>&);
 template void AddPixels(const std::vector<RayPixel<float>>&, const float*, std::size_t, float*);
 template void AddPixels(const std::vector<RayPixel<double>>&, const float*, std::size_t, double*);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels

@@ -1,10 +1,10 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_CELL_DISPARITY_H_
-#define THICKLENS_ESTIMATOR_CPU_CELL_DISPARITY_H_
+#ifndef THICKLENS_KERNELS_CELL_DISPARITY_H_
+#define THICKLENS_KERNELS_CELL_DISPARITY_H_
 
 #include <cstdint>
 #include <limits>
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 
 // Distance from a shape, px, within which a sample still belongs to it. It is larger than the
 // rounding of float disparities, so that samples on the outer border are not lost.
@@ -116,6 +116,6 @@ inline __attribute__((always_inline)) Rectangle RectangleOf(const Bounds& upper,
                 static_cast<float>(row.height_px - 1 - row.y))};
 }
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_CELL_DISPARITY_H_
+#endif  // THICKLENS_KERNELS_CELL_DISPARITY_H_

@@ -1,5 +1,5 @@
 // Whole rows of rays against a plain check of one ray at a time.
-#include "estimator/cpu/product_row.h"
+#include "thicklens/kernels/product_row.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 namespace {
 
 constexpr int kWidth = 61, kHeight = 23;
@@ -86,4 +86,4 @@ TEST(ProductRow, IsThatOfEachRay) {
 }
 
 }  // namespace
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels

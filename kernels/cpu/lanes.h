@@ -1,9 +1,9 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_LANES_H_
-#define THICKLENS_ESTIMATOR_CPU_LANES_H_
+#ifndef THICKLENS_KERNELS_CPU_LANES_H_
+#define THICKLENS_KERNELS_CPU_LANES_H_
 
 #include <cstddef>
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 
 // Numbers that hot loops process together. Computations with them become the vector instructions of
 // the function that they are inlined into.
@@ -24,6 +24,6 @@ inline __attribute__((always_inline)) void Store(const Lanes<Real>& from, Real* 
   __builtin_memcpy(to, &from, sizeof(Lanes<Real>));
 }
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_LANES_H_
+#endif  // THICKLENS_KERNELS_CPU_LANES_H_

@@ -1,6 +1,8 @@
-#include "estimator/cpu/grid_loops.h"
+#include "thicklens/kernels/grid_loops.h"
 
-namespace thicklens::estimator {
+#include "kernels/cpu/processor.h"
+
+namespace thicklens::kernels {
 namespace {
 
 template <typename Real>
@@ -35,8 +37,6 @@ inline __attribute__((always_inline)) void Links(Real gamma, const LinkRun<Real>
 
 #if defined(__x86_64__)
 
-bool HasAvx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
-
 template <typename Real>
 __attribute__((target("avx2,fma"))) void LinksAvx2(Real gamma, const LinkRun<Real>& run) {
   Links(gamma, run);
@@ -49,7 +49,7 @@ __attribute__((target("avx2,fma"))) void LinksAvx2(Real gamma, const LinkRun<Rea
 template <typename Real>
 void AddLinks(Real gamma, const LinkRun<Real>& run) {
 #if defined(__x86_64__)
-  if (HasAvx2()) return LinksAvx2(gamma, run);
+  if (HasAvx2AndFma()) return LinksAvx2(gamma, run);
 #endif
   Links(gamma, run);
 }
@@ -57,4 +57,4 @@ void AddLinks(Real gamma, const LinkRun<Real>& run) {
 template void AddLinks(float, const LinkRun<float>&);
 template void AddLinks(double, const LinkRun<double>&);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels

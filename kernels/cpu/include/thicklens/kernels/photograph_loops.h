@@ -1,11 +1,11 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_PHOTOGRAPH_LOOPS_H_
-#define THICKLENS_ESTIMATOR_CPU_PHOTOGRAPH_LOOPS_H_
+#ifndef THICKLENS_KERNELS_PHOTOGRAPH_LOOPS_H_
+#define THICKLENS_KERNELS_PHOTOGRAPH_LOOPS_H_
 
 #include <array>
 #include <cstddef>
 #include <vector>
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 
 // The innermost loops of H on the grid, between a row of the samples of views and rows of the
 // photograph.
@@ -23,7 +23,7 @@ struct PixelTap {
 
 // A row of the photograph that gets `share` of a row of rays.
 template <typename Real>
-struct PixelRow {
+struct SharedRow {
   Real* pixels = nullptr;  // null: there is none
   Real share = 0;
 };
@@ -32,7 +32,7 @@ struct PixelRow {
 // rays of a row of views; `row_start` is the first sample of the row in each view.
 template <typename Real>
 void AddTaps(const std::vector<PixelTap<Real>>& taps, const Real* rays, std::size_t row_start,
-             std::size_t begin, std::size_t end, const std::array<PixelRow<Real>, 2>& rows);
+             std::size_t begin, std::size_t end, const std::array<SharedRow<Real>, 2>& rows);
 
 // A pixel that a ray lands on; for neighbouring rays, the pixel of the first ray.
 template <typename Real>
@@ -47,6 +47,6 @@ template <typename Real>
 void AddPixels(const std::vector<RayPixel<Real>>& pixels, const float* irradiance,
                std::size_t count, Real* rays);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_PHOTOGRAPH_LOOPS_H_
+#endif  // THICKLENS_KERNELS_PHOTOGRAPH_LOOPS_H_

@@ -1,11 +1,12 @@
-#include "estimator/cpu/product_row.h"
+#include "thicklens/kernels/product_row.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/cpu/cell_disparity.h"
+#include "kernels/cpu/processor.h"
+#include "thicklens/kernels/cell_disparity.h"
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 namespace {
 
 // The loop gets the processor's own vector instructions from the caller that it is inlined into; it
@@ -57,9 +58,9 @@ __attribute__((target("avx2"))) void CheckAvx2(const ProductRow& row, std::int32
 
 void CheckProducts(const ProductRow& row, std::int32_t* is_product) {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return CheckAvx2(row, is_product);
+  if (HasAvx2()) return CheckAvx2(row, is_product);
 #endif
   Check(row, is_product);
 }
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels

@@ -1,9 +1,9 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_PRODUCT_ROW_H_
-#define THICKLENS_ESTIMATOR_CPU_PRODUCT_ROW_H_
+#ifndef THICKLENS_KERNELS_PRODUCT_ROW_H_
+#define THICKLENS_KERNELS_PRODUCT_ROW_H_
 
 #include <cstdint>
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 
 // The rays of one view through one row of a photograph's pixels, and where the axes of a separable
 // fan put these rays. No index of a pixel may exceed 2^31.
@@ -30,6 +30,6 @@ struct ProductRow {
 // or off the ray's surface. The result is the same on every processor.
 void CheckProducts(const ProductRow& row, std::int32_t* is_product);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_PRODUCT_ROW_H_
+#endif  // THICKLENS_KERNELS_PRODUCT_ROW_H_

@@ -1,6 +1,8 @@
-#include "estimator/cpu/cell_row.h"
+#include "thicklens/kernels/cell_row.h"
 
-namespace thicklens::estimator {
+#include "kernels/cpu/processor.h"
+
+namespace thicklens::kernels {
 namespace {
 
 // Limit of twice the area of a triangle; it is 1 if the surface is parallel to the image.
@@ -121,7 +123,7 @@ void PlacePixels(const float* disparity, float shift_x, float shift_y, float lim
                  PixelRow* row) {
   row->disparity = disparity;
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return PlaceAvx2(disparity, shift_x, shift_y, limit_px, row);
+  if (HasAvx2()) return PlaceAvx2(disparity, shift_x, shift_y, limit_px, row);
 #endif
   Place(disparity, shift_x, shift_y, limit_px, row);
 }
@@ -129,9 +131,9 @@ void PlacePixels(const float* disparity, float shift_x, float shift_y, float lim
 void SampleCells(const PixelRow& upper, const PixelRow& lower, const ViewRow& view,
                  CellRow* cells) {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) return SampleAvx2(upper, lower, view, cells);
+  if (HasAvx2()) return SampleAvx2(upper, lower, view, cells);
 #endif
   Sample(upper, lower, view, cells);
 }
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels

@@ -1,9 +1,9 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_GRID_LOOPS_H_
-#define THICKLENS_ESTIMATOR_CPU_GRID_LOOPS_H_
+#ifndef THICKLENS_KERNELS_GRID_LOOPS_H_
+#define THICKLENS_KERNELS_GRID_LOOPS_H_
 
 #include <cstddef>
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 
 // The innermost loop of D on the grid.
 
@@ -29,6 +29,6 @@ constexpr std::size_t kLongestRun = 256;
 template <typename Real>
 void AddLinks(Real gamma, const LinkRun<Real>& run);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_GRID_LOOPS_H_
+#endif  // THICKLENS_KERNELS_GRID_LOOPS_H_

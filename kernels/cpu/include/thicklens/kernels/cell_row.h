@@ -1,20 +1,19 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_CELL_ROW_H_
-#define THICKLENS_ESTIMATOR_CPU_CELL_ROW_H_
+#ifndef THICKLENS_KERNELS_CELL_ROW_H_
+#define THICKLENS_KERNELS_CELL_ROW_H_
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "estimator/cpu/cell_disparity.h"
+#include "thicklens/kernels/cell_disparity.h"
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 
 // The positions of a row of pixels of the centre view in another view, one number for each pixel.
 //
 // Positions are relative to the pixel, so that float holds them, and two cells that share an edge
 // get the same numbers for it: a sample on the wrong side of the edge for one cell is on the right
 // side for the other.
-// the other.
 struct PixelRow {
   explicit PixelRow(std::size_t width_px);
 
@@ -53,6 +52,6 @@ struct CellRow {
 
 void SampleCells(const PixelRow& upper, const PixelRow& lower, const ViewRow& view, CellRow* cells);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_CELL_ROW_H_
+#endif  // THICKLENS_KERNELS_CELL_ROW_H_

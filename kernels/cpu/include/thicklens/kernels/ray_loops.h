@@ -1,15 +1,14 @@
-#ifndef THICKLENS_ESTIMATOR_CPU_RAY_LOOPS_H_
-#define THICKLENS_ESTIMATOR_CPU_RAY_LOOPS_H_
+#ifndef THICKLENS_KERNELS_RAY_LOOPS_H_
+#define THICKLENS_KERNELS_RAY_LOOPS_H_
 
 #include <cstddef>
 #include <cstdint>
 
-#include "estimator/cpu/lanes.h"
+namespace thicklens::kernels {
 
-namespace thicklens::estimator {
-
-// The innermost loops over the rays of a view. They process kLanes rays together, and the last of
-// these may lie beyond the end of a run, a row or an image.
+// The innermost loops over the rays of a view. They process kRaysTogether rays together, and the
+// last of these may lie beyond the end of a run, a row or an image.
+constexpr std::size_t kRaysTogether = 8;
 
 // Neighbouring rays that come from neighbouring cells of four pixels.
 struct RayRun {
@@ -28,15 +27,15 @@ struct RayRow {
 };
 
 // Sets warped[x] to the value of the image at the point that ray x comes from, linear between the
-// pixels, for the rays in runs. `row` is the same row of that image. May write kLanes - 1 numbers
-// after each run and read as many after the image's last number.
+// pixels, for the rays in runs. `row` is the same row of that image. May write kRaysTogether - 1
+// numbers after each run and read as many after the image's last number.
 template <typename Real>
 void WarpRow(const RayRow<Real>& rays, const Real* row, Real* warped);
-// Applies the transpose of WarpRow: adds to the image. May read kLanes - 1 numbers after the last
-// value, and touch (not change) as many after the image's last number.
+// Applies the transpose of WarpRow: adds to the image. May read kRaysTogether - 1 numbers after the
+// last value, and touch (not change) as many after the image's last number.
 template <typename Real>
 void SpreadRow(const RayRow<Real>& rays, const Real* values, Real* row);
 
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
 
-#endif  // THICKLENS_ESTIMATOR_CPU_RAY_LOOPS_H_
+#endif  // THICKLENS_KERNELS_RAY_LOOPS_H_

@@ -1,4 +1,4 @@
-#include "estimator/cpu/aperture_prior.h"
+#include "thicklens/kernels/aperture_prior.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,13 +7,14 @@
 #include <random>
 #include <vector>
 
+#include "support/difference_matrix.h"
 #include "support/error_message.h"
-#include "tests/estimator/plain_rays.h"
 
-namespace thicklens::estimator {
+namespace thicklens::kernels {
 namespace {
 
 using ::testing::HasSubstr;
+using thicklens::testing::DifferenceMatrix;
 using thicklens::testing::ErrorOf;
 
 constexpr std::size_t kPoints = 5 * AperturePrior<float>::kPacket;
@@ -29,7 +30,7 @@ std::vector<float> RandomPlanes(int views) {
 
 void ExpectInverse(int u_count, int v_count, double gamma, double mu) {
   const int views = u_count * v_count;
-  const Eigen::MatrixXd d = testing::DifferenceMatrix(u_count, v_count);
+  const Eigen::MatrixXd d = DifferenceMatrix(u_count, v_count);
   const Eigen::MatrixXd inverse =
       (gamma * d.transpose() * d + mu * Eigen::MatrixXd::Identity(views, views)).inverse();
   const std::vector<float> before = RandomPlanes(views);
@@ -82,4 +83,4 @@ TEST(AperturePrior, RefusesMoreSamplesThanItHasRoomFor) {
 }
 
 }  // namespace
-}  // namespace thicklens::estimator
+}  // namespace thicklens::kernels
