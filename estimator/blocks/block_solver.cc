@@ -443,7 +443,7 @@ model::LightField EstimateByBlocks(const EstimateInput& input, const BlockOption
   merging->StartWhole(input.picture.width_px, input.picture.height_px, rays.u_count(),
                       rays.v_count(), input.picture.channels);
   const std::unique_ptr<Kernels<double>> pattern_of_workers = merging->Clone();
-  const IterationLimits limits{options.tolerance, options.max_iterations};
+  const LinearSolverLimits limits{options.tolerance, options.max_iterations};
   Workers workers([&] {
     return Worker{pattern_of_workers->Clone(), NewLinearSolver(options.solver, symmetric, limits)};
   });

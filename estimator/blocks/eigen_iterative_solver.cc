@@ -50,12 +50,12 @@ class EigenMethod : public IterativeMethod {
 
 }  // namespace
 
-std::unique_ptr<LinearSolver> NewEigenCgSolver(const IterationLimits& limits) {
+std::unique_ptr<LinearSolver> NewEigenCgSolver(const LinearSolverLimits& limits) {
   using Cg = Eigen::ConjugateGradient<RowMatrix, Eigen::Lower | Eigen::Upper>;
   return std::make_unique<IterativeSolver>(std::make_unique<EigenMethod<Cg>>(), limits);
 }
 
-std::unique_ptr<LinearSolver> NewEigenBicgstabSolver(const IterationLimits& limits) {
+std::unique_ptr<LinearSolver> NewEigenBicgstabSolver(const LinearSolverLimits& limits) {
   using Bicgstab = Eigen::BiCGSTAB<RowMatrix>;
   return std::make_unique<IterativeSolver>(std::make_unique<EigenMethod<Bicgstab>>(), limits);
 }

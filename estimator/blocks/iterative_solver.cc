@@ -31,7 +31,7 @@ double Norm(const std::vector<double>& x) {
 }  // namespace
 
 IterativeSolver::IterativeSolver(std::unique_ptr<IterativeMethod> method,
-                                 const IterationLimits& limits)
+                                 const LinearSolverLimits& limits)
     : method_(std::move(method)), limits_(limits) {}
 
 double IterativeSolver::PredictBytes(const kernels::CsrMatrix<double>& matrix) {

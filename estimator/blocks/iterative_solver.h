@@ -31,7 +31,7 @@ class IterativeMethod {
 // residual small.)
 class IterativeSolver : public LinearSolver {
  public:
-  IterativeSolver(std::unique_ptr<IterativeMethod> method, const IterationLimits& limits);
+  IterativeSolver(std::unique_ptr<IterativeMethod> method, const LinearSolverLimits& limits);
 
   double PredictBytes(const kernels::CsrMatrix<double>& matrix) override;
   void Factorize(const kernels::CsrMatrix<double>& matrix) override;
@@ -43,7 +43,7 @@ class IterativeSolver : public LinearSolver {
 
  private:
   std::unique_ptr<IterativeMethod> method_;
-  IterationLimits limits_;
+  LinearSolverLimits limits_;
   kernels::CsrMatrix<double> matrix_;
   int iterations_ = 0;
 };

@@ -94,7 +94,7 @@ BlockSolver DefaultBlockSolver() {
 }
 
 std::unique_ptr<LinearSolver> NewLinearSolver(BlockSolver solver, bool symmetric,
-                                              const IterationLimits& limits) {
+                                              const LinearSolverLimits& limits) {
   if (!IsBuiltIn(solver)) RefuseMissing(solver);
   if (!symmetric && (solver == BlockSolver::kCholmod || solver == BlockSolver::kCg)) {
     throw Error(

@@ -12,7 +12,7 @@
 namespace thicklens::estimator {
 
 // Stopping rule of an iterative solver; a direct solver does not use it.
-struct IterationLimits {
+struct LinearSolverLimits {
   double tolerance = 1e-6;    // limit of |b - A x|/|b|, > 0
   int max_iterations = 1000;  // for one right-hand side, >= 1
 };
@@ -54,7 +54,7 @@ class LinearSolver {
 // it: without it, this function throws Error for them. It also throws Error if this build has no
 // such solver.
 std::unique_ptr<LinearSolver> NewLinearSolver(BlockSolver solver, bool symmetric,
-                                              const IterationLimits& limits = {});
+                                              const LinearSolverLimits& limits = {});
 
 // Returns |b - A x|/|b| in 2-norms; |b - A x| if b is 0.
 double RelativeResidual(const kernels::CsrMatrix<double>& a, const std::vector<double>& x,

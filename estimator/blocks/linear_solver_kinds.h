@@ -15,10 +15,10 @@ std::unique_ptr<LinearSolver> NewCholmodSolver();
 std::unique_ptr<LinearSolver> NewEigenSolver(bool symmetric);
 // Conjugate gradients (for a symmetric matrix) and BiCGSTAB of Eigen, with a diagonal
 // preconditioner.
-std::unique_ptr<LinearSolver> NewEigenCgSolver(const IterationLimits& limits);
-std::unique_ptr<LinearSolver> NewEigenBicgstabSolver(const IterationLimits& limits);
+std::unique_ptr<LinearSolver> NewEigenCgSolver(const LinearSolverLimits& limits);
+std::unique_ptr<LinearSolver> NewEigenBicgstabSolver(const LinearSolverLimits& limits);
 // BiCGStab of ViennaCL, without a preconditioner, on the OpenCL device that ViennaCL chooses.
-std::unique_ptr<LinearSolver> NewViennaClSolver(const IterationLimits& limits);
+std::unique_ptr<LinearSolver> NewViennaClSolver(const LinearSolverLimits& limits);
 
 }  // namespace thicklens::estimator
 

@@ -118,7 +118,7 @@ void RequireDevice() {
 
 }  // namespace
 
-std::unique_ptr<LinearSolver> NewViennaClSolver(const IterationLimits& limits) {
+std::unique_ptr<LinearSolver> NewViennaClSolver(const LinearSolverLimits& limits) {
   RequireDevice();
   return std::make_unique<IterativeSolver>(std::make_unique<ViennaClMethod>(), limits);
 }

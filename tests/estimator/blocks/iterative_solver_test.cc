@@ -56,7 +56,7 @@ struct Answer {
   double residual = 0;
   int iterations = 0;
 };
-Answer Solved(std::function<double(double, double)> answer, const IterationLimits& limits) {
+Answer Solved(std::function<double(double, double)> answer, const LinearSolverLimits& limits) {
   const CsrMatrix<double> matrix = Diagonal({2, 5, -3});
   const std::vector<double> b = {1, -2, 4};
   IterativeSolver solver(std::make_unique<Believer>(std::move(answer)), limits);

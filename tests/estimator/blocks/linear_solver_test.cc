@@ -28,7 +28,7 @@ std::vector<BlockSolver> DirectSolvers() {
 }
 
 // Iterations to the end of what double holds.
-constexpr IterationLimits kTight{1e-13, 1000};
+constexpr LinearSolverLimits kTight{1e-13, 1000};
 
 CsrMatrix<double> ToCsr(const Eigen::MatrixXd& dense) {
   CsrMatrix<double> csr;
