@@ -37,7 +37,7 @@ struct Rows {
 
 // Calls work(first, last) for bands of the rows; each thread gets the same number of bands.
 template <typename Work>
-void ForBands(const Rows& rows, int threads, const Work& work) {
+void ForBalancedBands(const Rows& rows, int threads, const Work& work) {
   const int resolved = ResolveThreads(threads);
   const int rounds = (rows.count + rows.most * resolved - 1) / (rows.most * resolved);
   const int bands = std::min(rows.count, rounds * resolved);
@@ -206,7 +206,7 @@ template <typename Real>
 void GridPhotograph<Real>::Apply(const Real* rays, Real* photograph) const {
   const std::size_t width = Index(picture_.width_px);
   const Rows of_picture{picture_.height_px, BandRows(width * sizeof(Real)), bytes_of_rays()};
-  ForBands(of_picture, threads_, [&](int first, int last) {
+  ForBalancedBands(of_picture, threads_, [&](int first, int last) {
     std::fill(photograph + Index(first) * width, photograph + Index(last) * width, Real{0});
     for (int l = 0; l < picture_.v_count; ++l) AddViews(l, first, last, rays, photograph);
     for (int y = first; y < last; ++y) {
@@ -250,7 +250,7 @@ void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) con
   // The frame is black, so that rays at the border need no loop of their own.
   std::vector<Real> framed(framed_width() * Index(picture_.height_px + 2));
   const Rows of_picture{picture_.height_px, kMostBandRows, framed.size() * sizeof(Real)};
-  ForBands(of_picture, threads_, [&](int first, int last) {
+  ForBalancedBands(of_picture, threads_, [&](int first, int last) {
     for (int y = first; y < last; ++y) {
       Normalise(y, photograph + Index(y) * Index(picture_.width_px),
                 framed.data() + Index(y + 1) * framed_width() + 1);
@@ -259,7 +259,7 @@ void GridPhotograph<Real>::AddTransposed(const Real* photograph, Real* rays) con
   // No two bands share a ray.
   const int t_count = picture_.t_count;
   const Rows of_views{picture_.views() * t_count, kMostRayRows, bytes_of_rays()};
-  ForBands(of_views, threads_, [&](int first, int last) {
+  ForBalancedBands(of_views, threads_, [&](int first, int last) {
     for (int view = first / t_count; view * t_count < last; ++view) {
       AddToView(view, std::max(0, first - view * t_count), std::min(t_count, last - view * t_count),
                 framed.data(), rays);

@@ -47,7 +47,7 @@ std::vector<Real> Filtered(const PatchPrior& prior, const DataTerm<Real>& data,
   const double threshold = kThreshold / 255 * std::pow(255 * prior.noise_sigma, kThresholdPower);
   std::vector<Real> values(radiance.size());
   const auto convert = [&](const auto& one) {
-    ForBands(data.height_px * data.channels, data.threads, [&](int y0, int y1) {
+    ForFixedBands(data.height_px * data.channels, data.threads, [&](int y0, int y1) {
       const auto width = static_cast<std::size_t>(data.width_px);
       for (std::size_t i = static_cast<std::size_t>(y0) * width;
            i < static_cast<std::size_t>(y1) * width; ++i) {

@@ -148,7 +148,7 @@ QuadraticPrior<Real> TouchingPrior(const DataTerm<Real>& data,
   QuadraticPrior<Real> prior;
   prior.pull.assign(data.pixels(), static_cast<Real>(kLeastPull));
   prior.smoothness.resize(data.pixels());
-  ForBands(data.height_px, data.threads, [&](int y0, int y1) {
+  ForFixedBands(data.height_px, data.threads, [&](int y0, int y1) {
     std::vector<Real> squares(Index(data.width_px));
     for (int y = y0; y < y1; ++y) {
       SquaredDifferences(data, radiance, y, &squares);

@@ -15,7 +15,7 @@ constexpr int kBandRows = 16;
 
 }  // namespace
 
-void ForBands(int height_px, int threads, const std::function<void(int, int)>& rows) {
+void ForFixedBands(int height_px, int threads, const std::function<void(int, int)>& rows) {
   const int bands = (height_px + kBandRows - 1) / kBandRows;
   ParallelFor(bands, threads, [&](int band) {
     rows(band * kBandRows, std::min((band + 1) * kBandRows, height_px));
@@ -24,8 +24,8 @@ void ForBands(int height_px, int threads, const std::function<void(int, int)>& r
 
 Sums SumOverBands(int height_px, int threads, const std::function<Sums(int, int)>& rows) {
   std::vector<Sums> of_band(Index((height_px + kBandRows - 1) / kBandRows));
-  ForBands(height_px, threads,
-           [&](int y0, int y1) { of_band[Index(y0 / kBandRows)] = rows(y0, y1); });
+  ForFixedBands(height_px, threads,
+                [&](int y0, int y1) { of_band[Index(y0 / kBandRows)] = rows(y0, y1); });
   Sums sums{};
   for (const Sums& band : of_band) {
     for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += band[i];

@@ -67,8 +67,8 @@ class SceneSystem {
 };
 
 // Calls rows(y0, y1) for bands of an image's rows that do not depend on the number of threads.
-void ForBands(int height_px, int threads, const std::function<void(int y0, int y1)>& rows);
-// Calls rows like ForBands and sums its results in the order of the bands.
+void ForFixedBands(int height_px, int threads, const std::function<void(int y0, int y1)>& rows);
+// Calls rows like ForFixedBands and sums its results in the order of the bands.
 using Sums = std::array<double, 3>;
 Sums SumOverBands(int height_px, int threads, const std::function<Sums(int y0, int y1)>& rows);
 
