@@ -91,17 +91,17 @@ struct DibrViews {
 
 ViewScores CompareView(const model::LightField& reference, const model::LightField& other, int k,
                        int l, int border_px, const std::optional<DibrViews>& dibr) {
-  const StoredValues truth =
-      StoredValuesOf(model::ViewPicture(reference, k, l), reference.transfer);
+  const model::StoredValues truth =
+      model::StoredValuesOf(model::ViewPicture(reference, k, l), reference.transfer);
   ViewScores view;
   view.u = k;
   view.v = l;
   view.scores = ComparePictures(
-      truth, StoredValuesOf(model::ViewPicture(other, k, l), reference.transfer), border_px);
+      truth, model::StoredValuesOf(model::ViewPicture(other, k, l), reference.transfer), border_px);
   if (!dibr) return view;
   const ViewDisparity seen = dibr->renderer.Render(reference.u_offset(k), reference.v_offset(l));
-  view.dibr = ComparePictures(truth, StoredValuesOf(dibr->warper.Warp(seen), reference.transfer),
-                              border_px);
+  view.dibr = ComparePictures(
+      truth, model::StoredValuesOf(dibr->warper.Warp(seen), reference.transfer), border_px);
   return view;
 }
 

@@ -29,12 +29,12 @@ constexpr double kStrongest = 0.01;
 // are 0.61 steps per px (root mean square), exceeds it at 2 of 100 000 pixels.
 constexpr double kLeastEdge = 2 / 255.0;
 
-std::string SizeText(const StoredValues& picture) {
+std::string SizeText(const model::StoredValues& picture) {
   return fmt::format("{}x{} px in {} channel(s)", picture.width_px, picture.height_px,
                      picture.channels);
 }
 
-void RequireComplete(const std::string& name, const StoredValues& picture) {
+void RequireComplete(const std::string& name, const model::StoredValues& picture) {
   const std::size_t count = static_cast<std::size_t>(std::max(0, picture.width_px)) *
                             static_cast<std::size_t>(std::max(0, picture.height_px)) *
                             static_cast<std::size_t>(std::max(0, picture.channels));
@@ -61,19 +61,19 @@ void RequireBorder(int width_px, int height_px, int border_px) {
                           border_px, width_px, height_px, largest_px));
 }
 
-const float* PixelAt(const StoredValues& picture, int x, int y) {
+const float* PixelAt(const model::StoredValues& picture, int x, int y) {
   return picture.values.data() +
          (static_cast<std::ptrdiff_t>(y) * picture.width_px + x) * picture.channels;
 }
 
-Eigen::Vector3d ColourAt(const StoredValues& picture, int x, int y) {
+Eigen::Vector3d ColourAt(const model::StoredValues& picture, int x, int y) {
   const float* value = PixelAt(picture, x, y);
   if (picture.channels == 1) return Eigen::Vector3d::Constant(value[0]);
   return {value[0], value[1], value[2]};
 }
 
 // Double is needed because the variances of SSIM are small differences of large sums.
-cv::Mat1d GreyOf(const StoredValues& picture) {
+cv::Mat1d GreyOf(const model::StoredValues& picture) {
   cv::Mat1d grey(picture.height_px, picture.width_px);
   for (int y = 0; y < picture.height_px; ++y) {
     ThrowIfCancelled();
@@ -88,7 +88,8 @@ cv::Mat1d GreyOf(const StoredValues& picture) {
 }
 
 // PSNR, dB: -10 log10 of the mean squared difference; full scale is 1.
-double PsnrDb(const StoredValues& reference, const StoredValues& other, const cv::Rect& inside) {
+double PsnrDb(const model::StoredValues& reference, const model::StoredValues& other,
+              const cv::Rect& inside) {
   double sum = 0;
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
     ThrowIfCancelled();
@@ -134,7 +135,7 @@ double MeanSsim(const cv::Mat1d& a, const cv::Mat1d& b, int border_px) {
   return sum / inside.area();
 }
 
-double MeanDeltaE94(const StoredValues& reference, const StoredValues& other,
+double MeanDeltaE94(const model::StoredValues& reference, const model::StoredValues& other,
                     const cv::Rect& inside) {
   double sum = 0;
   for (int y = inside.y; y < inside.y + inside.height; ++y) {
@@ -206,35 +207,8 @@ double LabCurve(double relative) {
 
 }  // namespace
 
-StoredValues StoredValuesOf(const model::StoredPicture& picture) {
-  const int channels = picture.channels == 4 ? 3 : picture.channels;
-  if (channels != 1 && channels != 3) {
-    throw Error(fmt::format(
-        "picture: {} channels: it must have 1 (grey), 3 (RGB) or 4 (RGB and alpha)", channels));
-  }
-  StoredValues stored{picture.width_px, picture.height_px, channels, {}};
-  const double full_scale = picture.full_scale();
-  stored.values.reserve(picture.values.size());
-  for (std::size_t i = 0; i < picture.values.size(); ++i) {
-    if (picture.channels == 4 && i % 4 == 3) continue;
-    stored.values.push_back(static_cast<float>(picture.values[i] / full_scale));
-  }
-  return stored;
-}
-
-StoredValues StoredValuesOf(const model::LinearPicture& picture,
-                            const model::TransferCurve& transfer) {
-  StoredValues stored{picture.width_px, picture.height_px, picture.channels, {}};
-  stored.values.reserve(picture.values.size());
-  for (const float light : picture.values) {
-    if (std::isnan(light)) throw Error("picture: a value is not a number (NaN)");
-    stored.values.push_back(static_cast<float>(std::clamp(transfer.Encode(light), 0.0, 1.0)));
-  }
-  return stored;
-}
-
-PictureScores ComparePictures(const StoredValues& reference, const StoredValues& other,
-                              int border_px) {
+PictureScores ComparePictures(const model::StoredValues& reference,
+                              const model::StoredValues& other, int border_px) {
   RequireComplete("reference", reference);
   RequireComplete("other picture", other);
   if (reference.width_px != other.width_px || reference.height_px != other.height_px ||

@@ -18,6 +18,7 @@
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/model/stored_values.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_parts.h"
 #include "tools/bench/bench_scene.h"
@@ -86,10 +87,10 @@ void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Bac
   const model::LinearPicture again =
       estimator::Photograph(estimate, scene.input.weights, &*scene.input.camera, nullptr, nullptr,
                             options.common.threads);
-  row->psnr_picture_db = estimator::ComparePictures(
-                             estimator::StoredValuesOf(scene.input.picture, scene.input.transfer),
-                             estimator::StoredValuesOf(again, scene.input.transfer), border_px)
-                             .psnr_db;
+  row->psnr_picture_db =
+      estimator::ComparePictures(model::StoredValuesOf(scene.input.picture, scene.input.transfer),
+                                 model::StoredValuesOf(again, scene.input.transfer), border_px)
+          .psnr_db;
 }
 
 std::string RowText(const GammaRow& row) {

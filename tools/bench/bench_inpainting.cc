@@ -19,6 +19,7 @@
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/kernels/device.h"
+#include "thicklens/model/stored_values.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/bench_solvers.h"
@@ -83,8 +84,7 @@ double PsnrWithin(const std::vector<cv::Mat>& region, const model::LightField& t
   for (int l = 0; l < truth.v_count; ++l) {
     for (int k = 0; k < truth.u_count; ++k) {
       const auto of = [&](const model::LightField& light_field) {
-        return estimator::StoredValuesOf(model::ViewPicture(light_field, k, l), truth.transfer)
-            .values;
+        return model::StoredValuesOf(model::ViewPicture(light_field, k, l), truth.transfer).values;
       };
       const std::vector<float> a = of(truth), b = of(estimate);
       const cv::Mat& mask = region[static_cast<std::size_t>(l * truth.u_count + k)];

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "thicklens/estimator/render.h"
+#include "thicklens/model/stored_values.h"
 
 namespace thicklens::tools {
 namespace {
@@ -131,8 +132,8 @@ FidelityScores ScoresOfPictures(const SampledPicture& picture,
         estimator::Photograph(estimates[i], input.weights, input.camera ? &*input.camera : nullptr,
                               nullptr, nullptr, threads);
     const estimator::PictureScores of_part = estimator::ComparePictures(
-        estimator::StoredValuesOf(input.picture, input.transfer),
-        estimator::StoredValuesOf(again, input.transfer), BorderPx(input.picture));
+        model::StoredValuesOf(input.picture, input.transfer),
+        model::StoredValuesOf(again, input.transfer), BorderPx(input.picture));
     scores.psnr_db += of_part.psnr_db / count;
     scores.delta_e94_mean += of_part.delta_e94_mean / count;
     has_edges = has_edges && of_part.macade_standin.has_value();

@@ -22,6 +22,7 @@
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
+#include "thicklens/model/stored_values.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/light_field_options.h"
@@ -88,8 +89,8 @@ CommandResult ComparePictureFiles(const CompareOptions& options) {
   const model::StoredPicture other =
       Cropped(ReadPicture(options.other_path), reading.crop, options.other_path);
   const estimator::PictureScores scores = NamingTheFile(options.other_path, [&] {
-    return estimator::ComparePictures(estimator::StoredValuesOf(reference),
-                                      estimator::StoredValuesOf(other), options.border_px);
+    return estimator::ComparePictures(model::StoredValuesOf(reference),
+                                      model::StoredValuesOf(other), options.border_px);
   });
   PrintResult(options.common, PictureScoresText(scores, options.border_px));
   CommandResult result;

@@ -7,6 +7,7 @@
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field_grid.h"
+#include "thicklens/model/stored_values.h"
 #include "tools/report/attribution.h"
 
 namespace thicklens::tools {
@@ -42,9 +43,9 @@ class SceneWorld {
   const model::SceneSimulator& simulator() const { return simulator_; }
   const model::StoredPicture& stored() const { return stored_; }
   double seconds() const { return seconds_; }
-  estimator::StoredValues Values(bool with_noise) const {
-    return with_noise ? estimator::StoredValuesOf(stored_)
-                      : estimator::StoredValuesOf(noiseless_, simulator_.camera().sensor.transfer);
+  model::StoredValues Values(bool with_noise) const {
+    return with_noise ? model::StoredValuesOf(stored_)
+                      : model::StoredValuesOf(noiseless_, simulator_.camera().sensor.transfer);
   }
 
  private:
@@ -177,8 +178,8 @@ class SceneAttributor {
 
   void Compare(const SceneWorld& world, SceneEffect* row) const {
     const bool with_noise = IsOfStorage(row->effect);
-    const estimator::StoredValues with = base_->Values(with_noise);
-    const estimator::StoredValues without = world.Values(with_noise);
+    const model::StoredValues with = base_->Values(with_noise);
+    const model::StoredValues without = world.Values(with_noise);
     PictureChangeMeter meter;
     meter.Add(with, without);
     row->picture = meter.Result();

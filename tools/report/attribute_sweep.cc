@@ -12,6 +12,7 @@
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/io/simulated_sweep.h"
+#include "thicklens/model/stored_values.h"
 #include "tools/report/attribution.h"
 
 namespace thicklens::tools {
@@ -64,11 +65,11 @@ class SweepWorld {
   const model::SweepSimulator& simulator() const { return simulator_; }
   double seconds() const { return seconds_; }
 
-  estimator::StoredValues Values(int frame, bool with_noise) const {
+  model::StoredValues Values(int frame, bool with_noise) const {
     tell_();
-    return with_noise ? estimator::StoredValuesOf(stored_.At(frame))
-                      : estimator::StoredValuesOf(simulator_.RenderNoiseless(frame),
-                                                  simulator_.camera().sensor.transfer);
+    return with_noise ? model::StoredValuesOf(stored_.At(frame))
+                      : model::StoredValuesOf(simulator_.RenderNoiseless(frame),
+                                              simulator_.camera().sensor.transfer);
   }
 
   calib::Calibration Calibrated() const {
@@ -136,9 +137,8 @@ class SweepAttributor {
     result_.true_blur_ratio = simulator.truth().blur_ratio;
     result_.picture_seconds = base.seconds();
     CalibrateBase(base);
-    const Frames<estimator::StoredValues> noiseless(sweep_.frame_count, base.Pixels() * 4,
-                                                    run_.threads,
-                                                    [&](int i) { return base.Values(i, false); });
+    const Frames<model::StoredValues> noiseless(sweep_.frame_count, base.Pixels() * 4, run_.threads,
+                                                [&](int i) { return base.Values(i, false); });
     for (const model::EffectFinding& finding : simulator.effects().findings) {
       if (!result_.on.Has(finding.effect)) continue;
       ++done_;
@@ -170,7 +170,7 @@ class SweepAttributor {
     result_.calibration_seconds = SecondsSince(start);
   }
 
-  void TakeAway(const SweepWorld& base, const Frames<estimator::StoredValues>& noiseless,
+  void TakeAway(const SweepWorld& base, const Frames<model::StoredValues>& noiseless,
                 SweepEffect* row) const {
     model::SweepSimulationOptions options = sweep_;
     options.effects.without.Add(row->effect);
@@ -195,7 +195,7 @@ class SweepAttributor {
         [](const auto& one, const auto& other) { return one.reading_mm == other.reading_mm; });
   }
 
-  void Compare(const SweepWorld& base, const Frames<estimator::StoredValues>& noiseless,
+  void Compare(const SweepWorld& base, const Frames<model::StoredValues>& noiseless,
                const SweepWorld& world, SweepEffect* row) const {
     const bool with_noise = IsOfStorage(row->effect);
     const auto with = [&](int i) { return with_noise ? base.Values(i, true) : noiseless.At(i); };
@@ -211,7 +211,7 @@ class SweepAttributor {
     if (row->picture.nothing()) return;
     const auto most = std::max_element(rms.begin(), rms.end()) - rms.begin();
     const auto frame = static_cast<int>(most);
-    const estimator::StoredValues there = with(frame);
+    const model::StoredValues there = with(frame);
     row->difference = {
         there.width_px, there.height_px,
         GreyLevelDifference(there, world.Values(frame, with_noise)),

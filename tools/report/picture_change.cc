@@ -12,8 +12,8 @@ constexpr double kFlat = 1e-4;
 
 }  // namespace
 
-double PictureChangeMeter::Add(const estimator::StoredValues& reference,
-                               const estimator::StoredValues& other) {
+double PictureChangeMeter::Add(const model::StoredValues& reference,
+                               const model::StoredValues& other) {
   double squares = 0;
   for (std::size_t i = 0; i < reference.values.size(); ++i) {
     const double difference = static_cast<double>(other.values[i]) - reference.values[i];
@@ -61,8 +61,8 @@ PictureChange PictureChangeMeter::Result() const {
   return change;
 }
 
-std::vector<float> GreyLevelDifference(const estimator::StoredValues& reference,
-                                       const estimator::StoredValues& other) {
+std::vector<float> GreyLevelDifference(const model::StoredValues& reference,
+                                       const model::StoredValues& other) {
   const auto channels = static_cast<std::size_t>(reference.channels);
   std::vector<float> difference(reference.values.size() / channels);
   for (std::size_t i = 0; i < reference.values.size(); ++i) {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "thicklens/estimator/compare.h"
+#include "thicklens/model/stored_values.h"
 
 namespace thicklens::tools {
 
@@ -24,7 +24,7 @@ struct PictureChange {
 class PictureChangeMeter {
  public:
   // Both must have one size and number of channels. Returns the rms of this image, grey levels.
-  double Add(const estimator::StoredValues& reference, const estimator::StoredValues& other);
+  double Add(const model::StoredValues& reference, const model::StoredValues& other);
   // Adds the sums of another meter.
   void Add(const PictureChangeMeter& other);
   PictureChange Result() const;
@@ -35,8 +35,8 @@ class PictureChangeMeter {
 };
 
 // Returns `other` minus the reference, as the mean of the channels, in grey levels; pixel by pixel.
-std::vector<float> GreyLevelDifference(const estimator::StoredValues& reference,
-                                       const estimator::StoredValues& other);
+std::vector<float> GreyLevelDifference(const model::StoredValues& reference,
+                                       const model::StoredValues& other);
 
 }  // namespace thicklens::tools
 

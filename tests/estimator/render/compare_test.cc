@@ -10,6 +10,7 @@
 
 #include "support/error_message.h"
 #include "thicklens/estimator/view_geometry.h"
+#include "thicklens/model/stored_values.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -20,36 +21,36 @@ using thicklens::testing::ErrorOf;
 
 constexpr double kPi = 3.14159265358979323846;
 
-StoredValues Noise(int width_px, int height_px, int channels, unsigned seed) {
+model::StoredValues Noise(int width_px, int height_px, int channels, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> uniform(0, 1);
-  StoredValues picture{width_px, height_px, channels, {}};
+  model::StoredValues picture{width_px, height_px, channels, {}};
   for (int i = 0; i < width_px * height_px * channels; ++i)
     picture.values.push_back(uniform(random));
   return picture;
 }
 
 template <typename ValueAt>
-StoredValues Drawn(int width_px, int height_px, const ValueAt& value_at) {
-  StoredValues picture{width_px, height_px, 1, {}};
+model::StoredValues Drawn(int width_px, int height_px, const ValueAt& value_at) {
+  model::StoredValues picture{width_px, height_px, 1, {}};
   for (int y = 0; y < height_px; ++y) {
     for (int x = 0; x < width_px; ++x) picture.values.push_back(static_cast<float>(value_at(x, y)));
   }
   return picture;
 }
 
-StoredValues Flat(int width_px, int height_px, double value) {
+model::StoredValues Flat(int width_px, int height_px, double value) {
   return Drawn(width_px, height_px, [value](int, int) { return value; });
 }
 
-double GreyAt(const StoredValues& picture, int x, int y) {
+double GreyAt(const model::StoredValues& picture, int x, int y) {
   const float* value = picture.values.data() + (y * picture.width_px + x) * picture.channels;
   if (picture.channels == 1) return value[0];
   return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2];
 }
 
 // SSIM as the paper defines it: window by window, weighted moments about the weighted means.
-double SlowSsim(const StoredValues& a, const StoredValues& b, int border_px) {
+double SlowSsim(const model::StoredValues& a, const model::StoredValues& b, int border_px) {
   const int margin = std::max(border_px, 5);
   double sum = 0;
   int windows = 0;
@@ -85,48 +86,24 @@ double SlowSsim(const StoredValues& a, const StoredValues& b, int border_px) {
   return sum / windows;
 }
 
-TEST(StoredValuesOf, DividesByFullScaleAndLeavesAlphaOut) {
-  const StoredValues narrow = StoredValuesOf(model::StoredPicture{1, 1, 4, 8, {255, 51, 0, 7}});
-  EXPECT_EQ(narrow.channels, 3);
-  EXPECT_THAT(narrow.values, ::testing::ElementsAre(1.0F, 0.2F, 0.0F));
-  const StoredValues wide = StoredValuesOf(model::StoredPicture{2, 1, 1, 16, {65535, 13107}});
-  EXPECT_THAT(wide.values, ::testing::ElementsAre(1.0F, 0.2F));
-  EXPECT_THAT(ErrorOf([] {
-                StoredValuesOf(model::StoredPicture{1, 1, 2, 8, {1, 2}});
-              }),
-              HasSubstr("2 channels"));
-}
-
-TEST(StoredValuesOf, EncodesAndClipsWithoutRounding) {
-  const model::LinearPicture light{4, 1, 1, {-0.5F, 0.25F, 0.3F, 7.0F}};
-  const StoredValues stored = StoredValuesOf(light, model::TransferCurve::Gamma(2));
-  EXPECT_EQ(stored.values[0], 0);
-  EXPECT_NEAR(stored.values[1], 0.5, 1e-7);
-  EXPECT_NEAR(stored.values[2], std::sqrt(0.3), 1e-7);
-  EXPECT_EQ(stored.values[3], 1);
-  const model::LinearPicture broken{1, 1, 1, {std::numeric_limits<float>::quiet_NaN()}};
-  EXPECT_THAT(ErrorOf([&] { StoredValuesOf(broken, model::TransferCurve::Srgb()); }),
-              HasSubstr("NaN"));
-}
-
 TEST(Psnr, IsThatOfAConstantDifference) {
   const PictureScores scores = ComparePictures(Flat(20, 14, 0.5), Flat(20, 14, 0.25), 0);
   EXPECT_NEAR(scores.psnr_db, -20 * std::log10(0.25), 1e-12);
 }
 
 TEST(Psnr, PoolsTheChannels) {
-  StoredValues reference = Noise(16, 12, 3, 1);
+  model::StoredValues reference = Noise(16, 12, 3, 1);
   for (float& value : reference.values) value *= 0.5F;
-  StoredValues other = reference;
+  model::StoredValues other = reference;
   for (std::size_t i = 1; i < other.values.size(); i += 3) other.values[i] += 0.125F;
   EXPECT_NEAR(ComparePictures(reference, other, 2).psnr_db, -10 * std::log10(1.0 / 64 / 3), 1e-6);
 }
 
 TEST(Psnr, IsInfiniteForEqualPicturesAndWhatLiesInTheBorderDoesNotCount) {
-  const StoredValues reference = Noise(20, 17, 1, 2);
+  const model::StoredValues reference = Noise(20, 17, 1, 2);
   EXPECT_EQ(ComparePictures(reference, reference, 0).psnr_db,
             std::numeric_limits<double>::infinity());
-  StoredValues other = reference;
+  model::StoredValues other = reference;
   other.values[3 * 20 + 9] += 0.5F;       // y = 3
   other.values[8 * 20 + 20 - 4] += 0.5F;  // x = 16
   EXPECT_EQ(ComparePictures(reference, other, 4).psnr_db, std::numeric_limits<double>::infinity());
@@ -139,8 +116,8 @@ TEST(Psnr, IsInfiniteForEqualPicturesAndWhatLiesInTheBorderDoesNotCount) {
 
 TEST(Ssim, IsThatOfTheDirectSum) {
   for (const int channels : {1, 3}) {
-    const StoredValues a = Noise(31, 26, channels, 3);
-    StoredValues b = Noise(31, 26, channels, 4);
+    const model::StoredValues a = Noise(31, 26, channels, 3);
+    model::StoredValues b = Noise(31, 26, channels, 4);
     for (std::size_t i = 0; i < b.values.size(); ++i)
       b.values[i] = 0.7F * a.values[i] + 0.3F * b.values[i];
     for (const int border_px : {0, 5, 8}) {
@@ -151,8 +128,8 @@ TEST(Ssim, IsThatOfTheDirectSum) {
 }
 
 TEST(Ssim, IsSymmetricAndOneForEqualPictures) {
-  const StoredValues a = Noise(40, 30, 1, 5);
-  const StoredValues b = Noise(40, 30, 1, 6);
+  const model::StoredValues a = Noise(40, 30, 1, 5);
+  const model::StoredValues b = Noise(40, 30, 1, 6);
   EXPECT_NEAR(ComparePictures(a, a, 0).ssim, 1, 1e-12);
   EXPECT_NEAR(ComparePictures(a, b, 0).ssim, ComparePictures(b, a, 0).ssim, 1e-12);
   EXPECT_LT(ComparePictures(a, b, 0).ssim, 0.2);
@@ -164,9 +141,9 @@ TEST(Ssim, OfFlatPicturesIsThatOfTheirMeans) {
 }
 
 TEST(Ssim, IsNotDefinedWhereNoWindowFits) {
-  const StoredValues narrow = Noise(10, 30, 1, 7);
+  const model::StoredValues narrow = Noise(10, 30, 1, 7);
   EXPECT_TRUE(std::isnan(ComparePictures(narrow, narrow, 0).ssim));
-  const StoredValues just_fits = Noise(11, 11, 1, 7);
+  const model::StoredValues just_fits = Noise(11, 11, 1, 7);
   EXPECT_NEAR(ComparePictures(just_fits, just_fits, 0).ssim, 1, 1e-12);
 }
 
@@ -207,14 +184,14 @@ TEST(LabOf, KnowsPrimariesAndGreys) {
 }
 
 TEST(MeanDeltaE94, AveragesInsideTheBorderAndTakesGreyAsRgb) {
-  StoredValues reference = Flat(12, 12, 0.5);
-  StoredValues other = reference;
+  model::StoredValues reference = Flat(12, 12, 0.5);
+  model::StoredValues other = reference;
   other.values[6 * 12 + 6] = 0.75F;
   other.values[0] = 0;
   const double one = DeltaE94(LabOf({0.5, 0.5, 0.5}), LabOf({0.75, 0.75, 0.75}));
   EXPECT_NEAR(ComparePictures(reference, other, 1).delta_e94_mean, one / 100, 1e-9);
   // Red against green, half and half.
-  StoredValues red{12, 12, 3, {}}, mixed{12, 12, 3, {}};
+  model::StoredValues red{12, 12, 3, {}}, mixed{12, 12, 3, {}};
   for (int i = 0; i < 144; ++i) {
     red.values.insert(red.values.end(), {1, 0, 0});
     if (i % 2 == 0) mixed.values.insert(mixed.values.end(), {1, 0, 0});
@@ -225,12 +202,12 @@ TEST(MeanDeltaE94, AveragesInsideTheBorderAndTakesGreyAsRgb) {
 }
 
 TEST(MacadeStandin, IsOneForEqualOrientation) {
-  const StoredValues reference = Noise(60, 50, 1, 8);
-  StoredValues weaker = reference;
-  StoredValues inverted = reference;
+  const model::StoredValues reference = Noise(60, 50, 1, 8);
+  model::StoredValues weaker = reference;
+  model::StoredValues inverted = reference;
   for (float& value : weaker.values) value = 0.25F + 0.5F * value;
   for (float& value : inverted.values) value = 1 - value;
-  for (const StoredValues& other : {reference, weaker, inverted}) {
+  for (const model::StoredValues& other : {reference, weaker, inverted}) {
     const auto standin = ComparePictures(reference, other, 0).macade_standin;
     ASSERT_TRUE(standin);
     EXPECT_NEAR(*standin, 1, 1e-6);
@@ -260,8 +237,9 @@ TEST(MacadeStandin, IsTheCosineBetweenTwoRamps) {
 }
 
 TEST(MacadeStandin, CountsAnEdgeThatWasLostAsNothing) {
-  const StoredValues ramp = Drawn(20, 20, [](int x, int) { return 0.02 * x; });
-  const StoredValues half = Drawn(20, 20, [](int x, int y) { return y < 10 ? 0.02 * x : 0.5; });
+  const model::StoredValues ramp = Drawn(20, 20, [](int x, int) { return 0.02 * x; });
+  const model::StoredValues half =
+      Drawn(20, 20, [](int x, int y) { return y < 10 ? 0.02 * x : 0.5; });
   ASSERT_TRUE(ComparePictures(ramp, Flat(20, 20, 0.5), 0).macade_standin);
   EXPECT_EQ(*ComparePictures(ramp, Flat(20, 20, 0.5), 0).macade_standin, 0);
   // Rows 10 to 18 of 1 to 18: without any gradient from 11 on, an oblique one in rows 9 and 10.
@@ -294,8 +272,8 @@ TEST(MacadeStandin, LooksAtEdgesOfTheReferenceOnly) {
 }
 
 TEST(ComparePictures, RefusesWhatDoesNotFit) {
-  const StoredValues picture = Noise(20, 12, 1, 12);
-  const auto message = [&](const StoredValues& other, int border_px) {
+  const model::StoredValues picture = Noise(20, 12, 1, 12);
+  const auto message = [&](const model::StoredValues& other, int border_px) {
     return ErrorOf([&] { ComparePictures(picture, other, border_px); });
   };
   EXPECT_THAT(message(Noise(21, 12, 1, 1), 0), AllOf(HasSubstr("20x12"), HasSubstr("21x12")));
@@ -303,7 +281,7 @@ TEST(ComparePictures, RefusesWhatDoesNotFit) {
   EXPECT_THAT(message(picture, 6), AllOf(HasSubstr("border of 6 px"), HasSubstr("0 to 5")));
   EXPECT_THAT(message(picture, -1), HasSubstr("border of -1 px"));
   EXPECT_EQ(message(picture, 5), "(no error)");
-  EXPECT_THAT(message(StoredValues{20, 12, 1, {0.5F}}, 0), HasSubstr("1 values"));
+  EXPECT_THAT(message(model::StoredValues{20, 12, 1, {0.5F}}, 0), HasSubstr("1 values"));
 }
 
 // Views of a texture that differ from it by `difference(k, l)`, stored as they are.
@@ -313,7 +291,7 @@ model::LightField LightFieldOf(int u_count, int v_count, const Difference& diffe
   light_field.transfer = model::TransferCurve::Linear();
   for (int l = 0; l < v_count; ++l) {
     for (int k = 0; k < u_count; ++k) {
-      StoredValues texture = Noise(24, 20, 1, 77);
+      model::StoredValues texture = Noise(24, 20, 1, 77);
       for (float& value : texture.values)
         value = static_cast<float>(0.25 + 0.25 * value + difference(k, l));
       model::SetView(&light_field, k, l, {24, 20, 1, texture.values});
@@ -360,14 +338,14 @@ TEST(CompareLightFields, MeansOfScoresAreMeans) {
   // With the centre view alone, all three are its scores, and those of ComparePictures.
   model::LightField reference = model::MakeLightField(24, 20, 1, 1, 3);
   model::LightField other = reference;
-  const StoredValues a = Noise(24, 20, 3, 5);
-  const StoredValues b = Noise(24, 20, 3, 6);
+  const model::StoredValues a = Noise(24, 20, 3, 5);
+  const model::StoredValues b = Noise(24, 20, 3, 6);
   model::SetView(&reference, 0, 0, {24, 20, 3, a.values});
   model::SetView(&other, 0, 0, {24, 20, 3, b.values});
   other.transfer = model::TransferCurve::Linear();  // for storing it; the reference's counts
-  const PictureScores expected =
-      ComparePictures(StoredValuesOf(model::ViewPicture(reference, 0, 0), reference.transfer),
-                      StoredValuesOf(model::ViewPicture(other, 0, 0), reference.transfer), 3);
+  const PictureScores expected = ComparePictures(
+      model::StoredValuesOf(model::ViewPicture(reference, 0, 0), reference.transfer),
+      model::StoredValuesOf(model::ViewPicture(other, 0, 0), reference.transfer), 3);
   const LightFieldScores scores = CompareLightFields(reference, other, 3, std::nullopt, 1);
   for (const PictureScores& mean : {scores.mean, scores.centre, scores.corner}) {
     EXPECT_EQ(mean.psnr_db, expected.psnr_db);
@@ -411,7 +389,7 @@ constexpr int kWide = 40;
 constexpr int kHigh = 32;
 
 // What stands at x in the centre view stands at x - a d, y - b d in the view (a, b).
-model::LightField ShiftedTexture(const StoredValues& texture, int disparity_px) {
+model::LightField ShiftedTexture(const model::StoredValues& texture, int disparity_px) {
   model::LightField light_field = model::MakeLightField(kWide, kHigh, 3, 3, 1);
   for (int l = 0; l < 3; ++l) {
     for (int k = 0; k < 3; ++k) {
@@ -429,7 +407,7 @@ model::LightField ShiftedTexture(const StoredValues& texture, int disparity_px) 
   return light_field;
 }
 
-DibrInput DibrOf(const StoredValues& texture, float disparity_px) {
+DibrInput DibrOf(const model::StoredValues& texture, float disparity_px) {
   DibrInput dibr;
   dibr.photograph = {kWide, kHigh, 1, texture.values};
   dibr.disparity.width_px = kWide;
@@ -439,7 +417,7 @@ DibrInput DibrOf(const StoredValues& texture, float disparity_px) {
 }
 
 TEST(CompareLightFields, WarpsThePhotographIntoEachView) {
-  const StoredValues texture = Noise(kWide, kHigh, 1, 13);
+  const model::StoredValues texture = Noise(kWide, kHigh, 1, 13);
   const model::LightField truth = ShiftedTexture(texture, 2);
   const model::LightField still = ShiftedTexture(texture, 0);
   const LightFieldScores right = CompareLightFields(truth, still, 6, DibrOf(texture, 2), 1);
@@ -455,7 +433,7 @@ TEST(CompareLightFields, WarpsThePhotographIntoEachView) {
 // Two means that stand beside each other are over the same views, although each has another view
 // without difference.
 TEST(CompareLightFields, MeansOfEstimateAndBaselineAreOverTheSameViews) {
-  const StoredValues texture = Noise(kWide, kHigh, 1, 15);
+  const model::StoredValues texture = Noise(kWide, kHigh, 1, 15);
   const model::LightField truth = ShiftedTexture(texture, 2);
   model::LightField other = ShiftedTexture(texture, 1);
   model::SetView(&other, 0, 0, model::ViewPicture(truth, 0, 0));
@@ -478,7 +456,7 @@ TEST(CompareLightFields, MeansOfEstimateAndBaselineAreOverTheSameViews) {
 }
 
 TEST(CompareLightFields, GivesTheSameOnAnyNumberOfThreads) {
-  const StoredValues texture = Noise(kWide, kHigh, 1, 14);
+  const model::StoredValues texture = Noise(kWide, kHigh, 1, 14);
   const model::LightField truth = ShiftedTexture(texture, 1);
   const model::LightField still = ShiftedTexture(texture, 0);
   const LightFieldScores one = CompareLightFields(truth, still, 3, DibrOf(texture, 0.7F), 1);

@@ -22,6 +22,7 @@
 #include "thicklens/io/light_field_io.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field_grid.h"
+#include "thicklens/model/stored_values.h"
 #include "tools/report/compare_table.h"
 #include "tools/support/child_process.h"
 
@@ -141,8 +142,8 @@ model::StoredPicture Noisy(model::StoredPicture picture, int amplitude, unsigned
 // What the library says of two pictures; the protocol between file and score is the command's.
 estimator::PictureScores Direct(const model::StoredPicture& reference,
                                 const model::StoredPicture& other, int border_px) {
-  return estimator::ComparePictures(estimator::StoredValuesOf(reference),
-                                    estimator::StoredValuesOf(other), border_px);
+  return estimator::ComparePictures(model::StoredValuesOf(reference), model::StoredValuesOf(other),
+                                    border_px);
 }
 
 class CompareProgram : public ::testing::Test {

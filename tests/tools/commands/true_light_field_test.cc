@@ -15,6 +15,7 @@
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/scene.h"
+#include "thicklens/model/stored_values.h"
 
 namespace thicklens::tools {
 namespace {
@@ -36,8 +37,8 @@ class TrueLightFieldTest : public ::testing::TestWithParam<model::ApertureShape>
 
   // Of stored values, without the border of which H has to guess what lies beyond.
   double PsnrOf(const model::LinearPicture& picture, const model::LinearPicture& reference) const {
-    return estimator::ComparePictures(estimator::StoredValuesOf(reference, views_.transfer),
-                                      estimator::StoredValuesOf(picture, views_.transfer), 20)
+    return estimator::ComparePictures(model::StoredValuesOf(reference, views_.transfer),
+                                      model::StoredValuesOf(picture, views_.transfer), 20)
         .psnr_db;
   }
 

@@ -13,8 +13,8 @@ namespace {
 using thicklens::testing::kPi;
 
 // A product of waves with a period of 16 px, moved to the right and down.
-estimator::StoredValues Waves(double right_px, double down_px) {
-  estimator::StoredValues picture{66, 50, 3, {}};  // whole periods inside the outermost pixels
+model::StoredValues Waves(double right_px, double down_px) {
+  model::StoredValues picture{66, 50, 3, {}};  // whole periods inside the outermost pixels
   for (int y = 0; y < picture.height_px; ++y) {
     for (int x = 0; x < picture.width_px; ++x) {
       const double light =
@@ -27,7 +27,7 @@ estimator::StoredValues Waves(double right_px, double down_px) {
   return picture;
 }
 
-PictureChange Change(const estimator::StoredValues& a, const estimator::StoredValues& b) {
+PictureChange Change(const model::StoredValues& a, const model::StoredValues& b) {
   PictureChangeMeter meter;
   meter.Add(a, b);
   return meter.Result();
@@ -45,8 +45,8 @@ TEST(PictureChangeTest, AShiftIsAShift) {
 }
 
 TEST(PictureChangeTest, TellsRmsLargestAndPsnr) {
-  estimator::StoredValues dark{4, 3, 1, std::vector<float>(12, 0.25F)};
-  estimator::StoredValues bright = dark;
+  model::StoredValues dark{4, 3, 1, std::vector<float>(12, 0.25F)};
+  model::StoredValues bright = dark;
   bright.values[5] += 0.1F;
   const PictureChange change = Change(dark, bright);
   EXPECT_NEAR(change.largest_grey_levels, 25.5, 1e-4);
@@ -70,8 +70,8 @@ TEST(PictureChangeTest, PartsAddUp) {
 }
 
 TEST(PictureChangeTest, DifferencesAreTheMeanOfTheChannels) {
-  const estimator::StoredValues before{2, 1, 3, {0, 0, 0, 0.5F, 0.5F, 0.5F}};
-  const estimator::StoredValues after{2, 1, 3, {0.1F, 0, 0.2F, 0.5F, 0.4F, 0.5F}};
+  const model::StoredValues before{2, 1, 3, {0, 0, 0, 0.5F, 0.5F, 0.5F}};
+  const model::StoredValues after{2, 1, 3, {0.1F, 0, 0.2F, 0.5F, 0.4F, 0.5F}};
   const std::vector<float> difference = GreyLevelDifference(before, after);
   ASSERT_EQ(difference.size(), 2U);
   EXPECT_NEAR(difference[0], 25.5, 1e-4);

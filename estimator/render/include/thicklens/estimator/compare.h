@@ -9,22 +9,9 @@
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
+#include "thicklens/model/stored_values.h"
 
 namespace thicklens::estimator {
-
-// Stored values of an image in [0, 1], on which image metrics are computed. Channels are
-// interleaved.
-struct StoredValues {
-  int width_px = 0;
-  int height_px = 0;
-  int channels = 0;  // 1 (grey) or 3 (sRGB)
-  std::vector<float> values;
-};
-// Divides the stored values by full scale and leaves alpha out.
-StoredValues StoredValuesOf(const model::StoredPicture& picture);
-// Encodes by the transfer curve and clips to [0, 1], without rounding.
-StoredValues StoredValuesOf(const model::LinearPicture& picture,
-                            const model::TransferCurve& transfer);
 
 struct PictureScores {
   double psnr_db = 0;                    // +inf for equal images
@@ -49,8 +36,8 @@ struct PictureScores {
 // An edge pixel has at least half of the gradient that one pixel in a hundred of the reference
 // exceeds, and at least 2/255 per px (a fixed multiple of the noise of 8-bit values). If the other
 // image has no gradient at all at an edge pixel, an edge was lost and the pixel counts 0.
-PictureScores ComparePictures(const StoredValues& reference, const StoredValues& other,
-                              int border_px);
+PictureScores ComparePictures(const model::StoredValues& reference,
+                              const model::StoredValues& other, int border_px);
 
 // CIE94 difference of two colours in L*, a*, b*; the first one is the reference.
 double DeltaE94(const Eigen::Vector3d& reference_lab, const Eigen::Vector3d& lab);
