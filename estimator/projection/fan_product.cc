@@ -6,10 +6,10 @@
 #include <cstdint>
 
 #include "estimator/projection/view_fan.h"
-#include "estimator/views/catmull_rom.h"
 #include "estimator/views/surface_taps.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/kernels/catmull_rom.h"
 #include "thicklens/kernels/product_row.h"
 
 namespace thicklens::estimator {
@@ -105,7 +105,7 @@ Taps TapsOnLine(int pixel, float source_px, int count, Between between, const Is
   if (fraction == 0) return {below - pixel};
   bool cubic = between == Between::kCubic && below >= 1 && below + 2 < count;
   for (int n = below - 1; cubic && n <= below + 2; ++n) cubic = is_near(n);
-  if (cubic) return {below - 1 - pixel, 4, CatmullRomWeights(fraction)};
+  if (cubic) return {below - 1 - pixel, 4, kernels::CatmullRomWeights<double>(fraction)};
   return {below - pixel, 2, {1 - fraction, fraction, 0, 0}};
 }
 

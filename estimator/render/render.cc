@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "estimator/render/shown_views.h"
-#include "estimator/views/catmull_rom.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/kernels/catmull_rom.h"
 
 namespace thicklens::estimator {
 namespace {
@@ -41,7 +41,7 @@ struct ShiftedAxis {
     const double snapped_px = std::abs(source_px - nearest_px) < kRounding ? nearest_px : source_px;
     if (!(std::abs(snapped_px) < count)) return;  // all of it is outside
     whole = static_cast<int>(std::floor(snapped_px));
-    const std::array<double, 4> weights = CatmullRomWeights(snapped_px - whole);
+    const std::array<double, 4> weights = kernels::CatmullRomWeights<double>(snapped_px - whole);
     for (std::size_t n = 0; n < weights.size(); ++n) tap_weight[n] = static_cast<float>(weights[n]);
     first = static_cast<int>(std::max(0.0, std::ceil(-snapped_px)));
     last = static_cast<int>(std::min(count - 1.0, std::floor(count - 1 - snapped_px)));

@@ -29,7 +29,7 @@ inline __attribute__((always_inline)) Four Load(const float* from) {
   return four;
 }
 
-// The weights of catmull_rom.h, in float, all four at once.
+// The weights of catmull_rom.h, all four at once; a weight that is 0 may have another sign.
 inline __attribute__((always_inline)) Four CatmullRom(float fraction) {
   constexpr Four kCubic{-0.5F, 1.5F, -1.5F, 0.5F};
   constexpr Four kSquare{1, -2.5F, 2, -0.5F};

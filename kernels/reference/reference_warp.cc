@@ -9,6 +9,7 @@
 
 #include "kernels/reference/warp_arguments.h"
 #include "thicklens/base/error.h"
+#include "thicklens/kernels/catmull_rom.h"
 #include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
@@ -32,12 +33,6 @@ Place PlaceAt(int sample, float source, int count, float limit_px) {
   const int at = sample + static_cast<int>(below);
   const int pixel = std::clamp(at, 0, count - 1);
   return {pixel, at == pixel && at < count - 1 ? way - below : 0.0F};
-}
-
-// Weights of the pixels at -1, 0, 1 and 2, after Catmull and Rom.
-std::array<float, 4> CatmullRom(float t) {
-  return {((-0.5F * t + 1) * t - 0.5F) * t, (1.5F * t - 2.5F) * t * t + 1,
-          ((-1.5F * t + 2) * t + 0.5F) * t, (0.5F * t - 0.5F) * t * t};
 }
 
 class ReferenceWarp : public ViewWarp {
@@ -108,8 +103,8 @@ class ReferenceWarp : public ViewWarp {
   }
 
   float Cubic(const Place& across, const Place& down, int channel) const {
-    const std::array<float, 4> weight_x = CatmullRom(across.rest);
-    const std::array<float, 4> weight_y = CatmullRom(down.rest);
+    const std::array<float, 4> weight_x = CatmullRomWeights(across.rest);
+    const std::array<float, 4> weight_y = CatmullRomWeights(down.rest);
     float sum = 0;
     for (int j = 0; j < 4; ++j) {
       float row = 0;
