@@ -16,6 +16,7 @@
 #include "estimator/views/input_checks.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/residual_guard.h"
 #include "thicklens/base/run_cost.h"
@@ -28,7 +29,6 @@ namespace {
 using kernels::BlockGeometry;
 using kernels::Kernels;
 constexpr int kDefaultBlockPx = 16;  // the paper's size
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Divides an image into blocks, row by row; the blocks at the right and lower border may be
 // smaller.

@@ -10,6 +10,7 @@
 #include "estimator/views/same_point.h"
 #include "estimator/views/warped_views.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
@@ -18,8 +19,6 @@ namespace {
 using kernels::BlockGeometry;
 using kernels::CsrMatrix;
 using kernels::CsrPattern;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Calls visit(ray, k, l, s, t) for every existing ray of the block.
 template <typename Visit>

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
@@ -22,8 +23,6 @@ constexpr double kWindowSigmaPx = 2;
 // exceeds this limit.
 constexpr double kSameSurface = 5;
 constexpr int kLeastNeighbours = 6;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // The Gaussian over the window, one axis.
 std::array<double, 2 * kReachPx + 1> WindowWeights() {

@@ -12,6 +12,7 @@
 #include "estimator/depth/hole_region.h"
 #include "estimator/depth/hole_territories.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/estimator/estimate_checks.h"
 
 namespace thicklens::estimator {
@@ -28,8 +29,6 @@ constexpr double kMostJumpPx = 1;
 constexpr double kSweepsPerPx = 6;
 constexpr double kSweepsOfAll = 16;
 constexpr double kMostUpdates = 1e6;  // in addition
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Solves for one hole: each pixel's disparity u is the mean over its neighbours of u + (p - q)
 // slope, where the slope is the mean of their planes' slopes. Pixels of different surfaces are not

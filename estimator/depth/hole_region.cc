@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "thicklens/base/index.h"
+
 namespace thicklens::estimator {
 namespace {
 
@@ -13,8 +15,6 @@ constexpr int kLeastDepthPx = 3;
 constexpr int kMostDepthPx = 48;
 // If some group has so many rim pixels, isolated rim pixels are ignored.
 constexpr int kManyRimPixels = 3;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 cv::Mat DistanceToKnown(const DisparityMap& map) {
   cv::Mat is_hole(map.height_px, map.width_px, CV_8U);

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "thicklens/base/index.h"
+
 namespace thicklens::estimator {
 namespace {
 
@@ -16,8 +18,6 @@ constexpr double kEdgePerWidth = 0.1;
 constexpr int kMostLevels = 4;
 constexpr int kMostRounds = 3;
 constexpr float kMostBuckets = 4096;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 
 #include "estimator/projection/grid_photograph.h"
 #include "estimator/views/same_point.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/kernels/grid_loops.h"
 
@@ -13,8 +14,6 @@ namespace thicklens::estimator {
 namespace {
 
 constexpr std::size_t kBandSamples = kernels::kLongestRun;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

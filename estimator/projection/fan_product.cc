@@ -8,14 +8,13 @@
 #include "estimator/projection/view_fan.h"
 #include "estimator/views/surface_taps.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/kernels/catmull_rom.h"
 #include "thicklens/kernels/product_row.h"
 
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Minimum and maximum disparity of the 2 x 2 pixels from each pixel to the right and down.
 struct CellRange {

@@ -11,12 +11,11 @@
 #include "estimator/projection/view_fan.h"
 #include "estimator/views/surface_taps.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
 struct Band {

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
@@ -21,8 +22,6 @@ constexpr std::size_t kMostBandBytes = 320 * 1024;
 constexpr int kMostRayRows = 256;
 // Starting a thread for less takes longer than it saves.
 constexpr std::size_t kLeastBytesOfThread = 3 * 1024 * 1024;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 int BandRows(std::size_t bytes_of_row) {
   const std::size_t rows = kMostBandBytes / std::max<std::size_t>(bytes_of_row, 1);

@@ -5,6 +5,7 @@
 
 #include "estimator/views/surface_taps.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
@@ -12,8 +13,6 @@ namespace {
 
 // Rows of the photograph that are summed together.
 constexpr int kBandRows = 8;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
 std::int32_t Floor(Real x) {

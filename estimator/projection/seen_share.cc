@@ -3,16 +3,11 @@
 #include <cstddef>
 
 #include "estimator/views/surface_taps.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/kernels/seen_row.h"
 
 namespace thicklens::estimator {
-namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 std::vector<float> SeenShare(const ViewFan& fan, const DisparityMap& disparity,
                              const std::vector<unsigned char>& known, int threads) {
   const auto same_surface = static_cast<float>(SurfaceTolerance(disparity));

@@ -5,14 +5,13 @@
 #include <cstddef>
 #include <limits>
 
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 double Offset(int position, int count) { return position - (count - 1) / 2.0; }
 

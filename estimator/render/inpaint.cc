@@ -14,6 +14,7 @@
 #include "estimator/render/shown_views.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/run_cost.h"
 
@@ -22,8 +23,6 @@ namespace {
 
 // Tolerance for points of one surface, as in RenderDisparity.
 constexpr double kSameSurfacePx = 0.2;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Holes of one view and the disparities of its points.
 struct ViewHoles {

@@ -12,13 +12,12 @@
 #include "estimator/views/ray_irradiance.h"
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/render.h"
 
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Calls work(view, k, l) for all views.
 template <typename Work>

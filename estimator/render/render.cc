@@ -13,6 +13,7 @@
 #include "estimator/render/shown_views.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/kernels/catmull_rom.h"
 
@@ -21,8 +22,6 @@ namespace {
 
 // Positions whose difference, relative or in px, is smaller are equal except for rounding.
 constexpr double kRounding = 1e-9;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 void CheckIndex(const char* name, int value, int count) {
   if (value >= 0 && value < count) return;

@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 int Half(int count) { return (count + 1) / 2; }
 

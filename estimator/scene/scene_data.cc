@@ -5,13 +5,12 @@
 #include <cstddef>
 
 #include "estimator/scene/stored_slope.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::estimator {
 namespace {
 
 constexpr double kHiddenWeight = 20;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Returns the sum of the squares of the weights that the rays of one axis put on the pixels of a
 // line, linear between pixels, for neighbours `step_px` apart.

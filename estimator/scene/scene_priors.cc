@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstddef>
 
+#include "thicklens/base/index.h"
+
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Sets the sum over the channels of the squared forward differences at each pixel of a row.
 template <typename Real>

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
@@ -24,8 +25,6 @@ constexpr double kRegularisation = 2.5e-4;
 constexpr double kDoubt = 4;  // factor of the unexplained share
 
 constexpr int kStripRows = 64;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
 constexpr int kDepthOf = cv::DataType<Real>::depth;

@@ -4,12 +4,11 @@
 #include <cmath>
 #include <cstddef>
 
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBandRows = 16;
 

@@ -15,6 +15,7 @@
 #include "estimator/views/mixed_samples.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/kernels/cell_row.h"
 
@@ -29,8 +30,6 @@ constexpr float kFarAwayPx = 4194304;
 
 // The limit keeps the displacement of disparity 0 at 0 in float as well.
 constexpr double kLargestShift = 1e30;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 void CheckMap(const DisparityMap& map) {
   if (map.width_px < 1 || map.height_px < 1 ||

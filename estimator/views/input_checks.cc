@@ -10,11 +10,10 @@
 
 #include "estimator/views/ray_landing.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 [[noreturn]] void Fail(const std::string& what) { throw Error("estimate: " + what); }
 

@@ -12,11 +12,10 @@
 
 #include "estimator/views/surface_taps.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::estimator {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Minimum share of a sample's pixel. A smaller share counts as none, and a share that leaves less
 // than this counts as the whole pixel.

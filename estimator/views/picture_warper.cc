@@ -6,6 +6,7 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/estimator/view_geometry.h"
 
 namespace thicklens::estimator {
@@ -14,8 +15,6 @@ namespace {
 // A pixel whose disparity differs by more than this, px per view step, is not of the sample's
 // surface.
 constexpr double kSamePointPx = 0.3;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 void CheckPicture(const model::LinearPicture& picture) {
   if (picture.width_px < 1 || picture.height_px < 1 || picture.channels < 1 ||

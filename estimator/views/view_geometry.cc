@@ -7,13 +7,12 @@
 #include <limits>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::estimator {
 namespace {
 
 constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 void CheckCount(const char* what, int width_px, int height_px, int channels, std::size_t count) {
   if (width_px < 1 || height_px < 1 || channels < 1 ||

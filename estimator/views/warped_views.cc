@@ -6,15 +6,10 @@
 
 #include "estimator/views/input_checks.h"
 #include "estimator/views/ray_irradiance.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::estimator {
-namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
-
 model::LinearPicture WithoutFalloff(const model::LinearPicture& photograph,
                                     const model::LightFieldGrid& grid, const model::Camera& camera,
                                     const Eigen::ArrayXXd& weights, int threads) {

@@ -8,6 +8,7 @@
 #include "kernels/cpu/lanes.h"
 #include "kernels/cpu/processor.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::kernels {
@@ -18,8 +19,6 @@ constexpr std::size_t kPacket = AperturePrior<float>::kPacket;
 // Number of points for one call of ParallelFor's work.
 constexpr std::size_t kChunk = 256 * kPacket;
 constexpr int kMostSamples = 64;  // along an axis
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Orthonormal DCT-II of one axis. Even functions need only the sums of the samples at the same
 // distance from the middle, odd ones only the differences: `values` has count x (count + 1)/2

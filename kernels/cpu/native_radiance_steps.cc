@@ -8,12 +8,11 @@
 #include "kernels/cpu/bands.h"
 #include "kernels/cpu/prior_rows.h"
 #include "kernels/cpu/radiance_loops.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/radiance_steps.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBandRows = 16;  // rows of a band of a sum, for any number of threads
 

@@ -6,11 +6,10 @@
 
 #include "kernels/cpu/bands.h"
 #include "kernels/cpu/patch_loops.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBandRows = 64;
 constexpr int kColours = 3;

@@ -7,13 +7,12 @@
 
 #include "kernels/cpu/bands.h"
 #include "kernels/cpu/filter_loops.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::kernels {
 namespace {
 
 constexpr int kLeastBandPx = 4096;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 // Computes rows of the result, one after the other, and has the memory for this.
 template <typename Real>

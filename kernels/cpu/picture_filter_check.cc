@@ -7,14 +7,13 @@
 
 #include "kernels/reference/arguments.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::kernels {
 namespace {
 
 constexpr std::int64_t kMostPixels = std::numeric_limits<std::int32_t>::max();
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // Throws Error unless every pixel of the block reads only pixels inside the image.
 template <typename Real>

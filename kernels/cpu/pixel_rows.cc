@@ -5,6 +5,7 @@
 
 #include "kernels/cpu/bands.h"
 #include "kernels/cpu/filter_loops.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::kernels {
@@ -12,8 +13,6 @@ namespace {
 
 constexpr std::size_t kDotChunk = 4096;
 constexpr int kLeastDotChunks = 8;  // minimum number of a band
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 

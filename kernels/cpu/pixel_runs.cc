@@ -8,6 +8,7 @@
 #include "kernels/cpu/bands.h"
 #include "kernels/cpu/filter_loops.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/picture_filter.h"
 
 namespace thicklens::kernels {
@@ -23,8 +24,6 @@ constexpr int kPartPx = 64;            // parts of a row have multiples of this 
 // less than 0.2 s.
 constexpr int kPiecesOfAPart = 16;
 constexpr std::size_t kRowsAtOnce = 1024;
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
 RunRange<Real> RangeOf(const PixelRuns<Real>& runs, std::size_t first, std::size_t last) {

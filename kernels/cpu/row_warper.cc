@@ -5,6 +5,7 @@
 
 #include "kernels/cpu/processor.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::kernels {
 namespace {
@@ -13,8 +14,6 @@ namespace {
 // the pixels at -1, 0, 1 and 2.
 constexpr int kBefore = 1;
 constexpr int kAfter = 2;
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 std::size_t Stride(int width_px) { return Index(width_px + kBefore + kAfter); }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/opencl/agreement.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::kernels {
 namespace {
@@ -15,8 +16,6 @@ constexpr int kPixels = kWidth * kHeight;
 constexpr int kChannels = 3;
 constexpr int kRadius = 3;
 constexpr int kSteps = 3;  // steps for each prior
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
 PixelFilter<Real> MakeFilter(Axis axis, Numbers* numbers) {

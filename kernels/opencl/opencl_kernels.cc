@@ -10,13 +10,12 @@
 #include "kernels/opencl/opencl_device.h"
 #include "kernels/reference/arguments.h"
 #include "kernels/reference/splat.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/kernels/sparse.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 constexpr const char* kChannel = "channel of the light field";
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "thicklens/base/index.h"
+
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 constexpr int kTogether = 4;  // channels that an entry of a row processes together
 // Minimum number of numbers before and after planes that items may read beyond the reach of

@@ -9,12 +9,11 @@
 #include "kernels/opencl/opencl_call.h"
 #include "kernels/opencl/opencl_device.h"
 #include "kernels/opencl/opencl_projection.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/radiance_steps.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 constexpr std::size_t kItemPixels = 16;  // equal to ITEM_PIXELS in radiance.cl
 constexpr std::size_t kSums = 3;         // equal to SUMS in radiance.cl

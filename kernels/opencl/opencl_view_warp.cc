@@ -9,12 +9,11 @@
 #include "kernels/opencl/opencl_call.h"
 #include "kernels/opencl/opencl_device.h"
 #include "kernels/reference/warp_arguments.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int kBefore = 1, kAfter = 2;  // repeated border pixels before and after
 constexpr int kFour = 4;  // channels of a pixel that are read at once if there are several

@@ -6,13 +6,12 @@
 
 #include "kernels/cpu/bands.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::kernels {
 namespace {
 
 constexpr int kWindowSlices = 16;  // number of slices in a window over which rows are sorted
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // The coefficients of a filter at any position.
 template <typename Real>

@@ -8,6 +8,7 @@
 
 #include "kernels/reference/arguments.h"
 #include "kernels/reference/splat.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/kernels.h"
 #include "thicklens/kernels/sparse.h"
 
@@ -16,8 +17,6 @@ namespace {
 
 // Displacements of more samples than this leave every block.
 constexpr int kFarAway = 1 << 30;
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // Returns the number of a ray (see BlockGeometry).
 std::int32_t RayNumber(const BlockGeometry& block, int k, int l, int x, int y) {

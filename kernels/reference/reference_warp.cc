@@ -9,13 +9,12 @@
 
 #include "kernels/reference/warp_arguments.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 #include "thicklens/kernels/catmull_rom.h"
 #include "thicklens/kernels/view_warp.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
 std::size_t PixelsOf(const SurfacePicture& picture) {
   return Index(picture.width_px) * Index(picture.height_px);

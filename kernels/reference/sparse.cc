@@ -8,11 +8,10 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/index.h"
 
 namespace thicklens::kernels {
 namespace {
-
-std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 template <typename Real>
 void CheckEll(const EllMatrix<Real>& ell) {
