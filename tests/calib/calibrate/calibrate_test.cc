@@ -16,7 +16,7 @@
 namespace thicklens::calib {
 namespace {
 
-using ::testing::AnyOf;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -193,19 +193,32 @@ TEST(Calibrate, OnePictureRepeatedIsRefused) {
   ExpectRefused(Calibrated(s), "does not change with the reading");
 }
 
-TEST(Calibrate, AFocusBeyondTheSweepIsSaidToBeBeyondIt) {
+// The plane of focus at 400 mm lies between frames 19 and 20 of 41, at a step of 4 mm. A focus
+// outside the sweep is accepted, with a warning, if its standard deviation is below one step. The
+// 11 frames here end 29 and 31 mm short of the focus and determine it to 2 mm.
+TEST(Calibrate, AFocusBeyondTheSweepIsExtrapolatedWithAWarning) {
   for (const bool nearer : {false, true}) {
     SCOPED_TRACE(nearer);
-    // The focus at 400 mm lies 20 steps into the sweep; 11 frames that stay 25 mm clear of it.
     SimulatedSweep s = Good();
     Keep(&s, nearer ? 27 : 2, 11);
     const Calibration c = Calibrated(s);
-    if (c.outcome == Outcome::kRefused) {
-      EXPECT_THAT(c.reason, HasSubstr(nearer ? "lies nearer" : "lies farther"));
-    } else {
-      EXPECT_THAT(c.warnings, Contains(HasSubstr("is extrapolated")));
-      EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
-    }
+    EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
+    EXPECT_THAT(c.warnings, Contains(AllOf(HasSubstr("is extrapolated"),
+                                           HasSubstr(nearer ? "nearer than" : "farther than"))));
+    ASSERT_TRUE(c.focus_depth_mm);
+    EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 4 * c.focus_depth_mm->sigma);
+    EXPECT_LT(c.focus_depth_mm->sigma, 4);
+  }
+}
+
+// The 8 frames here end 51 and 45 mm short of the focus and determine it to 9 and 8 mm only.
+TEST(Calibrate, AFocusFarBeyondTheSweepIsRefusedWithItsSide) {
+  for (const bool nearer : {false, true}) {
+    SCOPED_TRACE(nearer);
+    SimulatedSweep s = Good();
+    Keep(&s, nearer ? 31 : 0, 8);
+    ExpectRefused(Calibrated(s), nearer ? "sharpness is monotone: the focus lies nearer"
+                                        : "sharpness is monotone: the focus lies farther");
   }
 }
 
