@@ -1,4 +1,4 @@
-// A calibration has errors, but they do not lean to one side.
+// A calibration has errors, but their mean is 0, or as small as is known.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,23 +21,29 @@ struct Errors {
   double image_distance_mm = 0, blur_ratio = 0;
 };
 
-// The mean error is within two of its own standard errors.
-void ExpectNoBias(const std::string& name, const std::vector<double>& errors) {
+// The mean errors of all sweeps of a case, where they are known not to be 0.
+struct Bias {
+  double image_distance_mm = 0, blur_ratio = 0;
+};
+
+// The mean error differs from the known bias by at most two of its own standard errors.
+void ExpectBias(const std::string& name, const std::vector<double>& errors, double bias) {
   const auto count = static_cast<double>(errors.size());
   double mean = 0, variance = 0;
   for (const double error : errors) mean += error / count;
   for (const double error : errors) variance += std::pow(error - mean, 2) / (count - 1);
   const double standard_error = std::sqrt(variance / count);
   EXPECT_GT(standard_error, 0) << name;
-  EXPECT_LT(std::abs(mean), 2 * standard_error) << name << ": mean " << mean;
+  EXPECT_LT(std::abs(mean - bias), 2 * standard_error)
+      << name << ": mean " << mean << ", known bias " << bias;
   ::testing::Test::RecordProperty(name + "_mean", std::to_string(1e6 * mean) + "e-6");
   ::testing::Test::RecordProperty(name + "_standard_error",
                                   std::to_string(1e6 * standard_error) + "e-6");
 }
 
-// A hundred sweeps of leaves, floors drawn from their stated error. Of a calibration without bias
-// two results pass two standard errors for one in ten choices of seeds.
-void ExpectNoBiasOfSweeps(const std::string& case_name) {
+// A hundred sweeps of leaves, with floors drawn from their stated error. At the known bias one of
+// the two results is outside its two standard errors for one in ten choices of seeds.
+void ExpectBiasOfSweeps(const std::string& case_name, const Bias& bias) {
   constexpr int kSweeps = 100, kSizePx = 96;
   CalibrationOptions how;
   how.map_field = false;
@@ -60,11 +66,16 @@ void ExpectNoBiasOfSweeps(const std::string& case_name) {
     blur_ratio.push_back(error.blur_ratio);
   }
   ASSERT_GE(image_distance_mm.size(), 98U);
-  ExpectNoBias("image_distance_mm", image_distance_mm);
-  ExpectNoBias("blur_ratio", blur_ratio);
+  ExpectBias("image_distance_mm", image_distance_mm, bias.image_distance_mm);
+  ExpectBias("blur_ratio", blur_ratio, bias.blur_ratio);
 }
 
-TEST(BiasSlow, MacroLens) { ExpectNoBiasOfSweeps("ii"); }
+TEST(BiasSlow, MacroLens) { ExpectBiasOfSweeps("ii", {}); }
+
+// The calibration is biased here: d1 comes out too small by 0.01 um (docs/calibration.md), which is
+// 0.12 of its standard deviation, and the blur ratio by 0.05 %, which is 0.3 of its own. That of
+// the blur ratio was measured on 450 sweeps, as -0.00023 with a standard error of 0.00004.
+TEST(BiasSlow, WideThickLens) { ExpectBiasOfSweeps("iii", {-1e-5, -2.3e-4}); }
 
 }  // namespace
 }  // namespace thicklens::calib
