@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/fit/blur_fit.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::testing {
@@ -14,7 +15,7 @@ namespace thicklens::testing {
 // A bench whose blur is known in closed form, and what meters say of it. Case iii of the sweeps:
 // A uf^2 = 116.6 px^2.
 struct BlurBench {
-  model::ThickLens lens{12.5, 12.8, 3, 4.4643};
+  model::ThickLens lens = WideLens(4.4643);
   double pitch_mm = 0.006;
   double focus_mm = 400, ratio = 0.45, floor_px2 = 0.25;
   double offset_mm = 30;

@@ -7,6 +7,12 @@
 #include <filesystem>
 #include <sstream>
 
+#include "depth_io.h"
+#include "image_io.h"
+#include "light_field_io.h"
+#include "printable_text.h"
+#include "program_run.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/io/depth_io.h"
@@ -23,6 +29,10 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using thicklens::testing::TestCamera;
+using thicklens::testing::TestSensor;
+using thicklens::testing::ThinLens;
+using thicklens::testing::WithMethod;
 
 constexpr int kWidthPx = 24, kHeightPx = 16;
 constexpr unsigned kNobody = 65534;
@@ -36,20 +46,11 @@ layers:
 )";
 
 model::Camera SmallCamera() {
-  model::Camera camera;
-  camera.name = "small";
-  camera.lens = {50, 50, 0, 8.9286};
-  camera.sensor.width_px = kWidthPx;
-  camera.sensor.height_px = kHeightPx;
-  camera.sensor.pixel_pitch_mm = 0.0045;
-  camera.sensor.principal_point_px = {11.5, 7.5};
-  camera.sensor.transfer = model::TransferCurve::Srgb();
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = model::Estimate{60, 0.001};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0.002};
+  model::Camera camera =
+      TestCamera("small", ThinLens(50, 8.9286),
+                 TestSensor(kWidthPx, kHeightPx, 0.0045, {11.5, 7.5}), {60, 0.001}, {0.45, 0.002});
   camera.calibration->blur_floor_px = model::Estimate{0.5, 0.01};
-  camera.calibration->evidence.method = "assumed";
-  return camera;
+  return WithMethod(camera);
 }
 
 // A picture whose values differ from pixel to pixel.

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "support/test_cameras.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::testing {
@@ -25,23 +26,15 @@ struct MacroScene {
     return 1 / (1 / kFocusMm + defocus_px / (kRatio * kRadiusMm * ScalePx()));
   }
 
-  static model::Camera Camera(int width_px, int height_px, model::Psf psf) {
-    model::Camera camera;
-    camera.name = "macro";
-    camera.lens = {kFrontMm, kRearMm, kThicknessMm, kRadiusMm};
-    camera.sensor.width_px = width_px;
-    camera.sensor.height_px = height_px;
-    camera.sensor.pixel_pitch_mm = kPitchMm;
-    camera.sensor.principal_point_px = {(width_px - 1) / 2.0 + 0.3, (height_px - 1) / 2.0 - 0.4};
-    camera.sensor.transfer = model::TransferCurve::Linear();
+  static model::Camera Camera(int width_px, int height_px, model::Psf psf, double floor_px = 0) {
+    const Eigen::Vector2d axis_px((width_px - 1) / 2.0 + 0.3, (height_px - 1) / 2.0 - 0.4);
+    model::Camera camera = TestCamera(
+        "macro", {kFrontMm, kRearMm, kThicknessMm, kRadiusMm},
+        TestSensor(width_px, height_px, kPitchMm, axis_px, model::TransferCurve::Linear()),
+        {kThicknessMm + kRearMm * kFocusMm / (kFocusMm - kFrontMm), 0}, {kRatio, 0});
     camera.psf = psf;
-    camera.calibration.emplace();
-    camera.calibration->image_distance_mm =
-        model::Estimate{kThicknessMm + kRearMm * kFocusMm / (kFocusMm - kFrontMm), 0};
-    camera.calibration->blur_ratio = model::Estimate{kRatio, 0};
-    camera.calibration->blur_floor_px = model::Estimate{0, 0};
-    camera.calibration->evidence.method = "simulated";
-    return camera;
+    camera.calibration->blur_floor_px = model::Estimate{floor_px, 0};
+    return WithMethod(camera, "simulated");
   }
 
   static model::SceneLayer Uniform(double depth_mm, double light) {

@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "support/test_cameras.h"
 #include "tests/calib/damaged_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
@@ -150,7 +151,7 @@ TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
 // 1:1, 3 mm of sweep at 200 mm: the scale fixes the zero to some millimetres only.
 TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusTold) {
   model::SweepSimulationOptions options = SweepCase("ii", 384, 1);
-  options.camera.lens = {100, 100, 0, 17.86};
+  options.camera.lens = testing::ThinLens(100, 17.86);
   options.camera.sensor.pixel_pitch_mm = 0.0043;
   options.camera.calibration->image_distance_mm = model::Estimate{200, 0};
   options.first_depth_mm = 198.53;

@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -18,21 +19,19 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCamera;
+using thicklens::testing::ThinLens;
+using thicklens::testing::WithMethod;
 
 constexpr double kD1Mm = 60, kRatio = 0.45;
 
 // 50 mm at f/2.8, d1 = 60 mm.
 model::Camera StoredCamera(double d1_sigma, double ratio_sigma) {
-  model::Camera camera;
-  camera.name = "stored";
-  camera.lens = {50, 50, 0, 50 / (2 * 2.8)};
-  camera.sensor = {512, 512, 0.0045, {255.5, 255.5}, model::TransferCurve::Linear()};
-  model::CameraCalibration calibration;
-  calibration.image_distance_mm = model::Estimate{kD1Mm, d1_sigma};
-  calibration.blur_ratio = model::Estimate{kRatio, ratio_sigma};
-  calibration.evidence.method = "joint-blur-fit";
-  camera.calibration = calibration;
-  return camera;
+  return WithMethod(TestCamera("stored", ThinLens(50, 50 / (2 * 2.8)),
+                               CentredSensor(512, 512, 0.0045, model::TransferCurve::Linear()),
+                               {kD1Mm, d1_sigma}, {kRatio, ratio_sigma}),
+                    "joint-blur-fit");
 }
 
 Calibration FoundCalibration(double d1_mm, double d1_sigma, double ratio, double ratio_sigma) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "calib/fit/blur_prediction.h"
+#include "support/test_cameras.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
 
@@ -102,7 +103,7 @@ TEST(WideLens, AGivenZeroHasNone) {
 
 TEST(WideLens, SlopesOfThePredictionAreThoseOfItsValues) {
   BlurFitSetup setup;
-  setup.lens = {12.5, 12.8, 3, 12.5 / 2.8};
+  setup.lens = testing::WideLens(12.5 / 2.8);
   setup.pixel_pitch_mm = 0.006;
   const Eigen::Vector4d at(60, 0.5, 0.25, 0);
   const BlurPrediction prediction = PredictBlur(setup, at, 52, 1.1);

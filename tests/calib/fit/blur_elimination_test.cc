@@ -13,6 +13,7 @@
 #include "calib/fit/blur_prediction.h"
 #include "calib/fit/error_elimination.h"
 #include "calib/fit/meter_information.h"
+#include "support/test_cameras.h"
 #include "tests/calib/blur_samples.h"
 
 namespace thicklens::calib {
@@ -178,7 +179,7 @@ SmallCase DrawnCase(BlurLaw law, model::BenchDirection direction, double reading
 TEST(BlurPrediction, DerivativesAreThoseOfItsValue) {
   for (const BlurLaw law : {BlurLaw::kPerspective, BlurLaw::kTelecentric}) {
     BlurFitSetup setup;
-    setup.lens = {12.5, 12.8, 3, 4.4643};
+    setup.lens = testing::WideLens(4.4643);
     setup.pixel_pitch_mm = 0.006;
     setup.law = law;
     for (const double depth_mm : {300.0, 399.0, 400.0, 470.0}) {
@@ -323,7 +324,7 @@ TEST(ErrorElimination, FitBlurEndsAtTheMinimumOfTheWholeProblem) {
     BlurBench bench;
     bench.reading_sigma_mm = 0.07;
     if (is_steep) {
-      bench.lens = {50, 50, 0, 8.93};
+      bench.lens = testing::ThinLens(50, 8.93);
       bench.pitch_mm = 0.0045;
       bench.focus_mm = 300;
       bench.first_mm = 285;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/fit/blur_measurement.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {
@@ -21,7 +22,7 @@ struct Unread {
 
   explicit Unread(std::size_t count) {
     sweep.target = SweepTarget::kTexture;
-    sweep.camera.lens = {12.5, 12.8, 3, 4.4643};
+    sweep.camera.lens = testing::WideLens(4.4643);
     sweep.camera.sensor.pixel_pitch_mm = 0.006;
     sweep.camera.sensor.width_px = 640;
     sweep.camera.sensor.height_px = 480;

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "support/test_cameras.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {
@@ -22,7 +23,7 @@ FrameMeasurement Frame(double depth_mm, double slope, double normalised, double 
 // 10 60 |1/z - 1/300|/0.005 px.
 model::Camera ThinCamera() {
   model::Camera camera;
-  camera.lens = {50, 50, 0, 10};
+  camera.lens = testing::ThinLens(50, 10);
   camera.sensor.pixel_pitch_mm = 0.005;
   return camera;
 }

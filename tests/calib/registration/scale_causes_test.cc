@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "support/test_cameras.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {
@@ -42,7 +43,7 @@ TEST(SortCauses, NamesTheBestAloneOnlyIfItIsSignificantAndFarAhead) {
 // A lens of 50 mm f/2.8 with 4.5 um pixels.
 FocusSweep Bench() {
   FocusSweep sweep;
-  sweep.camera.lens = {50, 50, 0, 8.9286};
+  sweep.camera.lens = testing::ThinLens(50, 8.9286);
   sweep.camera.sensor.pixel_pitch_mm = 0.0045;
   sweep.reading_sigma_mm = 0.002;
   return sweep;
@@ -178,7 +179,7 @@ TEST(ScaleCauses, AFocusMotorInDioptresIsRecognised) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     FocusSweep sweep = Bench();
     sweep.direction = direction;
-    sweep.camera.lens = {4.74, 4.74, 0, 1.3167};
+    sweep.camera.lens = testing::ThinLens(4.74, 1.3167);
     sweep.camera.sensor.pixel_pitch_mm = 0.0014;
     constexpr double kInFocusMm = 4.872;
     // 1/d = 1/f - q/1000; d goes as the scale.
@@ -221,7 +222,7 @@ TEST(ScaleCauses, TheUnitThatFitsScaleAndBlurIsNamed) {
 // Larger than life: nearer than two focal lengths, and in mm all the same.
 TEST(UnitAdvice, DoesNotDoubtAMagnificationAboveOneThatTheBlurShows) {
   FocusSweep sweep = Bench();
-  sweep.camera.lens = {45, 45, 0, 4.6};
+  sweep.camera.lens = testing::ThinLens(45, 4.6);
   sweep.camera.sensor.pixel_pitch_mm = 0.00345;
   const auto samples = MovingTarget(&sweep, 56.25, 0.45, [](double z) { return z - 40; });
   const ScaleLaw law = LawOf(samples, sweep);

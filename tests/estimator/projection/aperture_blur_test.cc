@@ -7,26 +7,21 @@
 #include <string>
 
 #include "estimator/views/ray_irradiance.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::estimator {
 namespace {
 
 using model::ApertureShape;
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::WideLens;
 
 model::Camera WideCamera() {
-  model::Camera camera;
-  camera.name = "wide";
-  camera.lens = {12.5, 12.8, 3, 12.5 / 2.8};
-  camera.sensor.width_px = 61;
-  camera.sensor.height_px = 41;
-  camera.sensor.pixel_pitch_mm = 0.09;  // corners 16 degrees off the axis
-  camera.sensor.principal_point_px = {30, 20};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 400), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.47, 0};
-  return camera;
+  // Its corners are 16 degrees off the axis.
+  return TestCameraFocusedAt(400, "wide", WideLens(12.5 / 2.8), CentredSensor(61, 41, 0.09),
+                             {0.47, 0});
 }
 
 // The moments of the rays of the point on the axis in focus, written out once more: the weights

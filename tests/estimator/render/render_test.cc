@@ -13,6 +13,7 @@
 #include "estimator/views/ray_irradiance.h"
 #include "estimator/views/ray_landing.h"
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/light_field_grid.h"
@@ -23,6 +24,9 @@ namespace {
 using ::testing::AllOf;
 using testing::ErrorOf;
 using ::testing::HasSubstr;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::TestSensor;
+using thicklens::testing::WideLens;
 
 const double kPi = std::acos(-1.0);
 
@@ -60,18 +64,9 @@ Eigen::ArrayXXd RandomWeights(int u_count, int v_count, unsigned seed) {
 
 // A wide field on few pixels, so that the fall-off is large.
 model::Camera WideCamera(model::Psf psf = model::Psf::kGaussian) {
-  model::Camera camera;
-  camera.name = "wide";
-  camera.lens = {12.5, 12.8, 3.0, 4.46};
-  camera.sensor.width_px = 15;
-  camera.sensor.height_px = 11;
-  camera.sensor.pixel_pitch_mm = 0.9;
-  camera.sensor.principal_point_px = {6, 4};
+  model::Camera camera =
+      TestCameraFocusedAt(640, "wide", WideLens(), TestSensor(15, 11, 0.9, {6, 4}));
   camera.psf = psf;
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 640), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
   return camera;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/model/effect_choice.h"
 #include "thicklens/model/effect_impact.h"
@@ -22,25 +23,20 @@ namespace {
 using ::testing::AllOf;
 using testing::ErrorOf;
 using ::testing::HasSubstr;
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::WideLens;
+using thicklens::testing::WithMethod;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocusMm = 800, kRatio = 0.45, kRadiusMm = 6, kPitchMm = 0.008;
 
 model::Camera BenchCamera(model::Psf psf) {
-  model::Camera camera;
-  camera.name = "made up";
-  camera.lens = {12.5, 12.8, 3, kRadiusMm};
-  camera.sensor.width_px = 96;
-  camera.sensor.height_px = 8;
-  camera.sensor.pixel_pitch_mm = kPitchMm;
-  camera.sensor.principal_point_px = {47.5, 3.5};
-  camera.sensor.transfer = model::TransferCurve::Linear();
+  model::Camera camera = TestCameraFocusedAt(
+      kFocusMm, "made up", WideLens(kRadiusMm),
+      CentredSensor(96, 8, kPitchMm, model::TransferCurve::Linear()), {kRatio, 0});
   camera.psf = psf;
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm = {model::ImageDistanceMm(camera.lens, kFocusMm), 0};
-  camera.calibration->blur_ratio = {kRatio, 0};
-  camera.calibration->evidence.method = "assumed";
-  return camera;
+  return WithMethod(camera);
 }
 
 // An upright sine of that period, in px of the picture, nearer than the plane of focus.

@@ -12,6 +12,7 @@
 #include <random>
 #include <vector>
 
+#include "support/test_cameras.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/depth_noise.h"
 #include "thicklens/estimator/scene_solver.h"
@@ -19,6 +20,11 @@
 
 namespace thicklens::estimator {
 namespace {
+
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::WideLens;
+using thicklens::testing::WithMethod;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
@@ -215,17 +221,8 @@ struct Bumps {
 // `shading`: the bumps that its light shows. `relief`: those that it has.
 Scene ShadedScene(const Bumps& shading, const Bumps& relief) {
   model::SceneSimulationOptions options;
-  options.camera.name = "made up";
-  options.camera.lens = {12.5, 12.8, 3, 6};
-  options.camera.sensor.width_px = kSceneWidth;
-  options.camera.sensor.height_px = kSceneHeight;
-  options.camera.sensor.pixel_pitch_mm = 0.008;
-  options.camera.sensor.principal_point_px = {63.5, 55.5};
-  model::CameraCalibration calibration;
-  calibration.image_distance_mm = {model::ImageDistanceMm(options.camera.lens, 800), 0};
-  calibration.blur_ratio = {0.45, 0};
-  calibration.evidence.method = "assumed";
-  options.camera.calibration = calibration;
+  options.camera = WithMethod(TestCameraFocusedAt(800, "made up", WideLens(6),
+                                                  CentredSensor(kSceneWidth, kSceneHeight, 0.008)));
   options.effects.base = model::EffectChoice::Base::kAll;
   options.effects.without = {model::Effect::kDiffraction};
   options.effects.without.Add(model::Effect::kFalloff);

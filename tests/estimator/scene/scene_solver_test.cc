@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/fill_holes.h"
@@ -28,6 +29,10 @@ namespace {
 using ::testing::AllOf;
 using testing::ErrorOf;
 using ::testing::HasSubstr;
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::WideLens;
+using thicklens::testing::WithMethod;
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
@@ -39,17 +44,8 @@ struct Simulated {
 
 Simulated Simulate(bool falloff) {
   model::SceneSimulationOptions options;
-  options.camera.name = "made up";
-  options.camera.lens = {12.5, 12.8, 3, 6};
-  options.camera.sensor.width_px = 96;
-  options.camera.sensor.height_px = 80;
-  options.camera.sensor.pixel_pitch_mm = 0.008;
-  options.camera.sensor.principal_point_px = {47.5, 39.5};
-  model::CameraCalibration calibration;
-  calibration.image_distance_mm = {model::ImageDistanceMm(options.camera.lens, 800), 0};
-  calibration.blur_ratio = {0.45, 0};
-  calibration.evidence.method = "assumed";
-  options.camera.calibration = calibration;
+  options.camera =
+      WithMethod(TestCameraFocusedAt(800, "made up", WideLens(6), CentredSensor(96, 80, 0.008)));
   model::SceneLayer wall;
   wall.plane.depth_mm = 1100;
   wall.plane.slope = {0.5, 0};

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/camera.h"
 #include "thicklens/model/light_field_grid.h"
 
@@ -23,6 +24,9 @@ namespace {
 using ::testing::AllOf;
 using testing::ErrorOf;
 using ::testing::HasSubstr;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::TestSensor;
+using thicklens::testing::WideLens;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -61,18 +65,7 @@ Eigen::Vector2d SourceOf(const ViewDisparity& view, int x, int y) {
 }
 
 model::Camera BenchCamera() {
-  model::Camera camera;
-  camera.name = "bench";
-  camera.lens = {12.5, 12.8, 3.0, 4.46};
-  camera.sensor.width_px = 21;
-  camera.sensor.height_px = 17;
-  camera.sensor.pixel_pitch_mm = 0.05;
-  camera.sensor.principal_point_px = {10, 7};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 640), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  return camera;
+  return TestCameraFocusedAt(640, "bench", WideLens(), TestSensor(21, 17, 0.05, {10, 7}));
 }
 
 // --- From depths and maps to disparities.

@@ -12,6 +12,7 @@
 #include "model/effects/effect_bounds.h"
 #include "model/optics/airy.h"
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/blur_transfer.h"
 #include "thicklens/model/effect_choice.h"
 #include "thicklens/model/effect_impact.h"
@@ -23,22 +24,17 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using thicklens::testing::ErrorOf;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::TestSensor;
+using thicklens::testing::ThickMacroLens;
 
 constexpr double kPi = 3.14159265358979323846;
 
 // A thick lens of f/5.6 with 4.5 um pixels, focused at 300 mm.
 Camera TheCamera(Psf psf = Psf::kGaussian, double floor_px = 0.5) {
-  Camera camera;
-  camera.name = "macro";
-  camera.lens = {50, 52, 4, 4.46};
-  camera.sensor.width_px = 640;
-  camera.sensor.height_px = 480;
-  camera.sensor.pixel_pitch_mm = 0.0045;
-  camera.sensor.principal_point_px = {300, 250};
+  const ThickLens lens = ThickMacroLens(4.46);
+  Camera camera = TestCameraFocusedAt(300, "macro", lens, TestSensor(640, 480, 0.0045, {300, 250}));
   camera.psf = psf;
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(camera.lens, 300), 0};
-  camera.calibration->blur_ratio = Estimate{0.45, 0};
   camera.calibration->blur_floor_px = Estimate{floor_px, 0};
   return camera;
 }

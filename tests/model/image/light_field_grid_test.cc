@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/matrix_lens.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::model {
@@ -18,22 +19,16 @@ namespace {
 
 using ::thicklens::testing::MatrixLens;
 using ::thicklens::testing::MatrixLenses;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::TestSensor;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 Camera CameraWith(const ThickLens& lens, double focus_depth_mm, Psf psf = Psf::kGaussian) {
-  Camera camera;
-  camera.name = "test-camera";
-  camera.lens = lens;
-  camera.sensor.width_px = 640;
-  camera.sensor.height_px = 480;
-  camera.sensor.pixel_pitch_mm = 0.006;
-  camera.sensor.principal_point_px = {317.25, 243.5};
+  Camera camera = TestCameraFocusedAt(focus_depth_mm, "test-camera", lens,
+                                      TestSensor(640, 480, 0.006, {317.25, 243.5}), {0.451, 0});
   camera.psf = psf;
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(lens, focus_depth_mm), 0};
-  camera.calibration->blur_ratio = Estimate{0.451, 0};
   return camera;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::model {
@@ -44,20 +45,13 @@ LightField Numbered(int channels) {
   return light_field;
 }
 
-Camera SmallCamera() {
-  Camera camera;
-  camera.name = "small";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kS, kT, 0.006, {2.25, 1.5}, TransferCurve::Gamma(2.2)};
-  camera.calibration = CameraCalibration{};
-  camera.calibration->image_distance_mm = Estimate{15.94, 0};
-  camera.calibration->blur_ratio = Estimate{0.45, 0};
-  return camera;
+Camera GammaCamera() {
+  return thicklens::testing::SmallCamera(kS, kT, {2.25, 1.5}, TransferCurve::Gamma(2.2));
 }
 
 LightField WithCamera() {
   LightField light_field = Numbered(3);
-  light_field.camera = SmallCamera();
+  light_field.camera = GammaCamera();
   light_field.grid = DefaultGrid(*light_field.camera, kU, kV);
   light_field.weights = ApertureWeights(ApertureShape::kGaussian, kU, kV);
   light_field.landing_step_px = {0.25, -0.5};
@@ -222,7 +216,7 @@ TEST(CropPicture, ARectangleThatLeavesThePictureIsRefused) {
         CropViews(Numbered(1), {1, 0, 5, 1});
       }),
       AllOf(HasSubstr("1,0,5,1"), HasSubstr("5x4"), HasSubstr("x may be from 0 to 0, y to 3")));
-  EXPECT_THAT(ErrorOf([&] { CropCamera(SmallCamera(), {0, 1, 5, 4}); }), HasSubstr("sensor"));
+  EXPECT_THAT(ErrorOf([&] { CropCamera(GammaCamera(), {0, 1, 5, 4}); }), HasSubstr("sensor"));
 }
 
 // Each field spoilt on its own.

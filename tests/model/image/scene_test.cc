@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/matrix_lens.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -19,6 +20,8 @@ namespace {
 
 using ::thicklens::testing::MatrixLens;
 using ::thicklens::testing::MatrixLenses;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::TestSensor;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -34,15 +37,9 @@ std::size_t IndexOf(int x, int y) {
 // A coarse sensor with the axis off its centre, so that range and z differ much and every sign
 // shows.
 Camera CameraFor(const ThickLens& lens, double focus_depth_mm) {
-  Camera camera;
-  camera.name = "test-camera";
-  camera.lens = lens;
-  camera.sensor.width_px = kWidth;
-  camera.sensor.height_px = kHeight;
-  camera.sensor.pixel_pitch_mm = 0.9;
-  camera.sensor.principal_point_px = {3.25, 4.5};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(lens, focus_depth_mm), 0};
+  Camera camera = TestCameraFocusedAt(focus_depth_mm, "test-camera", lens,
+                                      TestSensor(kWidth, kHeight, 0.9, {3.25, 4.5}));
+  camera.calibration->blur_ratio.reset();
   return camera;
 }
 

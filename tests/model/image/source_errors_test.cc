@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "support/matrix_lens.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/light_field_grid.h"
 
 namespace thicklens::model {
@@ -17,21 +18,16 @@ namespace {
 
 using ::thicklens::testing::MatrixLens;
 using ::thicklens::testing::MatrixLenses;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::TestSensor;
+using thicklens::testing::WideLens;
 
 constexpr int kPictureSide = 4;
 constexpr int kViewSide = 3;
 
 Camera SmallCamera() {
-  Camera camera;
-  camera.lens = {12.5, 12.8, 3.0, 4.46};
-  camera.sensor.width_px = kPictureSide;
-  camera.sensor.height_px = kPictureSide;
-  camera.sensor.pixel_pitch_mm = 0.006;
-  camera.sensor.principal_point_px = {1.5, 1.5};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(camera.lens, 640), 0};
-  camera.calibration->blur_ratio = Estimate{0.45, 0};
-  return camera;
+  return TestCameraFocusedAt(640, "", WideLens(),
+                             TestSensor(kPictureSide, kPictureSide, 0.006, {1.5, 1.5}));
 }
 
 // H, XY x STUV: each ray lands by [S16] and gives its weight to the nearest pixel (the unit

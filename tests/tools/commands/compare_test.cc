@@ -16,6 +16,7 @@
 
 #include "support/special_numbers.h"
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
@@ -39,6 +40,10 @@ using Arguments = std::vector<std::string>;
 using Json = nlohmann::json;
 
 using thicklens::testing::kInfinity;
+using thicklens::testing::TestCamera;
+using thicklens::testing::TestSensor;
+using thicklens::testing::WideLens;
+using thicklens::testing::WithMethod;
 constexpr int kWide = 44, kHigh = 36, kDisparityPx = 1, kGrid = 7;
 
 // ---- Table and JSON.
@@ -342,17 +347,11 @@ TEST_F(CompareProgram, SaysWhatTheDisparityMeansByItsOptions) {
 
 // With a camera, the disparity goes through millimetres and back to the steps of the grid.
 TEST_F(CompareProgram, AsksWhatTheDepthMapOfACameraSays) {
-  model::Camera camera;
-  camera.name = "small";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kWide, kHigh, 0.006, {21.5, 17.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm = model::Estimate{16.3, 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  io::LightFieldReading reading;
+  const model::Camera camera = WithMethod(
+      TestCamera("small", WideLens(), TestSensor(kWide, kHigh, 0.006, {21.5, 17.5}), {16.3, 0}));
+  LightFieldReading reading;
   reading.grid = kGrid;
-  model::LightField light_field = io::ReadLightField(PutHci("views", 3, 0), reading);
-  camera.calibration->evidence.method = "assumed";
+  model::LightField light_field = ReadLightField(PutHci("views", 3, 0), reading);
   light_field.camera = camera;
   light_field.grid = model::DefaultGrid(camera, 3, 3);
   const std::string truth = Write("truth", light_field);

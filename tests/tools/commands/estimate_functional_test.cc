@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
@@ -32,8 +33,12 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using thicklens::testing::CentredSensor;
 using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::WideLens;
+using thicklens::testing::WithMethod;
 using Arguments = std::vector<std::string>;
 
 constexpr int kWidthPx = 60, kHeightPx = 44;
@@ -54,20 +59,8 @@ model::StoredPicture Stripes() {
 
 // A large sensor behind a short lens: dark corners.
 std::string WideCameraYaml() {
-  model::Camera camera;
-  camera.name = "wide";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kWidthPx,
-                   kHeightPx,
-                   0.2,
-                   {(kWidthPx - 1) / 2.0, (kHeightPx - 1) / 2.0},
-                   model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  camera.calibration->evidence.method = "assumed";
-  return model::CameraToYaml(camera);
+  return model::CameraToYaml(WithMethod(
+      TestCameraFocusedAt(800, "wide", WideLens(), CentredSensor(kWidthPx, kHeightPx, 0.2))));
 }
 
 class EstimateFunctionalTest : public ::testing::TestWithParam<const char*> {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
@@ -60,16 +61,7 @@ model::StoredPicture Stripes(int channels) {
 }
 
 std::string CameraYaml(const model::TransferCurve& transfer) {
-  model::Camera camera;
-  camera.name = "bench";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kColumns, kRows, 0.006, {(kColumns - 1) / 2.0, (kRows - 1) / 2.0}, transfer};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  camera.calibration->evidence.method = "assumed";
-  return model::CameraToYaml(camera);
+  return model::CameraToYaml(thicklens::testing::PhotographCamera(kColumns, kRows, transfer));
 }
 
 class EstimateSceneTest : public ::testing::Test {

@@ -20,6 +20,7 @@
 
 #include "support/sanitizers.h"
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/io/depth_io.h"
@@ -61,19 +62,8 @@ model::RawDepthMap MapOf(const std::function<double(int x, int y)>& value) {
   return map;
 }
 
-// 12.5 mm lens focused at 800 mm; depths of about that are sensible.
 std::string CameraYaml(int width_px, int height_px) {
-  model::Camera camera;
-  camera.name = "bench";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {width_px, height_px, 0.006, {}, model::TransferCurve::Srgb()};
-  camera.sensor.principal_point_px = {(width_px - 1) / 2.0, (height_px - 1) / 2.0};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  camera.calibration->evidence.method = "assumed";
-  return model::CameraToYaml(camera);
+  return model::CameraToYaml(thicklens::testing::PhotographCamera(width_px, height_px));
 }
 
 class EstimateTest : public ::testing::Test {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/thick_lens.h"
 #include "tools/report/explain_figure.h"
 #include "tools/report/explain_table.h"
@@ -92,7 +93,7 @@ TEST_F(ExplainCostsTest, DrawsTheCurve) {
 // The band's width against the scatter over cameras that are drawn as their covariance says.
 TEST(BlurBandTest, IsTheScatterOfWhatTheCovarianceAllows) {
   model::Camera camera;
-  camera.lens = {50, 52, 4, 10};
+  camera.lens = thicklens::testing::ThickMacroLens(10);
   camera.sensor.pixel_pitch_mm = 0.005;
   camera.sensor.width_px = camera.sensor.height_px = 100;
   const double distance_mm = 4 + 52 * 1000 / 950.0, ratio = 0.45;

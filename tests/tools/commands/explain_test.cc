@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "support/special_numbers.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 #include "tools/report/explain_table.h"
@@ -14,21 +15,17 @@ namespace {
 
 using ::testing::HasSubstr;
 
+using thicklens::testing::CentredSensor;
 using thicklens::testing::kInfinity;
+using thicklens::testing::TestCamera;
+using thicklens::testing::ThickMacroLens;
+using thicklens::testing::ThinLens;
 constexpr double kPitchMm = 0.005;
 
 // f1 = 50, f2 = 52, rho = 4 focused at 1000 mm: d1 = 4 + 52 * 1000/950.
 model::Camera ThickCamera() {
-  model::Camera camera;
-  camera.name = "thick";
-  camera.lens = {50, 52, 4, 10};
-  camera.sensor.width_px = 601;
-  camera.sensor.height_px = 801;
-  camera.sensor.pixel_pitch_mm = kPitchMm;
-  camera.sensor.principal_point_px = {300, 400};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = model::Estimate{4 + 52 * 1000 / 950.0, 0.001};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0.009};
+  model::Camera camera = TestCamera("thick", ThickMacroLens(10), CentredSensor(601, 801, kPitchMm),
+                                    {4 + 52 * 1000 / 950.0, 0.001}, {0.45, 0.009});
   camera.calibration->blur_floor_px = model::Estimate{0.5, 0};
   return camera;
 }
@@ -147,7 +144,7 @@ TEST(ExplainCamera, HyperfocalDistanceBlursInfinityByOnePixel) {
 
 TEST(ExplainCamera, KnowsAThinLens) {
   model::Camera camera = ThickCamera();
-  camera.lens = {50, 50, 0, 10};
+  camera.lens = ThinLens(50, 10);
   const Explanation known = ExplainCamera(camera, {500, 2000}, 2);
   EXPECT_TRUE(known.thin.same_lens);
   EXPECT_EQ(known.thin.scale_ratio, 1);

@@ -18,6 +18,7 @@
 
 #include "support/part_of.h"
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
@@ -34,23 +35,20 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
+using thicklens::testing::CentredSensor;
 using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
+using thicklens::testing::TestCamera;
+using thicklens::testing::WideLens;
+using thicklens::testing::WithMethod;
 using Arguments = std::vector<std::string>;
 
 constexpr int kRenderedS = 40, kRenderedT = 30;
 
 // A wide-angle camera, so that fall-off shows.
 model::Camera WideCamera() {
-  model::Camera camera;
-  camera.name = "wide";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kRenderedS, kRenderedT, 0.3, {19.5, 14.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm = model::Estimate{15.94, 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  camera.calibration->evidence.method = "assumed";
-  return camera;
+  return WithMethod(
+      TestCamera("wide", WideLens(), CentredSensor(kRenderedS, kRenderedT, 0.3), {15.94, 0}));
 }
 
 model::LightField AtRandom(int u_count, int v_count, unsigned seed) {

@@ -16,6 +16,7 @@
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
@@ -33,6 +34,7 @@ using ::testing::StartsWith;
 using thicklens::testing::ContentOf;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::TemporaryFolder;
+using thicklens::testing::WithMethod;
 
 constexpr int kS = 6, kT = 5;
 
@@ -52,14 +54,7 @@ model::LightField Relative(int u_count, int v_count, int channels, float lo = 0,
 
 model::LightField WithCamera(int u_count, int v_count) {
   model::LightField light_field = Relative(u_count, v_count, 3);
-  model::Camera camera;
-  camera.name = "small";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kS, kT, 0.006, {2.75, 1.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm = model::Estimate{15.94, 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  camera.calibration->evidence.method = "assumed";
+  const model::Camera camera = WithMethod(thicklens::testing::SmallCamera(kS, kT, {2.75, 1.5}));
   light_field.camera = camera;
   light_field.grid = model::DefaultGrid(camera, u_count, v_count);
   light_field.landing_step_px = {1e-17, 1.0 / 3};

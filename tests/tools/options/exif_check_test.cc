@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/support/child_process.h"
@@ -26,24 +27,23 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using thicklens::testing::CentredSensor;
 using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
+using thicklens::testing::TestCamera;
+using thicklens::testing::ThinLens;
+using thicklens::testing::WithMethod;
 using Arguments = std::vector<std::string>;
 
 constexpr int kPhotoWidthPx = 60, kPhotoHeightPx = 40;
 
 // 50 mm at f/2.8, focused at 300 mm; a sensor of 36 x 24 mm.
 model::Camera BenchLens() {
-  model::Camera camera;
-  camera.name = "bench lens";
-  camera.lens = {50, 50, 0, 50 / (2 * 2.8)};
-  camera.sensor = {kPhotoWidthPx, kPhotoHeightPx, 0.6, {29.5, 19.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 300), 0.001};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0.001};
-  camera.calibration->evidence.method = "joint-blur-fit";
-  return camera;
+  const model::ThickLens lens = ThinLens(50, 50 / (2 * 2.8));
+  return WithMethod(
+      TestCamera("bench lens", lens, CentredSensor(kPhotoWidthPx, kPhotoHeightPx, 0.6),
+                 {model::ImageDistanceMm(lens, 300), 0.001}, {0.45, 0.001}),
+      "joint-blur-fit");
 }
 
 PhotoSize Whole() { return {kPhotoWidthPx, kPhotoHeightPx, false}; }

@@ -8,6 +8,8 @@
 #include <functional>
 #include <string>
 
+#include "option_values.h"
+#include "support/test_cameras.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/kernels.h"
@@ -20,21 +22,16 @@ namespace {
 using model::Effect;
 using model::EffectSet;
 using ::testing::HasSubstr;
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCameraFocusedAt;
 
 constexpr int kSensorWidthPx = 60, kSensorHeightPx = 40;
 const EstimateOptions kUsual;
 
 // Thick, with a wide field where the pixels are large.
 model::Camera ThickCamera(double pixel_pitch_mm, double aperture_radius_mm = 4) {
-  model::Camera camera;
-  camera.lens = {12.5, 14, 6, aperture_radius_mm};
-  camera.sensor = {
-      kSensorWidthPx, kSensorHeightPx, pixel_pitch_mm, {29.5, 19.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  return camera;
+  return TestCameraFocusedAt(800, "", {12.5, 14, 6, aperture_radius_mm},
+                             CentredSensor(kSensorWidthPx, kSensorHeightPx, pixel_pitch_mm));
 }
 
 EffectSet Decided(const EstimateOptions& options, const std::optional<model::Camera>& camera) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "tools/options/option_values.h"
 
@@ -40,15 +41,8 @@ std::string UsageErrorOf(const Call& call) {
   return "(no error)";
 }
 
-model::Camera SmallCamera() {
-  model::Camera camera;
-  camera.name = "small";
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {kMapWidth, kMapHeight, 0.006, {1, 0.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm = model::Estimate{15.94, 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
-  return camera;
+model::Camera MapCamera() {
+  return thicklens::testing::SmallCamera(kMapWidth, kMapHeight, {1, 0.5});
 }
 
 model::RawDepthMap MapOf(std::vector<float> values) {
@@ -148,7 +142,7 @@ TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
 }
 
 TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
-  const model::Camera camera = SmallCamera();
+  const model::Camera camera = MapCamera();
   const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
   const model::RawDepthMap holes = MapOf(std::vector<float>(6, kHole));
   for (const model::Camera* used : {static_cast<const model::Camera*>(nullptr), &camera}) {
@@ -166,7 +160,7 @@ TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
 
 // A UV plane in the scene: what is nearer has no disparity.
 TEST(PrepareDepth, DepthsNearerThanTheUvPlaneAreRefused) {
-  const model::Camera camera = SmallCamera();
+  const model::Camera camera = MapCamera();
   const model::LightFieldGrid grid = model::GridOnPlanes(camera, {100, 1000}, 3, 3);
   EXPECT_THAT(ErrorOf([&] {
                 PrepareDepth(MapOf({500, 500, 500, 500, 500, 90}), "d.pfm", KindAndUnit("z", "mm"),
@@ -176,7 +170,7 @@ TEST(PrepareDepth, DepthsNearerThanTheUvPlaneAreRefused) {
 }
 
 TEST(PrepareDepth, WithACameraADepthBecomesItsDisparity) {
-  const model::Camera camera = SmallCamera();
+  const model::Camera camera = MapCamera();
   const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
   const std::vector<float> depth_mm = {400, 800, 1200, 400, 0, 5000};
   const PreparedDepth prepared =
@@ -196,7 +190,7 @@ TEST(PrepareDepth, WithACameraADepthBecomesItsDisparity) {
 // Through the depth and back: a disparity per step of the grid's own views stays what it is, also
 // where u has one view.
 TEST(PrepareDepth, WithACameraADisparityIsPerViewStepOfItsGrid) {
-  const model::Camera camera = SmallCamera();
+  const model::Camera camera = MapCamera();
   const std::vector<float> disparity_px = {-0.5F, 0, 0.5F, 0.25F, 0.125F, -0.25F};
   for (const auto& [u_count, v_count] : {std::pair{3, 3}, std::pair{1, 5}}) {
     const model::LightFieldGrid grid = model::DefaultGrid(camera, u_count, v_count);
@@ -212,7 +206,7 @@ TEST(PrepareDepth, WithACameraADisparityIsPerViewStepOfItsGrid) {
 
 // UV off the aperture: the views' step on the aperture is not du.
 TEST(PrepareDepth, TheStepOfADisparityIsTakenOnTheAperture) {
-  const model::Camera camera = SmallCamera();
+  const model::Camera camera = MapCamera();
   const double st_depth_mm = camera.focus_depth_mm();
   const model::LightFieldGrid grid = model::GridOnPlanes(camera, {-800, st_depth_mm + 800}, 3, 3);
   const double aperture_step_mm = grid.u_step_mm * st_depth_mm / (st_depth_mm + 800);  // [S10]

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "support/test_cameras.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -15,18 +16,14 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::WideLens;
 
 estimator::EstimateInput WithCamera() {
   estimator::EstimateInput input;
-  model::Camera camera;
-  camera.lens = {12.5, 12.8, 3, 4.46};
-  camera.sensor = {96, 64, 0.006, {47.5, 31.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm =
-      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
-  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
   input.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 7, 5);
-  input.camera = camera;
+  input.camera = TestCameraFocusedAt(800, "", WideLens(), CentredSensor(96, 64, 0.006));
   return input;
 }
 

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
@@ -25,6 +26,7 @@
 #include "tools/support/child_process.h"
 #include "tools/support/made_up_calibration.h"
 #include "tools/support/xml_elements.h"
+#include "xml_elements.h"
 
 namespace thicklens::tools {
 namespace {
@@ -34,8 +36,12 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
+using thicklens::testing::CentredSensor;
 using thicklens::testing::ContentOf;
 using thicklens::testing::TemporaryFolder;
+using thicklens::testing::TestCamera;
+using thicklens::testing::WideLens;
+using thicklens::testing::WithMethod;
 
 constexpr int kAcrossPx = 40, kDownPx = 24;
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
@@ -49,15 +55,11 @@ model::LightField Relative(int u_count, int v_count, unsigned seed = 1) {
 }
 
 model::Camera Calibrated() {
-  model::Camera camera;
-  camera.name = "bench-camera";
-  camera.lens = {12.5, 12.8, 3.0, 4.46};
-  camera.sensor = {kAcrossPx, kDownPx, 0.006, {19.5, 11.5}, model::TransferCurve::Srgb()};
-  camera.calibration = model::CameraCalibration{};
-  camera.calibration->image_distance_mm = model::Estimate{16.2158, 0.0012};
-  camera.calibration->blur_ratio = model::Estimate{0.4512, 0.0021};
+  model::Camera camera =
+      WithMethod(TestCamera("bench-camera", WideLens(), CentredSensor(kAcrossPx, kDownPx, 0.006),
+                            {16.2158, 0.0012}, {0.4512, 0.0021}),
+                 "joint-blur-fit");
   camera.calibration->bench_offset_mm = model::Estimate{0, 0};
-  camera.calibration->evidence.method = "joint-blur-fit";
   camera.calibration->evidence.frames_used = 41;
   return camera;
 }

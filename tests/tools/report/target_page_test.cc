@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string>
 
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 
 namespace thicklens::tools {
@@ -13,6 +14,8 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using thicklens::testing::TestSensor;
+using thicklens::testing::ThickMacroLens;
 
 constexpr SheetSize kA4 = {210, 297, true};
 
@@ -159,10 +162,8 @@ TEST(LayOutTarget, TellsWhenGivenFeaturesAreNotWhatTheCameraWants) {
 // one that is accepted.
 TEST(ViewOfTarget, IsWhatAThickLensSeesInFocus) {
   model::Camera camera;
-  camera.lens = {50, 52, 4, 10};
-  camera.sensor.width_px = 640;
-  camera.sensor.height_px = 480;
-  camera.sensor.pixel_pitch_mm = 0.004;
+  camera.lens = ThickMacroLens(10);
+  camera.sensor = TestSensor(640, 480, 0.004, {0, 0});
   const CameraView view = ViewOfTarget(camera, 800);
   EXPECT_NEAR(view.px_mm, 0.004 * (800 - 50) / 50, 1e-12);
   EXPECT_NEAR(view.width_mm, 38.4, 1e-9);

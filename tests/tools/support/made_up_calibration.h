@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "support/test_cameras.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
@@ -141,11 +142,8 @@ inline MadeUpCalibration MakeUpCalibration(int frame_count, double first_depth_m
   MadeUpCalibration made;
   model::Camera& camera = made.sweep.camera;
   camera.name = "bench-camera";
-  camera.lens = {12.5, 12.8, 3.0, 4.46};
-  camera.sensor.width_px = 640;
-  camera.sensor.height_px = 480;
-  camera.sensor.pixel_pitch_mm = 0.006;
-  camera.sensor.principal_point_px = {319.5, 239.5};
+  camera.lens = testing::WideLens();
+  camera.sensor = testing::CentredSensor(640, 480, 0.006);
   camera.statements["lens.lens_thickness_mm"] = {0.1, true};
   made.sweep.reading_sigma_mm = 0.07;
 

@@ -10,23 +10,21 @@
 #include "model/base/random_draws.h"
 #include "model/simulate/scene/scene_geometry.h"
 #include "model/simulate/scene/scene_texture.h"
+#include "support/test_cameras.h"
 
 namespace thicklens::model {
 namespace {
+
+using thicklens::testing::TestCamera;
+using thicklens::testing::TestSensor;
+using thicklens::testing::ThickMacroLens;
 
 // A macro lens focused at 300 mm, and three planes: a tilted one behind, a tilted rectangle whose
 // outline is in px, and a disc whose outline is in mm; those two cross.
 SceneSimulationOptions ThreePlanes() {
   SceneSimulationOptions options;
-  Camera& camera = options.camera;
-  camera.lens = {50, 52, 4, 9};
-  camera.sensor.width_px = 640;
-  camera.sensor.height_px = 480;
-  camera.sensor.pixel_pitch_mm = 0.0045;
-  camera.sensor.principal_point_px = {320.3, 239.1};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{4 + 52 * 300.0 / 250, 0};
-  camera.calibration->blur_ratio = Estimate{0.45, 0};
+  options.camera = TestCamera("", ThickMacroLens(9), TestSensor(640, 480, 0.0045, {320.3, 239.1}),
+                              {4 + 52 * 300.0 / 250, 0});
   options.layers.resize(3);
   options.layers[0].plane = {306, {0.3, -0.2}};
   options.layers[1].plane = {300, {-0.4, 0.1}};

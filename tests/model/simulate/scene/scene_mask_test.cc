@@ -13,6 +13,7 @@
 #include "model/base/random_draws.h"
 #include "model/simulate/scene/picture_bounds.h"
 #include "support/error_message.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::model {
@@ -20,6 +21,9 @@ namespace {
 
 using ::testing::HasSubstr;
 using thicklens::testing::ErrorOf;
+using thicklens::testing::TestCamera;
+using thicklens::testing::TestSensor;
+using thicklens::testing::ThickMacroLens;
 
 constexpr int kWidth = 37, kHeight = 26;
 
@@ -187,15 +191,8 @@ TEST(SceneMaskTest, TellsWhatIsWrong) {
 // A card before a wall; its outline is a rectangle from column and row 12.5 to 30.5 and 20.5.
 SceneSimulationOptions CardScene(const Eigen::Vector2d& slope) {
   SceneSimulationOptions options;
-  Camera& camera = options.camera;
-  camera.lens = {50, 52, 4, 9};
-  camera.sensor.width_px = 48;
-  camera.sensor.height_px = 40;
-  camera.sensor.pixel_pitch_mm = 0.0045;
-  camera.sensor.principal_point_px = {23.8, 19.1};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{4 + 52 * 300.0 / 250, 0};
-  camera.calibration->blur_ratio = Estimate{0.45, 0};
+  options.camera = TestCamera("", ThickMacroLens(9), TestSensor(48, 40, 0.0045, {23.8, 19.1}),
+                              {4 + 52 * 300.0 / 250, 0});
   options.layers.resize(2);
   options.layers[0].plane = {301, {0.2, 0}};
   options.layers[0].texture.kind = TextureKind::kSine;

@@ -10,6 +10,7 @@
 
 #include "model/base/random_draws.h"
 #include "model/simulate/sweep/edge_spread.h"
+#include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 #include "thicklens/model/sweep_simulator.h"
 
@@ -20,6 +21,8 @@ using ::testing::ElementsAre;
 using ::testing::Gt;
 using ::testing::HasSubstr;
 using ::testing::Pair;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::TestSensor;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocusMm = 300;
@@ -28,18 +31,10 @@ constexpr double kFocusMm = 300;
 SweepSimulationOptions WideSweep() {
   SweepSimulationOptions options;
   Camera& camera = options.camera;
-  camera.name = "wide";
-  camera.lens = {16, 16, 4, 3};
-  camera.sensor.width_px = 160;
-  camera.sensor.height_px = 120;
-  camera.sensor.pixel_pitch_mm = 0.08;
-  camera.sensor.principal_point_px = {70, 55};
+  camera = TestCameraFocusedAt(kFocusMm, "wide", {16, 16, 4, 3},
+                               TestSensor(160, 120, 0.08, {70, 55}), {0.5, 0});
   camera.psf = Psf::kDisc;
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(camera.lens, kFocusMm), 0};
-  camera.calibration->blur_ratio = Estimate{0.5, 0};
   camera.calibration->blur_floor_px = Estimate{0.4, 0};
-  camera.sensor.transfer = TransferCurve::Srgb();
   options.first_depth_mm = 120;
   options.step_mm = 90;
   options.frame_count = 5;

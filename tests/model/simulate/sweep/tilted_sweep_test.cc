@@ -8,6 +8,7 @@
 
 #include "model/simulate/sweep/tilted_target.h"
 #include "support/temporary_folder.h"
+#include "support/test_cameras.h"
 #include "thicklens/model/scene_simulator.h"
 #include "thicklens/model/sweep_simulator.h"
 
@@ -15,23 +16,18 @@ namespace thicklens::model {
 namespace {
 
 using ::testing::HasSubstr;
+using thicklens::testing::CentredSensor;
+using thicklens::testing::TestCameraFocusedAt;
+using thicklens::testing::ThinLens;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocusMm = 300;
 
 SweepSimulationOptions Sweep(TargetKind kind, double tilt_deg) {
   SweepSimulationOptions options;
-  Camera& camera = options.camera;
-  camera.name = "bench";
-  camera.lens = {50, 50, 0, 6};
-  camera.sensor.width_px = 160;
-  camera.sensor.height_px = 120;
-  camera.sensor.pixel_pitch_mm = 0.02;
-  camera.sensor.principal_point_px = {79.5, 59.5};
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm = Estimate{ImageDistanceMm(camera.lens, kFocusMm), 0};
-  camera.calibration->blur_ratio = Estimate{0.45, 0};
-  camera.calibration->blur_floor_px = Estimate{0.5, 0};
+  options.camera =
+      TestCameraFocusedAt(kFocusMm, "bench", ThinLens(50, 6), CentredSensor(160, 120, 0.02));
+  options.camera.calibration->blur_floor_px = Estimate{0.5, 0};
   options.target.kind = kind;
   options.target.tilt_deg = tilt_deg;
   options.first_depth_mm = 306;
