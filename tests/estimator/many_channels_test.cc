@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
-#include <random>
 #include <vector>
 
 #include "estimator/scene/stored_slope.h"
+#include "tests/estimator/solver_inputs.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
@@ -24,21 +24,13 @@ constexpr int kWidth = 26, kHeight = 21;
 
 // A slant with a near patch.
 EstimateInput InputOf(int channels) {
-  EstimateInput input;
-  input.picture = {kWidth, kHeight, channels, {}};
-  std::mt19937 engine(5);
-  std::uniform_real_distribution<float> uniform(0.1F, 0.9F);
-  for (int i = 0; i < kWidth * kHeight * channels; ++i) {
-    input.picture.values.push_back(uniform(engine));
-  }
-  input.disparity = {kWidth, kHeight, {}, {1, 1}};
-  for (int i = 0; i < kWidth * kHeight; ++i) {
-    const int x = i % kWidth, y = i / kWidth;
-    const bool patch = x > 9 && x < 17 && y > 6 && y < 15;
-    input.disparity.disparity.push_back(patch ? 1.4F : 0.04F * static_cast<float>(x) - 0.7F);
-  }
-  input.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
-  return input;
+  return testing::NoiseInput(
+      kWidth, kHeight, channels, testing::GaussianWeights(3, 3),
+      [](int x, int y) {
+        const bool patch = x > 9 && x < 17 && y > 6 && y < 15;
+        return patch ? 1.4F : 0.04F * static_cast<float>(x) - 0.7F;
+      },
+      5);
 }
 
 model::LinearPicture Band(const model::LinearPicture& picture, int channel) {

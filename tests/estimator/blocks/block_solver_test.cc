@@ -14,13 +14,13 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "support/error_message.h"
+#include "tests/estimator/solver_inputs.h"
 #include "thicklens/estimator/block_store.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
@@ -30,8 +30,11 @@ namespace thicklens::estimator {
 namespace {
 
 using ::testing::AllOf;
-using testing::ErrorOf;
+using thicklens::testing::ErrorOf;
+using testing::GaussianWeights;
 using ::testing::HasSubstr;
+using testing::NoiseInput;
+using testing::WithSolverCamera;
 
 std::shared_ptr<kernels::Backend> Twin() {
   return kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
@@ -48,57 +51,21 @@ struct MadeUp {
 };
 
 EstimateInput MakeInput(const MadeUp& made_up) {
-  std::mt19937 engine(made_up.seed);
-  std::uniform_real_distribution<float> uniform(0.1F, 0.9F);
-  EstimateInput input;
-  input.picture = {made_up.width_px, made_up.height_px, made_up.channels, {}};
-  input.picture.values.resize(Index(made_up.width_px * made_up.height_px * made_up.channels));
-  for (float& value : input.picture.values) value = uniform(engine);
-  input.disparity.width_px = made_up.width_px;
-  input.disparity.height_px = made_up.height_px;
-  for (int y = 0; y < made_up.height_px; ++y) {
-    for (int x = 0; x < made_up.width_px; ++x) {
-      const double share = made_up.width_px > 1 ? x / (made_up.width_px - 1.0) : 0;
-      const double jump = 2 * x >= made_up.width_px ? made_up.step_px : 0;
-      input.disparity.disparity.push_back(
-          static_cast<float>(made_up.far_px + (made_up.near_px - made_up.far_px) * share + jump));
-    }
-  }
-  input.weights =
-      model::ApertureWeights(model::ApertureShape::kGaussian, made_up.u_count, made_up.v_count);
-  return input;
+  return NoiseInput(
+      made_up.width_px, made_up.height_px, made_up.channels,
+      GaussianWeights(made_up.u_count, made_up.v_count),
+      [&](int x, int) {
+        const double share = made_up.width_px > 1 ? x / (made_up.width_px - 1.0) : 0;
+        const double jump = 2 * x >= made_up.width_px ? made_up.step_px : 0;
+        return made_up.far_px + (made_up.near_px - made_up.far_px) * share + jump;
+      },
+      made_up.seed);
 }
 
-// A camera whose grid may have ST elsewhere than in the plane of focus: then rays land between the
-// pixels.
 EstimateInput MakeCameraInput(const MadeUp& made_up, const model::LightFieldPlanes& planes,
                               double depth_mm, double slope_mm_per_px) {
-  model::Camera camera;
-  camera.name = "made up";
-  camera.lens = {12.5, 12.8, 3, 6};
-  camera.sensor.width_px = made_up.width_px;
-  camera.sensor.height_px = made_up.height_px;
-  camera.sensor.pixel_pitch_mm = 0.02;
-  camera.sensor.principal_point_px = {made_up.width_px / 2.0 - 0.3, made_up.height_px / 2.0};
-  model::CameraCalibration calibration;
-  calibration.image_distance_mm = {model::ImageDistanceMm(camera.lens, 800), 0};
-  calibration.blur_ratio = {0.45, 0};
-  calibration.evidence.method = "assumed";
-  camera.calibration = calibration;
-
-  EstimateInput input = MakeInput(made_up);
-  const model::ApertureSamples samples =
-      model::SampleAperture(input.weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
-  input.grid = model::GridOnPlanes(camera, planes, samples);
-  input.camera = camera;
-  std::vector<float> depths_mm;
-  for (int y = 0; y < made_up.height_px; ++y) {
-    for (int x = 0; x < made_up.width_px; ++x) {
-      depths_mm.push_back(static_cast<float>(depth_mm + slope_mm_per_px * x));
-    }
-  }
-  input.disparity = DisparityOnGrid(*input.grid, depths_mm, made_up.width_px, made_up.height_px);
-  return input;
+  return WithSolverCamera(MakeInput(made_up), planes,
+                          [=](int x) { return depth_mm + slope_mm_per_px * x; });
 }
 
 // H and D, dense, for one block that is the whole picture.

@@ -8,23 +8,26 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <random>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "support/difference_matrix.h"
 #include "support/error_message.h"
 #include "tests/estimator/plain_rays.h"
+#include "tests/estimator/solver_inputs.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::estimator {
 namespace {
 
+using testing::DifferenceMatrix;
+using testing::ExpectStepsAreReported;
+using testing::GaussianWeights;
 using ::testing::HasSubstr;
+using testing::NoiseInput;
 using testing::PhotographMatrix;
 using testing::ViewMatrix;
-using thicklens::testing::DifferenceMatrix;
+using testing::WithSolverCamera;
 using thicklens::testing::ErrorOf;
 
 constexpr double kPi = 3.14159265358979323846;
@@ -35,52 +38,15 @@ std::size_t Index(Eigen::Index i) { return static_cast<std::size_t>(i); }
 // A slant with a jump in its right half, that hides something.
 EstimateInput MakeInput(int width, int height, int channels, const Eigen::ArrayXXd& weights,
                         double jump_px = 1.7) {
-  std::mt19937 engine(1);
-  std::uniform_real_distribution<float> uniform(0.1F, 0.9F);
-  EstimateInput input;
-  input.picture = {width, height, channels, {}};
-  for (int i = 0; i < width * height * channels; ++i) {
-    input.picture.values.push_back(uniform(engine));
-  }
-  input.disparity = {width, height, {}, {1, 1}};
-  for (int i = 0; i < width * height; ++i) {
-    const double x = i % width;
-    input.disparity.disparity.push_back(
-        static_cast<float>(-0.6 + 1.1 * x / width + (2 * x >= width ? jump_px : 0)));
-  }
-  input.weights = weights;
-  return input;
-}
-
-Eigen::ArrayXXd Gaussian(int u_count, int v_count) {
-  return model::ApertureWeights(model::ApertureShape::kGaussian, u_count, v_count);
+  return NoiseInput(width, height, channels, weights, [=](double x, int) {
+    return -0.6 + 1.1 * x / width + (2 * x >= width ? jump_px : 0);
+  });
 }
 
 // A camera whose grid has ST elsewhere than in the plane of focus: rays land between the pixels.
 EstimateInput MakeCameraInput(int width, int height) {
-  EstimateInput input = MakeInput(width, height, 1, Gaussian(3, 3));
-  model::Camera camera;
-  camera.name = "made up";
-  camera.lens = {12.5, 12.8, 3, 6};
-  camera.sensor.width_px = width;
-  camera.sensor.height_px = height;
-  camera.sensor.pixel_pitch_mm = 0.02;
-  camera.sensor.principal_point_px = {width / 2.0 - 0.3, height / 2.0};
-  model::CameraCalibration calibration;
-  calibration.image_distance_mm = {model::ImageDistanceMm(camera.lens, 800), 0};
-  calibration.blur_ratio = {0.45, 0};
-  calibration.evidence.method = "assumed";
-  camera.calibration = calibration;
-  input.grid = model::GridOnPlanes(
-      camera, {0, 500},
-      model::SampleAperture(input.weights, camera.blur_ratio(), camera.lens.aperture_radius_mm));
-  input.camera = camera;
-  std::vector<float> depths_mm;
-  for (int i = 0; i < width * height; ++i) {
-    depths_mm.push_back(static_cast<float>(600 + 30 * (i % width)));
-  }
-  input.disparity = DisparityOnGrid(*input.grid, depths_mm, width, height);
-  return input;
+  return WithSolverCamera(MakeInput(width, height, 1, GaussianWeights(3, 3)), {0, 500},
+                          [](int x) { return 600 + 30 * x; });
 }
 
 Eigen::VectorXd ChannelOf(const model::LinearPicture& picture, int channel) {
@@ -151,7 +117,7 @@ void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photogr
 }
 
 TEST(FunctionalSolver, MinimisesTheFunctional) {
-  const EstimateInput input = MakeInput(8, 7, 1, Gaussian(3, 3));
+  const EstimateInput input = MakeInput(8, 7, 1, GaussianWeights(3, 3));
   ExpectDenseSolution(input, input.disparity, input.picture, Precise());
 }
 
@@ -160,12 +126,12 @@ TEST(FunctionalSolver, MinimisesItInDouble) {
   FunctionalOptions options = Precise();
   options.double_precision = true;
   options.tolerance = 1e-12;
-  const EstimateInput input = MakeInput(8, 7, 3, Gaussian(3, 3));
+  const EstimateInput input = MakeInput(8, 7, 3, GaussianWeights(3, 3));
   ExpectDenseSolution(input, input.disparity, input.picture, options, 2e-7);
 }
 
 TEST(FunctionalSolver, MinimisesItForOtherStrengths) {
-  const EstimateInput input = MakeInput(9, 5, 1, Gaussian(3, 3));
+  const EstimateInput input = MakeInput(9, 5, 1, GaussianWeights(3, 3));
   FunctionalOptions options = Precise();
   options.gamma = 0.02;
   options.ridge = 0.004;
@@ -173,12 +139,12 @@ TEST(FunctionalSolver, MinimisesItForOtherStrengths) {
 }
 
 TEST(FunctionalSolver, MinimisesItInColourForUnequalCounts) {
-  const EstimateInput input = MakeInput(10, 4, 3, Gaussian(4, 2));
+  const EstimateInput input = MakeInput(10, 4, 3, GaussianWeights(4, 2));
   ExpectDenseSolution(input, input.disparity, input.picture, Precise());
 }
 
 TEST(FunctionalSolver, MinimisesItWhereViewsHaveNoWeight) {
-  Eigen::ArrayXXd weights = Gaussian(3, 3);
+  Eigen::ArrayXXd weights = GaussianWeights(3, 3);
   weights(0, 0) = 0;
   weights(2, 1) = 0;
   weights /= weights.sum();
@@ -204,7 +170,7 @@ TEST(FunctionalSolver, MinimisesItOnPlanesWhereRaysLandBetweenPixels) {
 
 // Strong smoothness leaves one radiance r for all rays of a point: |H r - I|^2 + U V mu |r - I|^2.
 TEST(FunctionalSolver, TendsToAnEvenRadianceWithARidge) {
-  const EstimateInput input = MakeInput(13, 9, 1, Gaussian(3, 3));
+  const EstimateInput input = MakeInput(13, 9, 1, GaussianWeights(3, 3));
   FunctionalOptions options = Precise();
   options.gamma = 1e5;
   options.ridge = 0.02 / 9;
@@ -231,7 +197,7 @@ TEST(FunctionalSolver, TendsToAnEvenRadianceWithARidge) {
 }
 
 TEST(FunctionalSolver, AConstantPictureHasAConstantLightField) {
-  EstimateInput input = MakeInput(21, 13, 3, Gaussian(3, 3));
+  EstimateInput input = MakeInput(21, 13, 3, GaussianWeights(3, 3));
   for (std::size_t i = 0; i < input.picture.values.size(); ++i) {
     input.picture.values[i] = 0.2F * static_cast<float>(i % 3);
   }
@@ -256,9 +222,9 @@ TEST(FunctionalSolver, IsNearerToTheTruthThanTheWarpedPhotograph) {
   const auto view = [&](double a, double b, int i) {
     return texture(i % kSize + a * kDisparity, i / kSize + b * kDisparity);
   };
-  EstimateInput input = MakeInput(kSize, kSize, 1, Gaussian(5, 5), 0);
+  EstimateInput input = MakeInput(kSize, kSize, 1, GaussianWeights(5, 5), 0);
   // An aperture of five times as many samples with the same second moment.
-  const Eigen::ArrayXXd fine = Gaussian(25, 25);
+  const Eigen::ArrayXXd fine = GaussianWeights(25, 25);
   const auto moment = [](const Eigen::ArrayXXd& weights) {
     double sum = 0;
     for (Eigen::Index k = 0; k < weights.cols(); ++k) {
@@ -301,7 +267,7 @@ TEST(FunctionalSolver, IsNearerToTheTruthThanTheWarpedPhotograph) {
 }
 
 TEST(FunctionalSolver, SameBitsOnAnyNumberOfThreads) {
-  const EstimateInput input = MakeInput(101, 67, 3, Gaussian(5, 3));
+  const EstimateInput input = MakeInput(101, 67, 3, GaussianWeights(5, 3));
   FunctionalOptions options;
   options.threads = 1;
   FunctionalSummary summary;
@@ -314,7 +280,7 @@ TEST(FunctionalSolver, SameBitsOnAnyNumberOfThreads) {
 }
 
 TEST(FunctionalSolver, FloatIsAsGoodAsDouble) {
-  const EstimateInput input = MakeInput(101, 67, 1, Gaussian(5, 5));
+  const EstimateInput input = MakeInput(101, 67, 1, GaussianWeights(5, 5));
   FunctionalOptions options;
   options.tolerance = 1e-5;
   FunctionalSummary in_float, in_double;
@@ -345,7 +311,7 @@ TEST(FunctionalSolver, TellsWhereItCameFrom) {
 }
 
 TEST(FunctionalSolver, TellsThatItDidNotConverge) {
-  const EstimateInput input = MakeInput(40, 30, 1, Gaussian(3, 3));
+  const EstimateInput input = MakeInput(40, 30, 1, GaussianWeights(3, 3));
   FunctionalOptions options;
   options.max_iterations = 2;
   options.tolerance = 1e-4;
@@ -365,27 +331,16 @@ TEST(FunctionalSolver, TellsThatItDidNotConverge) {
 }
 
 TEST(FunctionalSolver, CountsItsStepsAndStopsOnRequest) {
-  const EstimateInput input = MakeInput(40, 30, 3, Gaussian(3, 3));
-  FunctionalOptions options;
-  int last = 0, total = 0;
-  options.progress = [&](int done, int of) {
-    EXPECT_GE(done, last);
-    EXPECT_LE(done, of);
-    last = done;
-    total = of;
-  };
-  FunctionalSummary summary;
-  EstimateFunctional(input, options, &summary);
-  EXPECT_EQ(last, total);
-  EXPECT_GT(total, 9 * 4);
-  options.progress = [&](int done, int of) {
-    if (2 * done > of) throw std::runtime_error("enough");
-  };
-  EXPECT_THROW(EstimateFunctional(input, options, &summary), std::runtime_error);
+  const EstimateInput input = MakeInput(40, 30, 3, GaussianWeights(3, 3));
+  const int steps = ExpectStepsAreReported(FunctionalOptions(), [&](const auto& options) {
+    FunctionalSummary summary;
+    EstimateFunctional(input, options, &summary);
+  });
+  EXPECT_GT(steps, 9 * 4);
 }
 
 TEST(FunctionalSolver, RefusesMoreMemoryThanItMayHave) {
-  const EstimateInput input = MakeInput(200, 200, 1, Gaussian(7, 7));
+  const EstimateInput input = MakeInput(200, 200, 1, GaussianWeights(7, 7));
   FunctionalOptions options;
   options.memory_limit_mib = 10;
   FunctionalSummary summary;
@@ -399,7 +354,7 @@ TEST(FunctionalSolver, RefusesMoreMemoryThanItMayHave) {
 }
 
 TEST(FunctionalSolver, RefusesOptionsThatDoNotFit) {
-  const EstimateInput input = MakeInput(8, 7, 1, Gaussian(3, 3));
+  const EstimateInput input = MakeInput(8, 7, 1, GaussianWeights(3, 3));
   FunctionalSummary summary;
   const auto error = [&](const std::function<void(FunctionalOptions*)>& change) {
     FunctionalOptions options;

@@ -12,7 +12,6 @@
 #include <functional>
 #include <memory>
 #include <random>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -21,6 +20,7 @@
 #include "estimator/projection/grid_photograph.h"
 #include "estimator/views/warped_views.h"
 #include "support/error_message.h"
+#include "tests/estimator/solver_inputs.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/light_field.h"
 
@@ -28,37 +28,18 @@ namespace thicklens::estimator {
 namespace {
 
 using ::testing::ElementsAre;
+using testing::ExpectStepsAreReported;
+using testing::GaussianWeights;
 using ::testing::HasSubstr;
+using testing::NoiseInput;
+using testing::WithSolverCamera;
 using thicklens::testing::ErrorOf;
 
 std::size_t Index(Eigen::Index i) { return static_cast<std::size_t>(i); }
 
-EstimateInput InputOf(int width, int height, int channels, const Eigen::ArrayXXd& weights,
-                      const std::function<double(int x, int y)>& disparity) {
-  std::mt19937 engine(1);
-  std::uniform_real_distribution<float> uniform(0.1F, 0.9F);
-  EstimateInput input;
-  input.picture = {width, height, channels, {}};
-  for (int i = 0; i < width * height * channels; ++i) {
-    input.picture.values.push_back(uniform(engine));
-  }
-  input.disparity = {width, height, {}, {1, 1}};
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      input.disparity.disparity.push_back(static_cast<float>(disparity(x, y)));
-    }
-  }
-  input.weights = weights;
-  return input;
-}
-
-Eigen::ArrayXXd Gaussian(int u_count, int v_count) {
-  return model::ApertureWeights(model::ApertureShape::kGaussian, u_count, v_count);
-}
-
 // A slant with a near patch that hides some of it.
 EstimateInput Occluded(int width, int height, int channels, const Eigen::ArrayXXd& weights) {
-  return InputOf(width, height, channels, weights, [=](int x, int y) {
+  return NoiseInput(width, height, channels, weights, [=](int x, int y) {
     const bool patch = x > width / 3 && x < 2 * width / 3 && y > height / 3 && y < height - 2;
     return patch ? 1.6 : -0.8 + 1.4 * x / width - 0.3 * y / height;
   });
@@ -66,45 +47,26 @@ EstimateInput Occluded(int width, int height, int channels, const Eigen::ArrayXX
 
 // ST elsewhere than in the plane of focus: rays land beside the pixels, some beside the picture.
 EstimateInput WithCamera(int width, int height, double st_depth_mm) {
-  EstimateInput input = Occluded(width, height, 1, Gaussian(3, 3));
-  model::Camera camera;
-  camera.name = "made up";
-  camera.lens = {12.5, 12.8, 3, 6};
-  camera.sensor.width_px = width;
-  camera.sensor.height_px = height;
-  camera.sensor.pixel_pitch_mm = 0.02;
-  camera.sensor.principal_point_px = {width / 2.0 - 0.3, height / 2.0};
-  model::CameraCalibration calibration;
-  calibration.image_distance_mm = {model::ImageDistanceMm(camera.lens, 800), 0};
-  calibration.blur_ratio = {0.45, 0};
-  calibration.evidence.method = "assumed";
-  camera.calibration = calibration;
-  input.grid = model::GridOnPlanes(
-      camera, {0, st_depth_mm},
-      model::SampleAperture(input.weights, camera.blur_ratio(), camera.lens.aperture_radius_mm));
-  input.camera = camera;
-  std::vector<float> depths_mm;
-  for (int i = 0; i < width * height; ++i) {
-    depths_mm.push_back(static_cast<float>(600 + 30 * (i % width)));
-  }
-  input.disparity = DisparityOnGrid(*input.grid, depths_mm, width, height);
-  return input;
+  return WithSolverCamera(Occluded(width, height, 1, GaussianWeights(3, 3)), {0, st_depth_mm},
+                          [](int x) { return 600 + 30 * x; });
 }
 
 std::vector<EstimateInput> Inputs() {
-  Eigen::ArrayXXd some = Gaussian(3, 3);
+  Eigen::ArrayXXd some = GaussianWeights(3, 3);
   some(0, 1) = some(2, 2) = 0;
   some /= some.sum();
-  return {Occluded(23, 17, 1, Gaussian(3, 5)), Occluded(19, 13, 1, some),
-          Occluded(16, 9, 1, Gaussian(4, 1)), Occluded(12, 15, 1, Gaussian(1, 3)),
-          // Longer than a band; whole disparities, one but for rounding; the steps of a camera.
-          InputOf(530, 5, 1, Gaussian(3, 2), [](int x, int) { return 0.9 - 0.004 * x; }),
-          InputOf(11, 8, 1, Gaussian(3, 3), [](int x, int) { return x < 6 ? 1.0 : -2.0; }),
-          InputOf(9, 6, 1, Gaussian(3, 3), [](int, int) { return 1e-20; }),
-          InputOf(1, 9, 1, Gaussian(3, 3), [](int, int) { return 0.0; }), WithCamera(17, 12, 800),
-          WithCamera(17, 12, 500), WithCamera(17, 12, 250), WithCamera(17, 12, 2000),
-          // Higher than two bands of the photograph.
-          WithCamera(6, 75, 250)};
+  return {
+      Occluded(23, 17, 1, GaussianWeights(3, 5)), Occluded(19, 13, 1, some),
+      Occluded(16, 9, 1, GaussianWeights(4, 1)), Occluded(12, 15, 1, GaussianWeights(1, 3)),
+      // Longer than a band; whole disparities, one but for rounding; the steps of a camera.
+      NoiseInput(530, 5, 1, GaussianWeights(3, 2), [](int x, int) { return 0.9 - 0.004 * x; }),
+      NoiseInput(11, 8, 1, GaussianWeights(3, 3), [](int x, int) { return x < 6 ? 1.0 : -2.0; }),
+      NoiseInput(9, 6, 1, GaussianWeights(3, 3), [](int, int) { return 1e-20; }),
+      NoiseInput(1, 9, 1, GaussianWeights(3, 3), [](int, int) { return 0.0; }),
+      WithCamera(17, 12, 800), WithCamera(17, 12, 500), WithCamera(17, 12, 250),
+      WithCamera(17, 12, 2000),
+      // Higher than two bands of the photograph.
+      WithCamera(6, 75, 250)};
 }
 
 std::vector<double> RandomNumbers(std::size_t count, unsigned seed) {
@@ -294,8 +256,8 @@ TEST(GridSolver, IsOneBlockForOtherStrengthsAndColours) {
   FunctionalOptions options = Precise();
   options.gamma = 0.05;
   options.ridge = 0.02;
-  ExpectOneBlock(Occluded(14, 11, 3, Gaussian(3, 3)), options);
-  ExpectOneBlock(Occluded(14, 11, 5, Gaussian(3, 3)), options);
+  ExpectOneBlock(Occluded(14, 11, 3, GaussianWeights(3, 3)), options);
+  ExpectOneBlock(Occluded(14, 11, 5, GaussianWeights(3, 3)), options);
   options.falloff = false;
   ExpectOneBlock(WithCamera(14, 11, 500), options);
 }
@@ -304,15 +266,15 @@ TEST(GridSolver, IsOneBlockInFloat) {
   FunctionalOptions options = Precise();
   options.double_precision = false;
   options.tolerance = 1e-5;
-  ExpectOneBlock(Occluded(23, 17, 1, Gaussian(3, 3)), options, 1e-3);
+  ExpectOneBlock(Occluded(23, 17, 1, GaussianWeights(3, 3)), options, 1e-3);
 }
 
 // All points at one disparity in (0, 1): dense H and D of the formulas.
 TEST(GridSolver, MinimisesTheFunctional) {
   constexpr int kWidth = 8, kHeight = 7, kViews = 3, kPixels = kWidth * kHeight;
   constexpr double kDisparity = 0.4, kGamma = 0.8, kRidge = 0.01;
-  const EstimateInput input =
-      InputOf(kWidth, kHeight, 1, Gaussian(kViews, kViews), [](int, int) { return kDisparity; });
+  const EstimateInput input = NoiseInput(kWidth, kHeight, 1, GaussianWeights(kViews, kViews),
+                                         [](int, int) { return kDisparity; });
   const auto ray = [](int k, int l, int s, int t) {
     return ((l * kViews + k) * kHeight + t) * kWidth + s;
   };
@@ -393,7 +355,7 @@ TEST(GridSolver, TellsTheResidualOfTheBlocksSystem) {
 
 // A flat scene of one radiance is its own light field; where there is a camera, radiance.
 TEST(GridSolver, AConstantPictureHasAConstantLightField) {
-  EstimateInput input = Occluded(31, 22, 3, Gaussian(3, 3));
+  EstimateInput input = Occluded(31, 22, 3, GaussianWeights(3, 3));
   for (std::size_t i = 0; i < input.picture.values.size(); ++i) {
     input.picture.values[i] = 0.2F * static_cast<float>(i % 3 + 1);
   }
@@ -411,7 +373,7 @@ TEST(GridSolver, AConstantPictureHasAConstantLightField) {
 
 TEST(GridSolver, SameBitsOnAnyNumberOfThreads) {
   for (const EstimateInput& input :
-       {Occluded(301, 37, 3, Gaussian(5, 3)), WithCamera(91, 70, 500)}) {
+       {Occluded(301, 37, 3, GaussianWeights(5, 3)), WithCamera(91, 70, 500)}) {
     FunctionalOptions options;
     options.max_iterations = 15;
     options.threads = 1;
@@ -443,27 +405,16 @@ TEST(GridSolver, TellsWhereItCameFrom) {
 }
 
 TEST(GridSolver, CountsItsStepsAndStopsOnRequest) {
-  const EstimateInput input = Occluded(40, 30, 3, Gaussian(3, 3));
-  FunctionalOptions options;
-  int last = 0, total = 0;
-  options.progress = [&](int done, int of) {
-    EXPECT_GE(done, last);
-    EXPECT_LE(done, of);
-    last = done;
-    total = of;
-  };
-  FunctionalSummary summary;
-  EstimateOnGrid(input, options, &summary);
-  EXPECT_EQ(last, total);
-  EXPECT_GT(total, 30);
-  options.progress = [](int done, int of) {
-    if (2 * done > of) throw std::runtime_error("enough");
-  };
-  EXPECT_THROW(EstimateOnGrid(input, options, &summary), std::runtime_error);
+  const EstimateInput input = Occluded(40, 30, 3, GaussianWeights(3, 3));
+  const int steps = ExpectStepsAreReported(FunctionalOptions(), [&](const auto& options) {
+    FunctionalSummary summary;
+    EstimateOnGrid(input, options, &summary);
+  });
+  EXPECT_GT(steps, 30);
 }
 
 TEST(GridSolver, RefusesMoreMemoryThanItMayHave) {
-  const EstimateInput input = Occluded(200, 200, 1, Gaussian(7, 7));
+  const EstimateInput input = Occluded(200, 200, 1, GaussianWeights(7, 7));
   FunctionalOptions options;
   options.memory_limit_mib = 10;
   FunctionalSummary summary;
@@ -485,7 +436,7 @@ TEST(GridSolver, RefusesOptionsThatDoNotFit) {
   options.ridge = 0;
   FunctionalSummary summary;
   EXPECT_THAT(
-      ErrorOf([&] { EstimateOnGrid(Occluded(8, 7, 1, Gaussian(3, 3)), options, &summary); }),
+      ErrorOf([&] { EstimateOnGrid(Occluded(8, 7, 1, GaussianWeights(3, 3)), options, &summary); }),
       HasSubstr("grid solver: ridge is 0"));
 }
 

@@ -1,0 +1,51 @@
+#ifndef THICKLENS_TESTS_ESTIMATOR_SOLVER_INPUTS_H_
+#define THICKLENS_TESTS_ESTIMATOR_SOLVER_INPUTS_H_
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <functional>
+#include <stdexcept>
+
+#include "thicklens/estimator/estimate_input.h"
+#include "thicklens/model/light_field_grid.h"
+
+namespace thicklens::estimator::testing {
+
+// Inputs that the tests of several solvers share.
+
+Eigen::ArrayXXd GaussianWeights(int u_count, int v_count);
+
+// A picture of uniform noise from 0.1 to 0.9, which has texture everywhere, with the disparity of
+// each pixel, px per view step.
+EstimateInput NoiseInput(int width_px, int height_px, int channels, const Eigen::ArrayXXd& weights,
+                         const std::function<double(int x, int y)>& disparity, unsigned seed = 1);
+
+// The same input seen by testing::SolverCamera, with a grid on these planes and the depth of each
+// column. Where the ST plane is not the plane of focus, rays land between the pixels.
+EstimateInput WithSolverCamera(EstimateInput input, const model::LightFieldPlanes& planes,
+                               const std::function<double(int x)>& depth_mm);
+
+// The steps that `solve` reports never go back and end with their total, which is returned; an
+// exception of the report leaves the solver. `solve` takes the options.
+template <typename Options, typename Solve>
+int ExpectStepsAreReported(Options options, const Solve& solve) {
+  int last = 0, total = 0;
+  options.progress = [&](int done, int of) {
+    EXPECT_GE(done, last);
+    EXPECT_LE(done, of);
+    last = done;
+    total = of;
+  };
+  solve(options);
+  EXPECT_EQ(last, total);
+  options.progress = [](int done, int of) {
+    if (2 * done > of) throw std::runtime_error("enough");
+  };
+  EXPECT_THROW(solve(options), std::runtime_error);
+  return total;
+}
+
+}  // namespace thicklens::estimator::testing
+
+#endif  // THICKLENS_TESTS_ESTIMATOR_SOLVER_INPUTS_H_
