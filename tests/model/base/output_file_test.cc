@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -19,6 +18,7 @@
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
+#include "tests/model/base/output_fixture.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 
@@ -35,19 +35,11 @@ using ::testing::MatchesRegex;
 using ::testing::StartsWith;
 using ::thicklens::testing::ContentOf;
 using ::thicklens::testing::ErrorOf;
+using ::thicklens::testing::FileRefusal;
+using ::thicklens::testing::FolderRefusal;
+using ::thicklens::testing::kMarker;
+using ::thicklens::testing::StatusOfChild;
 using ::thicklens::testing::TemporaryFolder;
-
-constexpr char kMarker[] = "truth.yaml";
-
-// Runs `work` in a child process and gives its exit status; 99 if it ended otherwise.
-template <typename Work>
-int InChildProcess(const Work& work) {
-  const pid_t child = ::fork();
-  if (child == 0) ::_exit(work());
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 99;
-}
 
 TEST(OutputFile, NothingAtTheTargetBeforeCommit) {
   const TemporaryFolder folder;
@@ -80,11 +72,9 @@ TEST(OutputFile, PartOfAKilledRunIsRemoved) {
 TEST(OutputFile, SecondClaimantIsRefused) {
   const TemporaryFolder folder;
   OutputFile first(folder / "a.yaml");
-  EXPECT_THAT(ErrorOf([&] { OutputFile second(folder / "a.yaml"); }),
+  EXPECT_THAT(FileRefusal(folder / "a.yaml"),
               AllOf(HasSubstr(folder / "a.yaml"), HasSubstr("another run")));
-  EXPECT_EQ(InChildProcess([&] {
-              return ErrorOf([&] { OutputFile second(folder / "a.yaml"); }) == "(no error)" ? 0 : 3;
-            }),
+  EXPECT_EQ(StatusOfChild([&] { return FileRefusal(folder / "a.yaml") == "(no error)" ? 0 : 3; }),
             3);
   first.Commit("first");
   EXPECT_EQ(ContentOf(folder / "a.yaml"), "first");
@@ -95,7 +85,7 @@ TEST(OutputFile, SecondClaimantIsRefused) {
 TEST(OutputFile, LockOfAKilledRunIsGone) {
   const TemporaryFolder folder;
   // _exit runs no destructor: the part file stays, as after a kill.
-  InChildProcess([&] {
+  StatusOfChild([&] {
     auto* file = new OutputFile(folder / "a.yaml");
     return file->path().empty() ? 1 : 0;
   });
@@ -133,18 +123,18 @@ TEST(OutputFile, ManyClaimantsOneHolder) {
 
 TEST(OutputFile, MissingFolderAndFolderAsTarget) {
   const TemporaryFolder folder;
-  EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / "none/a.yaml"); }),
+  EXPECT_THAT(FileRefusal(folder / "none/a.yaml"),
               AllOf(HasSubstr("none/a.yaml"), HasSubstr("does not exist")));
-  EXPECT_THAT(ErrorOf([&] { OutputFile file(folder.path()); }), HasSubstr("is a folder"));
-  EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / "a/"); }), HasSubstr("is a folder"));
-  EXPECT_THAT(ErrorOf([&] { OutputFile file(""); }), HasSubstr("empty"));
-  EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / std::string(256, 'a')); }),
+  EXPECT_THAT(FileRefusal(folder.path()), HasSubstr("is a folder"));
+  EXPECT_THAT(FileRefusal(folder / "a/"), HasSubstr("is a folder"));
+  EXPECT_THAT(FileRefusal(""), HasSubstr("empty"));
+  EXPECT_THAT(FileRefusal(folder / std::string(256, 'a')),
               HasSubstr("cannot be written: File name too long"));
   EXPECT_THAT(folder.Entries(), IsEmpty());
 }
 
 TEST(OutputFile, DevicesAreNotReplaced) {
-  EXPECT_THAT(ErrorOf([] { OutputFile file("/dev/null"); }), HasSubstr("device"));
+  EXPECT_THAT(FileRefusal("/dev/null"), HasSubstr("device"));
 }
 
 TEST(OutputFile, LinkStaysALink) {
@@ -161,16 +151,15 @@ TEST(OutputFile, ReadOnlyFolderIsToldAtOnce) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
   const TemporaryFolder folder;
   fs::permissions(folder.path(), fs::perms::owner_read | fs::perms::owner_exec);
-  EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / "a"); }), HasSubstr("cannot be written"));
-  EXPECT_THAT(ErrorOf([&] { OutputFolder out(folder / "a", kMarker); }),
-              HasSubstr("cannot be written"));
+  EXPECT_THAT(FileRefusal(folder / "a"), HasSubstr("cannot be written"));
+  EXPECT_THAT(FolderRefusal(folder / "a"), HasSubstr("cannot be written"));
   fs::permissions(folder.path(), fs::perms::owner_all);
 }
 
 TEST(OutputFile, FullDiskLeavesTheOldFile) {
   const TemporaryFolder folder;
   folder.Put("a", "old");
-  const int status = InChildProcess([&] {
+  const int status = StatusOfChild([&] {
     std::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{4096, 4096};
     ::setrlimit(RLIMIT_FSIZE, &limit);
@@ -230,14 +219,13 @@ TEST(OutputFolder, TrailingSlashesMeanTheSame) {
 TEST(OutputFolder, ReplacesOnlyItsOwn) {
   const TemporaryFolder folder;
   folder.Put("thesis/chapter.tex", "years");
-  EXPECT_THAT(ErrorOf([&] { OutputFolder out(folder / "thesis", kMarker); }),
+  EXPECT_THAT(FolderRefusal(folder / "thesis"),
               AllOf(HasSubstr("thesis"), HasSubstr(kMarker), HasSubstr("not replaced")));
   folder.Put("file", "x");
-  EXPECT_THAT(ErrorOf([&] { OutputFolder out(folder / "file", kMarker); }), HasSubstr("is a file"));
-  EXPECT_THAT(ErrorOf([&] { OutputFolder out(folder / "none/out", kMarker); }),
-              HasSubstr("does not exist"));
+  EXPECT_THAT(FolderRefusal(folder / "file"), HasSubstr("is a file"));
+  EXPECT_THAT(FolderRefusal(folder / "none/out"), HasSubstr("does not exist"));
   for (const char* name : {"", ".", "..", "/"})
-    EXPECT_NE(ErrorOf([&] { OutputFolder out(name, kMarker); }), "(no error)") << name;
+    EXPECT_NE(FolderRefusal(name), "(no error)") << name;
   EXPECT_EQ(ContentOf(folder / "thesis/chapter.tex"), "years");
   EXPECT_THAT(folder.Entries(), ElementsAre("file", "thesis"));
 
@@ -296,8 +284,7 @@ TEST(OutputFolder, NamesWhatWouldBeLostOneFolderDeeper) {
   put_own(&folder);
   fs::remove_all(folder / "out/views");
   folder.Put("out/views", "a file of that name");
-  EXPECT_THAT(ErrorOf([&] { OutputFolder out(folder / "out", kMarker, own); }),
-              HasSubstr("'views'"));
+  EXPECT_THAT(FolderRefusal(folder / "out", own), HasSubstr("'views'"));
   EXPECT_EQ(ContentOf(folder / "out/views"), "a file of that name");
 }
 
@@ -353,8 +340,7 @@ TEST(OutputFolder, StaleStagingIsEmptiedAndSecondClaimantRefused) {
   const TemporaryFolder folder;
   folder.Put(".out.0123456789abcdef.part/frames/stale.png", "x");
   OutputFolder out(folder / "out", kMarker);
-  EXPECT_THAT(ErrorOf([&] { OutputFolder second(folder / "out/", kMarker); }),
-              HasSubstr("another run"));
+  EXPECT_THAT(FolderRefusal(folder / "out/"), HasSubstr("another run"));
   out.Write(kMarker, "t");
   out.Commit();
   EXPECT_FALSE(fs::exists(folder / "out/frames"));
@@ -466,7 +452,7 @@ TEST(OutputFolder, IsThereAtEveryMomentWhileItIsReplaced) {
 
 TEST(OutputFolder, FullDiskIsAnError) {
   const TemporaryFolder folder;
-  const int status = InChildProcess([&] {
+  const int status = StatusOfChild([&] {
     std::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{4096, 4096};
     ::setrlimit(RLIMIT_FSIZE, &limit);

@@ -2,10 +2,8 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sched.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -18,6 +16,7 @@
 
 #include "support/error_message.h"
 #include "support/temporary_folder.h"
+#include "tests/model/base/output_fixture.h"
 #include "thicklens/base/output_file.h"
 
 namespace thicklens {
@@ -30,23 +29,22 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using ::thicklens::testing::ContentOf;
 using ::thicklens::testing::ErrorOf;
+using ::thicklens::testing::FileRefusal;
+using ::thicklens::testing::FolderRefusal;
+using ::thicklens::testing::kMarker;
+using ::thicklens::testing::OwnMounts;
 using ::thicklens::testing::TemporaryFolder;
+using ::thicklens::testing::TextOfChild;
+using ::thicklens::testing::TextOfChildWithMount;
+using ::thicklens::testing::Unless;
+using ::thicklens::testing::WriteFolder;
 
-constexpr char kMarker[] = "truth.yaml";
 constexpr uid_t kNobody = 65534;
 
 mode_t ModeOf(const std::string& path) {
   struct stat info {};
   EXPECT_EQ(::lstat(path.c_str(), &info), 0) << path;
   return info.st_mode & 07777;
-}
-
-void WriteFolder(const std::string& path, const std::string& content,
-                 const std::vector<std::string>& own = {}) {
-  OutputFolder out(path, kMarker, own);
-  out.Write(kMarker, content);
-  out.Write("frames/a.png", content);
-  out.Commit();
 }
 
 // ---- Links.
@@ -96,10 +94,9 @@ TEST(OutputPlace, ALinkToNothingIsRefused) {
   fs::create_symlink("nothing", folder / "link");
   fs::create_symlink("ring", folder / "ring");
   for (const char* name : {"link", "ring"}) {
-    EXPECT_THAT(ErrorOf([&] { OutputFile file(folder / name); }),
+    EXPECT_THAT(FileRefusal(folder / name),
                 AllOf(StartsWith(folder / name), HasSubstr("symbolic link to")));
-    EXPECT_THAT(ErrorOf([&] { OutputFolder out(folder / name, kMarker); }),
-                HasSubstr("symbolic link to"));
+    EXPECT_THAT(FolderRefusal(folder / name), HasSubstr("symbolic link to"));
   }
   EXPECT_THAT(folder.Entries(), ElementsAre("link", "ring"));
 }
@@ -107,10 +104,10 @@ TEST(OutputPlace, ALinkToNothingIsRefused) {
 TEST(OutputPlace, StandardOutputAndItsNamesAreNoFile) {
   const TemporaryFolder folder;
   for (const char* name : {"-", "/dev/stdout", "/proc/self/fd/1"}) {
-    EXPECT_NE(ErrorOf([&] { OutputFile file(name); }), "(no error)") << name;
-    EXPECT_NE(ErrorOf([&] { OutputFolder out(name, kMarker); }), "(no error)") << name;
+    EXPECT_NE(FileRefusal(name), "(no error)") << name;
+    EXPECT_NE(FolderRefusal(name), "(no error)") << name;
   }
-  EXPECT_THAT(ErrorOf([] { OutputFile file("-"); }), HasSubstr("standard output"));
+  EXPECT_THAT(FileRefusal("-"), HasSubstr("standard output"));
 }
 
 TEST(OutputPlace, AnyNameThatAFileMayHave) {
@@ -175,65 +172,10 @@ TEST(OutputPlace, OlderOnesLeaveTheirPermissions) {
 
 // ---- What needs another user or mounts: in a child process.
 
-// What `work` returns, an error text; empty: all is as it should be. "skip: ..." skips.
-template <typename Work>
-std::string InChild(const Work& work) {
-  int ends[2];
-  if (::pipe(ends) != 0) return "no pipe";
-  const pid_t child = ::fork();
-  if (child == 0) {
-    const std::string text = work();
-    const ssize_t written = ::write(ends[1], text.data(), text.size());
-    ::_exit(written == static_cast<ssize_t>(text.size()) ? 0 : 1);
-  }
-  ::close(ends[1]);
-  std::string text;
-  char buffer[4096];
-  for (ssize_t n; (n = ::read(ends[0], buffer, sizeof buffer)) > 0;)
-    text.append(buffer, static_cast<std::size_t>(n));
-  ::close(ends[0]);
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0 ? text : text + " (ended badly)";
-}
-
-#define RUN_IN_CHILD(work)                                                \
-  const std::string outcome = InChild(work);                              \
-  if (outcome.rfind("skip: ", 0) == 0) GTEST_SKIP() << outcome.substr(6); \
-  EXPECT_EQ(outcome, "")
-
-std::string Unless(bool condition, const std::string& text) { return condition ? "" : text + "; "; }
-
-// A mount namespace of its own, in which root of a user namespace may mount.
-std::string OwnMounts() {
-  const std::string user = std::to_string(::geteuid()), group = std::to_string(::getegid());
-  if (user != "0") {
-    if (::unshare(CLONE_NEWUSER) != 0)
-      return std::string("skip: no user namespace: ") + std::strerror(errno);
-    std::ofstream("/proc/self/setgroups") << "deny";
-    std::ofstream("/proc/self/uid_map") << "0 " + user + " 1";
-    std::ofstream("/proc/self/gid_map") << "0 " + group + " 1";
-  }
-  if (::unshare(CLONE_NEWNS) != 0)
-    return std::string("skip: no mount namespace: ") + std::strerror(errno);
-  if (::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
-    return std::string("skip: mounts cannot be made private: ") + std::strerror(errno);
-  return "";
-}
-
-std::string MountTmpfs(const std::string& folder) {
-  if (::mount("none", folder.c_str(), "tmpfs", 0, "size=1m") == 0) return "";
-  return std::string("skip: no tmpfs can be mounted: ") + std::strerror(errno);
-}
-
 TEST(OutputPlace, AMountPointIsWrittenInto) {
   const TemporaryFolder folder;
-  RUN_IN_CHILD([&]() -> std::string {
-    const std::string out = folder / "out";
-    fs::create_directory(out);
-    for (const std::string& skip : {OwnMounts(), MountTmpfs(out)}) {
-      if (!skip.empty()) return skip;
-    }
+  const std::string out = folder / "out";
+  EXPECT_CHILD_SUCCEEDS(TextOfChildWithMount(out, [&]() -> std::string {
     fs::create_directory(out + "/lost+found");
     WriteFolder(out, "old", {kMarker, "frames"});
     std::string wrong = Unless(ContentOf(out + "/truth.yaml") == "old", "it is not written");
@@ -243,7 +185,7 @@ TEST(OutputPlace, AMountPointIsWrittenInto) {
       replaced.Write("new", "2");
       replaced.Write(kMarker, "new");
       wrong += Unless(ContentOf(out + "/truth.yaml") == "old", "it goes before Commit");
-      const std::string second = ErrorOf([&] { OutputFolder other(out, kMarker, {}); });
+      const std::string second = FolderRefusal(out);
       wrong += Unless(second.find("another run") != std::string::npos, "two write it: " + second);
       replaced.Commit();
     }
@@ -257,28 +199,22 @@ TEST(OutputPlace, AMountPointIsWrittenInto) {
     wrong += Unless(entries == 3 && fs::exists(out + "/lost+found"), "other entries are there");
 
     std::ofstream(out + "/thesis.tex") << "years";
-    const std::string refusal = ErrorOf([&] {
-      OutputFolder other(out, kMarker, {kMarker, "new"});
-    });
+    const std::string refusal = FolderRefusal(out, {kMarker, "new"});
     wrong +=
         Unless(refusal.find("'thesis.tex', which would be lost") != std::string::npos, refusal);
     fs::remove(out + "/truth.yaml");
-    const std::string foreign = ErrorOf([&] { OutputFolder other(out, kMarker, {}); });
+    const std::string foreign = FolderRefusal(out);
     wrong += Unless(foreign.find("is not replaced") != std::string::npos, foreign);
     wrong += Unless(ContentOf(out + "/thesis.tex") == "years", "the thesis is lost");
     return wrong;
-  });
+  }));
 }
 
 // A container's own folders cannot be renamed.
 TEST(OutputPlace, AFolderOfALowerLayerIsWrittenInto) {
   const TemporaryFolder folder;
-  RUN_IN_CHILD([&]() -> std::string {
-    const std::string disk = folder / "disk";
-    fs::create_directory(disk);
-    for (const std::string& skip : {OwnMounts(), MountTmpfs(disk)}) {
-      if (!skip.empty()) return skip;
-    }
+  const std::string disk = folder / "disk";
+  EXPECT_CHILD_SUCCEEDS(TextOfChildWithMount(disk, [&]() -> std::string {
     for (const char* name : {"lower/out/frames", "upper", "work", "merged"})
       fs::create_directories(disk + "/" + name);
     std::ofstream(disk + "/lower/out/truth.yaml") << "older";
@@ -293,33 +229,27 @@ TEST(OutputPlace, AFolderOfALowerLayerIsWrittenInto) {
            Unless(ContentOf(merged + "/out/frames/a.png") == "new", "its frame is not written") +
            Unless(!fs::exists(merged + "/out/frames/old"), "the older content stays") +
            Unless(std::distance(fs::directory_iterator(merged), {}) == 1, "something is left");
-  });
+  }));
 }
 
 // A run that was killed between the older marker's end and the new one's beginning.
 TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNext) {
   const TemporaryFolder folder;
-  RUN_IN_CHILD([&]() -> std::string {
-    const std::string out = folder / "out";
-    fs::create_directory(out);
-    for (const std::string& skip : {OwnMounts(), MountTmpfs(out)}) {
-      if (!skip.empty()) return skip;
-    }
+  const std::string out = folder / "out";
+  EXPECT_CHILD_SUCCEEDS(TextOfChildWithMount(out, [&]() -> std::string {
     fs::create_directories(out + "/.thicklens.0123456789abcdef.part");
     std::ofstream(out + "/.thicklens.0123456789abcdef.part/.commit-begun") << "";
     fs::create_directories(out + "/frames");
     std::ofstream(out + "/frames/half") << "x";
     std::ofstream(out + "/mine") << "x";
-    const std::string refusal = ErrorOf([&] {
-      OutputFolder other(out, kMarker, {kMarker, "frames"});
-    });
+    const std::string refusal = FolderRefusal(out, {kMarker, "frames"});
     std::string wrong = Unless(refusal.find("'mine'") != std::string::npos, refusal);
     fs::remove(out + "/mine");
     WriteFolder(out, "new", {kMarker, "frames"});
     wrong += Unless(ContentOf(out + "/frames/a.png") == "new", "it is not written");
     wrong += Unless(!fs::exists(out + "/frames/half"), "the half one stays");
     return wrong;
-  });
+  }));
 }
 
 // The folder was a mount point when that run was killed, and is none any more.
@@ -333,10 +263,7 @@ TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNextThatReplacesTheF
     std::ofstream(out + "/frames/old") << "x";
     if (is_whole) std::ofstream(out + "/" + kMarker) << "old";
     std::ofstream(out + "/mine") << "x";
-    EXPECT_THAT(ErrorOf([&] {
-                  OutputFolder other(out, kMarker, {kMarker, "frames"});
-                }),
-                ::testing::HasSubstr("'mine'"));
+    EXPECT_THAT(FolderRefusal(out, {kMarker, "frames"}), ::testing::HasSubstr("'mine'"));
     EXPECT_TRUE(fs::exists(out + "/frames/old"));
     fs::remove(out + "/mine");
     WriteFolder(out, "new", {kMarker, "frames"});
@@ -354,48 +281,35 @@ TEST(OutputPlace, WhatAKilledRunDidNotTouchIsKept) {
   fs::create_directories(out + "/.thicklens.0123456789abcdef.part/frames");
   fs::create_directories(out + "/frames");
   std::ofstream(out + "/frames/photo.raw") << "mine";
-  EXPECT_THAT(ErrorOf([&] {
-                OutputFolder other(out, kMarker, {kMarker, "frames"});
-              }),
-              ::testing::HasSubstr("holds other files"));
+  EXPECT_THAT(FolderRefusal(out, {kMarker, "frames"}), ::testing::HasSubstr("holds other files"));
   EXPECT_EQ(ContentOf(out + "/frames/photo.raw"), "mine");
   // A mount point is written in place.
-  RUN_IN_CHILD([&]() -> std::string {
-    const std::string place = folder / "place";
-    fs::create_directory(place);
-    for (const std::string& skip : {OwnMounts(), MountTmpfs(place)}) {
-      if (!skip.empty()) return skip;
-    }
+  const std::string place = folder / "place";
+  EXPECT_CHILD_SUCCEEDS(TextOfChildWithMount(place, [&]() -> std::string {
     fs::create_directories(place + "/.thicklens.0123456789abcdef.part");
     fs::create_directories(place + "/frames");
     std::ofstream(place + "/frames/photo.raw") << "mine";
-    const std::string refusal = ErrorOf([&] {
-      OutputFolder other(place, kMarker, {kMarker, "frames"});
-    });
+    const std::string refusal = FolderRefusal(place, {kMarker, "frames"});
     return Unless(refusal.find("holds other files") != std::string::npos, refusal) +
            Unless(ContentOf(place + "/frames/photo.raw") == "mine", "the photo is lost");
-  });
+  }));
 }
 
 TEST(OutputPlace, AFullMountPointKeepsTheOlderContent) {
   const TemporaryFolder folder;
-  RUN_IN_CHILD([&]() -> std::string {
-    const std::string out = folder / "out";
-    fs::create_directory(out);
-    for (const std::string& skip : {OwnMounts(), MountTmpfs(out)}) {
-      if (!skip.empty()) return skip;
-    }
+  const std::string out = folder / "out";
+  EXPECT_CHILD_SUCCEEDS(TextOfChildWithMount(out, [&]() -> std::string {
     WriteFolder(out, "old");
     const std::string full = ErrorOf([&] { WriteFolder(out, std::string(3 << 20, 'x')); });
     return Unless(full.find("No space left on device") != std::string::npos, full) +
            Unless(ContentOf(out + "/truth.yaml") == "old", "the older one is lost") +
            Unless(ContentOf(out + "/frames/a.png") == "old", "its frame is lost");
-  });
+  }));
 }
 
 TEST(OutputPlace, AFileThatIsAMountPointIsWrittenInto) {
   const TemporaryFolder folder;
-  RUN_IN_CHILD([&]() -> std::string {
+  EXPECT_CHILD_SUCCEEDS(TextOfChild([&]() -> std::string {
     const std::string there = folder.Put("there", "a long older content");
     const std::string here = folder.Put("here");
     if (const std::string skip = OwnMounts(); !skip.empty()) return skip;
@@ -404,14 +318,14 @@ TEST(OutputPlace, AFileThatIsAMountPointIsWrittenInto) {
     std::string wrong;
     {
       OutputFile file(here);
-      const std::string second = ErrorOf([&] { OutputFile other(here); });
+      const std::string second = FileRefusal(here);
       wrong += Unless(second.find("another run") != std::string::npos, "two write it: " + second);
       file.Commit("new");
     }
     wrong += Unless(ContentOf(there) == "new", "it is not written");
     WriteFileAtomically(here, "longer than before");
     return wrong + Unless(ContentOf(there) == "longer than before", "it does not grow");
-  });
+  }));
 }
 
 // The folder around it belongs to another user, as that of a volume in a container may.
@@ -424,7 +338,7 @@ TEST(OutputPlace, AFolderInOneThatMayNotBeWrittenToIsWrittenInto) {
   ASSERT_EQ(::chown(out.c_str(), kNobody, kNobody), 0);
   ASSERT_EQ(::chown(file.c_str(), kNobody, kNobody), 0);
   const std::string of_root = folder.Put("of-root", "root's");
-  RUN_IN_CHILD([&]() -> std::string {
+  EXPECT_CHILD_SUCCEEDS(TextOfChild([&]() -> std::string {
     if (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0) return "skip: no other user";
     std::string wrong;
     WriteFolder(out, "old");
@@ -433,12 +347,12 @@ TEST(OutputPlace, AFolderInOneThatMayNotBeWrittenToIsWrittenInto) {
     wrong += Unless(ContentOf(out + "/truth.yaml") == "new", "the folder is not written");
     wrong += Unless(ContentOf(file) == "new", "the file is not written");
     for (const std::string& path : {folder / "more", of_root}) {
-      const std::string refusal = ErrorOf([&] { OutputFile other(path); });
+      const std::string refusal = FileRefusal(path);
       wrong += Unless(refusal == path + ": cannot be written: Permission denied", refusal);
     }
-    const std::string refusal = ErrorOf([&] { OutputFolder other(folder / "more", kMarker); });
+    const std::string refusal = FolderRefusal(folder / "more");
     return wrong + Unless(refusal.find("Permission denied") != std::string::npos, refusal);
-  });
+  }));
   EXPECT_EQ(ContentOf(of_root), "root's");
 }
 
@@ -453,13 +367,13 @@ TEST(OutputPlace, AReadOnlyFileOrFolderIsRefused) {
     ASSERT_EQ(::chown(path.c_str(), kNobody, kNobody), 0);
     ASSERT_EQ(::chmod(path.c_str(), path == file ? 0444 : 0555), 0);
   }
-  RUN_IN_CHILD([&]() -> std::string {
+  EXPECT_CHILD_SUCCEEDS(TextOfChild([&]() -> std::string {
     if (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0) return "skip: no other user";
-    const std::string of_file = ErrorOf([&] { OutputFile other(file); });
-    const std::string of_folder = ErrorOf([&] { OutputFolder other(folder / "out", kMarker); });
+    const std::string of_file = FileRefusal(file);
+    const std::string of_folder = FolderRefusal(folder / "out");
     return Unless(of_file.find("Permission denied") != std::string::npos, of_file) +
            Unless(of_folder.find("Permission denied") != std::string::npos, of_folder);
-  });
+  }));
 }
 
 }  // namespace
