@@ -38,6 +38,26 @@ double MeanOverPixel(const Function& f, int pairs) {
   return sum / (6 * pairs);
 }
 
+// Transfer functions at the frequency f, cycles per px: of a pixel, of a Gaussian, and of a uniform
+// disc, whose projection on the frequency's direction is added up in `steps` parts.
+inline double BoxTransfer(double f) {
+  constexpr double kPi = 3.14159265358979323846;
+  return f == 0 ? 1 : std::sin(kPi * f) / (kPi * f);
+}
+inline double GaussianTransfer(double sigma, double f) {
+  constexpr double kPi = 3.14159265358979323846;
+  return std::exp(-2 * kPi * kPi * sigma * sigma * f * f);
+}
+inline double DiscTransfer(double radius, double f, int steps = 200) {
+  constexpr double kPi = 3.14159265358979323846;
+  double sum = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double phi = kPi * ((i + 0.5) / steps - 0.5);
+    sum += std::pow(std::cos(phi), 2) * std::cos(2 * kPi * f * radius * std::sin(phi));
+  }
+  return 2 * sum / steps;
+}
+
 }  // namespace thicklens::testing
 
 #endif  // THICKLENS_TESTS_SUPPORT_BLUR_ORACLES_H_

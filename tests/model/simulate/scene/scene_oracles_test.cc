@@ -13,6 +13,7 @@
 namespace thicklens::model {
 namespace {
 
+using thicklens::testing::DiscTransfer;
 using thicklens::testing::MacroScene;
 using thicklens::testing::MeanOverPixel;
 using thicklens::testing::ShareBelow;
@@ -40,17 +41,6 @@ Misfit MisfitOf(const LinearPicture& picture, const Light& light) {
   return misfit;
 }
 
-// Of a disc of radius R: its projection on the frequency's direction, added up.
-double DiscTransferSum(double radius, double f) {
-  double sum = 0;
-  constexpr int kSteps = 400;
-  for (int i = 0; i < kSteps; ++i) {
-    const double phi = kPi * ((i + 0.5) / kSteps - 0.5);
-    sum += std::pow(std::cos(phi), 2) * std::cos(2 * kPi * f * radius * std::sin(phi));
-  }
-  return 2 * sum / kSteps;
-}
-
 // The sampler is a quadrature whose error against the transfer function falls with the rays, and
 // stays within what is stated of it. With the most rays that there may be it is a
 // hundred-thousandth: what must be exact to a millionth is tested on views and on frames of sweeps.
@@ -60,7 +50,7 @@ TEST(SceneOraclesTest, SinesComeCloserToTheTransferFunctionAsTheLawOfTheSampling
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     const double transfer = psf == Psf::kGaussian
                                 ? std::exp(-2 * kPi * kPi * kSigmaPx * kSigmaPx * f.squaredNorm())
-                                : DiscTransferSum(2 * kSigmaPx, f.norm());
+                                : DiscTransfer(2 * kSigmaPx, f.norm(), 400);
     const double box =
         std::sin(kPi * f.x()) / (kPi * f.x()) * std::sin(kPi * f.y()) / (kPi * f.y());
     std::vector<double> errors;

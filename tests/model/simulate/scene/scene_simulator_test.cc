@@ -7,16 +7,14 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <complex>
 #include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include "model/base/random_draws.h"
-#include "model/simulate/scene/ray_set.h"
-#include "model/simulate/scene/scene_texture.h"
+#include "support/blur_oracles.h"
 #include "support/error_message.h"
+#include "support/macro_scene.h"
 #include "thicklens/base/error.h"
 #include "thicklens/model/light_field_grid.h"
 
@@ -25,14 +23,19 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using thicklens::testing::BoxTransfer;
+using thicklens::testing::DiscTransfer;
 using thicklens::testing::ErrorOf;
+using thicklens::testing::GaussianTransfer;
+using thicklens::testing::MacroScene;
 
 constexpr double kPi = 3.14159265358979323846;
 
-// A thick macro lens, focused at 300 mm.
-constexpr double kFrontMm = 50, kRearMm = 52, kThicknessMm = 4, kRadiusMm = 9, kFocusMm = 300;
-constexpr double kPitchMm = 0.0045, kRatio = 0.45;
-constexpr double kScaleMm = kFrontMm * kFocusMm / (kFocusMm - kFrontMm);  // K = 60
+constexpr double kThicknessMm = MacroScene::kThicknessMm, kRearMm = MacroScene::kRearMm;
+constexpr double kFocusMm = MacroScene::kFocusMm, kPitchMm = MacroScene::kPitchMm;
+constexpr double kRadiusMm = MacroScene::kRadiusMm, kRatio = MacroScene::kRatio;
+constexpr double kScaleMm =
+    MacroScene::kFrontMm * kFocusMm / (kFocusMm - MacroScene::kFrontMm);  // K = 60
 constexpr double kScalePx = kScaleMm / kPitchMm;
 // c(z)/p: px to the left per mm of aperture, and the sigma of defocus.
 double ShiftPxPerMm(double depth_mm) { return kScalePx * (1 / depth_mm - 1 / kFocusMm); }
@@ -40,44 +43,8 @@ double DefocusPx(double depth_mm) { return kRatio * kRadiusMm * std::abs(ShiftPx
 // The depth nearer than focus where aperture steps of one sigma move by `px`.
 double DepthOfShift(double px) { return 1 / (1 / kFocusMm + px / (kRatio * kRadiusMm * kScalePx)); }
 
-Camera MacroCamera(int width_px, int height_px, Psf psf, double floor_px) {
-  Camera camera;
-  camera.name = "macro";
-  camera.lens = {kFrontMm, kRearMm, kThicknessMm, kRadiusMm};
-  camera.sensor.width_px = width_px;
-  camera.sensor.height_px = height_px;
-  camera.sensor.pixel_pitch_mm = kPitchMm;
-  camera.sensor.principal_point_px = {(width_px - 1) / 2.0 + 0.3, (height_px - 1) / 2.0 - 0.4};
-  camera.sensor.transfer = TransferCurve::Linear();
-  camera.psf = psf;
-  camera.calibration.emplace();
-  camera.calibration->image_distance_mm =
-      Estimate{kThicknessMm + kRearMm * kFocusMm / (kFocusMm - kFrontMm), 0};
-  camera.calibration->blur_ratio = Estimate{kRatio, 0};
-  camera.calibration->blur_floor_px = Estimate{floor_px, 0};
-  camera.calibration->evidence.method = "simulated";
-  return camera;
-}
-
-SceneLayer Uniform(double depth_mm, double light) {
-  SceneLayer layer;
-  layer.plane.depth_mm = depth_mm;
-  layer.texture.kind = TextureKind::kUniform;
-  layer.texture.colour.setConstant(light);
-  return layer;
-}
-
-SceneLayer Sine(double depth_mm, double period_px, double angle_deg) {
-  SceneLayer layer = Uniform(depth_mm, 0.5);
-  layer.texture.kind = TextureKind::kSine;
-  layer.texture.contrast = 0.8;
-  layer.texture.feature_size_px = period_px;
-  layer.texture.angle_deg = angle_deg;
-  return layer;
-}
-
 SceneLayer Leaves(double depth_mm, double radius_px) {
-  SceneLayer layer = Uniform(depth_mm, 0.5);
+  SceneLayer layer = MacroScene::Uniform(depth_mm, 0.5);
   layer.texture.kind = TextureKind::kDeadLeaves;
   layer.texture.feature_size_px = radius_px;
   return layer;
@@ -100,20 +67,6 @@ SceneSimulationOptions SceneOf(const Camera& camera, std::vector<SceneLayer> lay
   return options;
 }
 
-double BoxTransfer(double f) { return f == 0 ? 1 : std::sin(kPi * f) / (kPi * f); }
-double GaussTransfer(double sigma, double f) {
-  return std::exp(-2 * kPi * kPi * sigma * sigma * f * f);
-}
-// Of a disc: its projection on the frequency's direction, added up.
-double DiscTransferSum(double radius, double f) {
-  double sum = 0;
-  constexpr int kSteps = 200;
-  for (int i = 0; i < kSteps; ++i) {
-    const double phi = kPi * ((i + 0.5) / kSteps - 0.5);
-    sum += std::pow(std::cos(phi), 2) * std::cos(2 * kPi * f * radius * std::sin(phi));
-  }
-  return 2 * sum / kSteps;
-}
 double NormalBelow(double x) { return std::erfc(-x / std::sqrt(2.0)) / 2; }
 // A Gaussian edge behind the pixel box, added up.
 double EdgeBehindPixel(double distance_px, double sigma_px) {
@@ -152,253 +105,15 @@ double LargestDifference(const LinearPicture& a, const LinearPicture& b) {
   return largest;
 }
 
-// ------------------------------------------------------------------------------------- ray sets
-
-TEST(RaySetTest, CarriesTheMomentsAndTransferOfPsfAndPixel) {
-  for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
-    for (const double floor_px : {0.0, 0.7}) {
-      const std::vector<PixelRay> rays = PhotographRays({psf, true, floor_px, 0}, 600);
-      ASSERT_EQ(rays.size(), 600u);
-      Eigen::Array2d mean(0, 0), square(0, 0), offset(0, 0), offset_square(0, 0);
-      for (const PixelRay& ray : rays) {
-        mean += ray.aperture.array() / 600;
-        square += ray.aperture.array().square() / 600;
-        offset += ray.offset_px.array() / 600;
-        offset_square += ray.offset_px.array().square() / 600;
-        EXPECT_LT(ray.aperture.norm(), psf == Psf::kDisc ? 2.02 : 6);
-      }
-      for (int axis = 0; axis < 2; ++axis) {
-        EXPECT_NEAR(mean(axis), 0, 1e-12);
-        EXPECT_NEAR(square(axis), 1, 1e-12);
-        EXPECT_NEAR(offset(axis), 0, 1e-12);
-        EXPECT_NEAR(offset_square(axis) / (1.0 / 12 + floor_px * floor_px), 1, 0.005);
-      }
-      for (const double f : {0.05, 0.13, 0.25, 0.4}) {
-        std::complex<double> aperture = 0, pixel = 0;
-        const Eigen::Vector2d direction(std::cos(0.7), std::sin(0.7));
-        for (const PixelRay& ray : rays) {
-          aperture += std::polar(1 / 600.0, 2 * kPi * f * direction.dot(ray.aperture));
-          pixel += std::polar(1 / 600.0, 2 * kPi * f * ray.offset_px.x());
-        }
-        const double expected = psf == Psf::kGaussian ? GaussTransfer(1, f) : DiscTransferSum(2, f);
-        EXPECT_LT(std::abs(aperture - expected), 0.006);
-        EXPECT_LT(std::abs(pixel - BoxTransfer(f) * GaussTransfer(floor_px, f)), 0.002);
-      }
-    }
-  }
-}
-
-TEST(RaySetTest, ViewRaysFillThePixelAlone) {
-  const std::vector<PixelRay> rays = ViewRays(true, 0);
-  // Each of 8 x 8 cells of the pixel gets its share, 89/64 rays, to less than two.
-  std::vector<int> cells(64, 0);
-  for (const PixelRay& ray : rays) {
-    EXPECT_EQ(ray.aperture, Eigen::Vector2d(0, 0));
-    const Eigen::Vector2d in_pixel = 8 * (ray.offset_px.array() + 0.5);
-    ++cells[static_cast<std::size_t>(in_pixel.y()) * 8 + static_cast<std::size_t>(in_pixel.x())];
-  }
-  EXPECT_GE(*std::min_element(cells.begin(), cells.end()), 0);
-  EXPECT_LE(*std::max_element(cells.begin(), cells.end()), 3);
-  for (const double f : {0.1, 0.3, 0.5}) {
-    std::complex<double> sum = 0, floor = 0;
-    for (const PixelRay& ray : rays) sum += std::polar(1 / 89.0, 2 * kPi * f * ray.offset_px.y());
-    for (const PixelRay& ray : ViewRays(true, 0.6))
-      floor += std::polar(1 / 89.0, 2 * kPi * f * ray.offset_px.y());
-    EXPECT_LT(std::abs(sum - BoxTransfer(f)), 1e-3);
-    EXPECT_LT(std::abs(floor - BoxTransfer(f) * GaussTransfer(0.6, f)), 3e-3);
-  }
-}
-
-// ------------------------------------------------------------------------------------- textures
-
-TextureRequest SquareRequest(double side_px) {
-  TextureRequest request;
-  request.pixel_mm = 0.02;
-  request.coarsest_pixel_mm = 0.02;
-  request.low_mm.setConstant(-side_px * 0.01);
-  request.high_mm.setConstant(side_px * 0.01);
-  return request;
-}
-
-SceneTexture DrawTexture(const TextureOptions& options, const TextureRequest& request,
-                         const LinearPicture& picture = {}) {
-  RandomDraws draws(5, RandomDraws::Purpose::kTexture, 0);
-  return SceneTexture(options, request, picture, &draws);
-}
-
-TEST(SceneTextureTest, HoldsNothingThatThePixelsCannotShow) {
-  for (const TextureKind kind : {TextureKind::kCheckerboard, TextureKind::kSiemensStar,
-                                 TextureKind::kDeadLeaves, TextureKind::kNoise}) {
-    TextureOptions options;
-    options.kind = kind;
-    const SceneTexture texture = DrawTexture(options, SquareRequest(160));
-    // Rows of 128 px, 16 samples to the px, under a window whose own spectrum falls fast.
-    const auto power = [&](double from, double to) {
-      double sum = 0;
-      for (double y_px = -60; y_px < 60; y_px += 23.3) {
-        for (double f = from; f < to; f += 0.053) {
-          std::complex<double> at_f = 0;
-          for (int i = 0; i < 2048; ++i) {
-            const double x_px = (i - 1024) / 16.0;
-            const double t = (i + 0.5) / 2048;
-            const double window = 0.35875 - 0.48829 * std::cos(2 * kPi * t) +
-                                  0.14128 * std::cos(4 * kPi * t) - 0.01168 * std::cos(6 * kPi * t);
-            const double light = static_cast<double>(texture.At(x_px * 0.02, y_px * 0.02)(1)) - 0.5;
-            at_f += window * light * std::polar(1.0, -2 * kPi * f * x_px);
-          }
-          sum += std::norm(at_f);
-        }
-      }
-      return sum / (to - from);
-    };
-    EXPECT_GT(power(0.03, 0.45), 1) << TextureKindName(kind);
-    // Between the samples it is linear, which leaves a little around multiples of 4.
-    EXPECT_LT(power(0.55, 2.5) / power(0.03, 0.45), 1e-5) << TextureKindName(kind);
-    EXPECT_LT(power(3.5, 4.5) / power(0.03, 0.45), 1e-3) << TextureKindName(kind);
-  }
-}
-
-TEST(SceneTextureTest, HasItsColourForItsMeanAndRepeats) {
-  for (const TextureKind kind : {TextureKind::kCheckerboard, TextureKind::kSiemensStar,
-                                 TextureKind::kDeadLeaves, TextureKind::kNoise}) {
-    TextureOptions options;
-    options.kind = kind;
-    options.colour = {0.6, 0.3, 0.1};
-    options.saturation = 0;
-    const SceneTexture texture = DrawTexture(options, SquareRequest(120));
-    Eigen::Array3d mean(0, 0, 0);
-    double least = 1, most = 0;
-    for (int i = 0; i < 120 * 120; ++i) {
-      const Eigen::Array4f light = texture.At((i % 120 - 59.5) * 0.02, (i / 120 - 59.5) * 0.02);
-      mean += light.head<3>().cast<double>() / (120 * 120);
-      least = std::min(least, static_cast<double>(light(0)));
-      most = std::max(most, static_cast<double>(light(0)));
-      // Without saturation the channels differ by their colour alone.
-      EXPECT_NEAR(light(0) / 0.6f, light(1) / 0.3f, 2e-3f);
-      EXPECT_NEAR(light(0) / 0.6f, light(2) / 0.1f, 2e-3f);
-      EXPECT_TRUE(texture.At(1e9 + i, -1e9).isFinite().all());
-    }
-    EXPECT_LT((mean - options.colour.array()).abs().maxCoeff(), 0.02) << TextureKindName(kind);
-    EXPECT_LT(least, 0.6 * 0.7) << TextureKindName(kind);
-    EXPECT_GT(most, 0.6 * 1.3) << TextureKindName(kind);
-  }
-}
-
-TEST(SceneTextureTest, SaturationGivesEveryChannelItsOwnDetail) {
-  for (const TextureKind kind : {TextureKind::kDeadLeaves, TextureKind::kNoise}) {
-    TextureOptions options;
-    options.kind = kind;
-    options.saturation = 1;
-    const SceneTexture texture = DrawTexture(options, SquareRequest(120));
-    double both = 0, red = 0, blue = 0;
-    for (int i = 0; i < 120 * 120; ++i) {
-      const Eigen::Array4d light =
-          texture.At((i % 120 - 59.5) * 0.02, (i / 120 - 59.5) * 0.02).cast<double>() - 0.5;
-      both += light(0) * light(2);
-      red += light(0) * light(0);
-      blue += light(2) * light(2);
-    }
-    EXPECT_LT(std::abs(both) / std::sqrt(red * blue), 0.35) << TextureKindName(kind);
-  }
-}
-
-TEST(SceneTextureTest, CheckerboardHasItsSquaresAroundTheAxis) {
-  TextureOptions options;
-  options.kind = TextureKind::kCheckerboard;
-  options.contrast = 0.5;
-  options.feature_size_px = 10;
-  const SceneTexture texture = DrawTexture(options, SquareRequest(100));
-  for (int row = -4; row < 4; ++row) {
-    for (int column = -4; column < 4; ++column) {
-      const double expected = (row + column) % 2 == 0 ? 0.75 : 0.25;
-      EXPECT_NEAR(texture.At((column + 0.5) * 0.2, (row + 0.5) * 0.2)(0), expected, 0.01)
-          << row << " " << column;
-      EXPECT_NEAR(texture.At((column + 0.5) * 0.2, row * 0.2)(0), 0.5, 0.01);
-    }
-  }
-}
-
-TEST(SceneTextureTest, PictureStandsUprightAndIsMirroredBeyondItsSides) {
-  // Red, green; blue, white.
-  LinearPicture picture{16, 16, 3, {}};
-  for (int i = 0; i < 256; ++i) {
-    const bool right = i % 16 >= 8;
-    const bool below = i / 16 >= 8;
-    for (const bool light : {right == below, right, below}) picture.values.push_back(light);
-  }
-  TextureOptions options;
-  options.kind = TextureKind::kPicture;
-  options.picture_path = "quarters.png";
-  options.feature_size_px = 80;
-  TextureRequest request = SquareRequest(60);
-  request.centre_mm = {0.3, -0.1};
-  const SceneTexture texture = DrawTexture(options, request, picture);
-  const auto at = [&](double x_px, double y_px) {
-    return Eigen::Array3f(texture.At(0.3 + 0.02 * x_px, -0.1 + 0.02 * y_px).head<3>());
-  };
-  const Eigen::Array3f red(1, 0, 0), green(0, 1, 0), blue(0, 0, 1), white(1, 1, 1);
-  EXPECT_LT((at(-36, -36) - red).abs().maxCoeff(), 0.05);
-  EXPECT_LT((at(36, -36) - green).abs().maxCoeff(), 0.05);
-  EXPECT_LT((at(-36, 36) - blue).abs().maxCoeff(), 0.05);
-  EXPECT_LT((at(36, 36) - white).abs().maxCoeff(), 0.05);
-  EXPECT_LT((at(44, -36) - green).abs().maxCoeff(), 0.05);
-  EXPECT_LT((at(80 + 36, -36) - red).abs().maxCoeff(), 0.05);
-  EXPECT_LT((at(36, 80 + 36) - green).abs().maxCoeff(), 0.05);
-  // Halfway between two of its pixels.
-  EXPECT_LT((at(0, -36) - Eigen::Array3f(0.5f, 0.5f, 0)).abs().maxCoeff(), 0.05);
-
-  EXPECT_THAT(ErrorOf([&] { DrawTexture(options, request); }),
-              HasSubstr("texture.picture 'quarters.png' is empty"));
-}
-
-// A picture of waves, four of its pixels to one px, so that nothing is resampled: they pass the
-// limit of the band with the fading alone, whatever the lines between the samples take.
-TEST(SceneTextureTest, DetailBelowTheLimitKeepsItsAmplitude) {
-  for (const int period : {10, 20}) {  // of its pixels
-    LinearPicture picture{320, 320, 1, {}};
-    for (int i = 0; i < 320 * 320; ++i) {
-      picture.values.push_back(
-          static_cast<float>(0.5 + 0.4 * std::cos(2 * kPi * (i % 320 + 0.5) / period)));
-    }
-    TextureOptions options;
-    options.kind = TextureKind::kPicture;
-    options.feature_size_px = 80;
-    const SceneTexture texture = DrawTexture(options, SquareRequest(60), picture);
-    double amplitude = 0;
-    for (int i = 0; i < 4000; ++i) {  // 40 px from the left side, whole periods
-      const double x_px = (i + 0.5) / 100;
-      amplitude += static_cast<double>(texture.At((x_px - 40) * 0.02, 0.003)(2)) *
-                   std::cos(2 * kPi * 4 * x_px / period) / 2000;
-    }
-    EXPECT_NEAR(amplitude, 0.4 * GaussTransfer(0.5, 4.0 / period), 5e-4) << period;
-  }
-}
-
-TEST(SceneTextureTest, RefusesFeaturesThatCannotBeShown) {
-  const auto message = [](TextureKind kind, double size_px) {
-    TextureOptions options;
-    options.kind = kind;
-    options.feature_size_px = size_px;
-    TextureRequest request = SquareRequest(60);
-    request.coarsest_pixel_mm = 0.025;
-    return ErrorOf([&] { DrawTexture(options, request); });
-  };
-  EXPECT_THAT(message(TextureKind::kSine, 2.4), HasSubstr("must be at least 2.5 here"));
-  EXPECT_EQ(message(TextureKind::kSine, 2.51), "(no error)");
-  EXPECT_THAT(message(TextureKind::kNoise, 1.9), HasSubstr("of noise it must be from 2 to 1000"));
-  EXPECT_THAT(message(TextureKind::kDeadLeaves, 0.4), HasSubstr("must be from 0.5 to"));
-  EXPECT_THAT(message(TextureKind::kCheckerboard, 0.9), HasSubstr("must be from 1 to"));
-  EXPECT_THAT(message(TextureKind::kCheckerboard, 2000), HasSubstr("must be from 1 to"));
-}
-
 // ----------------------------------------------------------------------------------- photograph
 
 TEST(SceneSimulatorTest, UniformSceneGivesAUniformPicture) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
     // In front and behind look alike where both have the same light.
     const SceneSimulator simulator(
-        SceneOf(MacroCamera(20, 16, psf, 0.5),
-                {Uniform(310, 0.4), WithRectangle(Uniform(294, 0.4), 9, 8, 6, 5)}),
+        SceneOf(MacroScene::Camera(20, 16, psf, 0.5),
+                {MacroScene::Uniform(310, 0.4),
+                 WithRectangle(MacroScene::Uniform(294, 0.4), 9, 8, 6, 5)}),
         {});
     const LinearPicture picture = simulator.RenderNoiseless({1, {}});
     ASSERT_EQ(picture.values.size(), 20u * 16 * 3);
@@ -411,7 +126,8 @@ TEST(SceneSimulatorTest, UniformSceneGivesAUniformPicture) {
 TEST(SceneSimulatorTest, FallOffIsThatOfTheFormula) {
   constexpr double kFastRadiusMm = 30;
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
-    SceneSimulationOptions options = SceneOf(MacroCamera(16, 12, psf, 0), {Uniform(330, 1)});
+    SceneSimulationOptions options =
+        SceneOf(MacroScene::Camera(16, 12, psf, 0), {MacroScene::Uniform(330, 1)});
     options.effects.without = {Effect::kDiffraction};
     options.camera.sensor.pixel_pitch_mm = 2;
     options.camera.lens.aperture_radius_mm = kFastRadiusMm;
@@ -461,7 +177,8 @@ TEST(SceneSimulatorTest, SineHasTheModulationOfItsBlur) {
         for (const auto& [period_px, angle_deg] :
              {std::pair{7.0, 0.0}, {12.0, 60.0}, {4.1, 90.0}}) {
           SceneSimulationOptions options =
-              SceneOf(MacroCamera(20, 16, psf, floor_px), {Sine(depth_mm, period_px, angle_deg)});
+              SceneOf(MacroScene::Camera(20, 16, psf, floor_px),
+                      {MacroScene::Sine(depth_mm, period_px, angle_deg)});
           options.rays_per_pixel = 1000;
           const SceneSimulator simulator(options, {});
           const Eigen::Vector2d f =
@@ -470,9 +187,9 @@ TEST(SceneSimulatorTest, SineHasTheModulationOfItsBlur) {
           const Wave wave = FitWave(simulator.RenderNoiseless({1, {}}),
                                     options.camera.sensor.principal_point_px, f);
           const double sigma_px = DefocusPx(depth_mm);
-          const double defocus = psf == Psf::kGaussian ? GaussTransfer(sigma_px, f.norm())
-                                                       : DiscTransferSum(2 * sigma_px, f.norm());
-          const double expected = 0.5 * 0.8 * defocus * GaussTransfer(floor_px, f.norm()) *
+          const double defocus = psf == Psf::kGaussian ? GaussianTransfer(sigma_px, f.norm())
+                                                       : DiscTransfer(2 * sigma_px, f.norm());
+          const double expected = 0.5 * 0.8 * defocus * GaussianTransfer(floor_px, f.norm()) *
                                   BoxTransfer(f.x()) * BoxTransfer(f.y());
           EXPECT_NEAR(wave.mean, 0.5, 5e-4);
           EXPECT_NEAR(wave.cosine, expected, 0.0025) << depth_mm << " " << period_px;
@@ -487,7 +204,7 @@ TEST(SceneSimulatorTest, SineHasTheModulationOfItsBlur) {
 // from one of fifteen times as many by less than half a grey level, rms.
 TEST(SceneSimulatorTest, SixHundredRaysAreEnough) {
   SceneSimulationOptions options =
-      SceneOf(MacroCamera(24, 20, Psf::kGaussian, 0.5),
+      SceneOf(MacroScene::Camera(24, 20, Psf::kGaussian, 0.5),
               {Leaves(1 / (2 / kFocusMm - 1 / DepthOfShift(3)), 2),
                WithRectangle(Leaves(DepthOfShift(3), 2), 8, 9, 12, 11)});
   const LinearPicture picture = SceneSimulator(options, {}).RenderNoiseless({2, {}});
@@ -506,9 +223,10 @@ TEST(SceneSimulatorTest, EdgeIsAsWideAsTheBlurOfTheNearerLayer) {
   for (const bool focused : {false, true}) {
     const double front_mm = focused ? kFocusMm : near_mm;
     const double back_mm = focused ? 306 : kFocusMm;
-    SceneSimulationOptions options = SceneOf(
-        MacroCamera(40, 9, Psf::kGaussian, 0.4),
-        {WithRectangle(Uniform(front_mm, 0.9), 20.3 + 100, 4, 200, 400), Uniform(back_mm, 0.1)});
+    SceneSimulationOptions options =
+        SceneOf(MacroScene::Camera(40, 9, Psf::kGaussian, 0.4),
+                {WithRectangle(MacroScene::Uniform(front_mm, 0.9), 20.3 + 100, 4, 200, 400),
+                 MacroScene::Uniform(back_mm, 0.1)});
     options.rays_per_pixel = 3000;
     const SceneSimulator simulator(options, {});
     const LinearPicture picture = simulator.RenderNoiseless({1, {}});
@@ -524,8 +242,8 @@ TEST(SceneSimulatorTest, EdgeIsAsWideAsTheBlurOfTheNearerLayer) {
 
 TEST(SceneSimulatorTest, ViewsOfAFrontoParallelPlaneAreDisplacedByTheDisparity) {
   for (const double depth_mm : {DepthOfShift(1.5), kFocusMm, 304.0}) {
-    const SceneSimulationOptions options =
-        SceneOf(MacroCamera(24, 20, Psf::kGaussian, 0), {Sine(depth_mm, 16, 30)});
+    const SceneSimulationOptions options = SceneOf(MacroScene::Camera(24, 20, Psf::kGaussian, 0),
+                                                   {MacroScene::Sine(depth_mm, 16, 30)});
     const LightField light_field = SceneSimulator(options, {}).RenderLightField(4, 3, {1, {}});
     const LightFieldGrid grid = DefaultGrid(options.camera, 4, 3);
     const Eigen::Vector2d f = Eigen::Vector2d(std::cos(kPi / 6), std::sin(kPi / 6)) / 16;
@@ -549,7 +267,7 @@ TEST(SceneSimulatorTest, ViewsOfAFrontoParallelPlaneAreDisplacedByTheDisparity) 
 TEST(SceneSimulatorTest, WholeShiftsRepeatTheCentreViewOfATexture) {
   const double depth_mm = DepthOfShift(2);
   const SceneSimulator simulator(
-      SceneOf(MacroCamera(30, 24, Psf::kDisc, 0.5), {Leaves(depth_mm, 2)}), {});
+      SceneOf(MacroScene::Camera(30, 24, Psf::kDisc, 0.5), {Leaves(depth_mm, 2)}), {});
   const LinearPicture centre = simulator.RenderView({0, 0}, {1, {}});
   // Three px to the left and two down: this view's (x, y) is the centre's (x + 3, y - 2).
   const LinearPicture view =
@@ -568,10 +286,11 @@ TEST(SceneSimulatorTest, WholeShiftsRepeatTheCentreViewOfATexture) {
 // blurred as that, and is seen in the layer alone.
 TEST(SceneSimulatorTest, GlossShowsItsLampAtTheDepthOfTheMirrorImage) {
   const double image_depth_mm = DepthOfShift(-1.5);
-  SceneLayer glossy = WithRectangle(Uniform(kFocusMm, 0.25), 19.5, 19.5, 34, 34);
+  SceneLayer glossy = WithRectangle(MacroScene::Uniform(kFocusMm, 0.25), 19.5, 19.5, 34, 34);
   glossy.gloss.push_back({image_depth_mm, {20, 19}, 2, 0.5});
-  const Camera camera = MacroCamera(40, 40, Psf::kGaussian, 0);
-  const SceneSimulator simulator(SceneOf(camera, {glossy, Uniform(kFocusMm + 1, 0.1)}), {});
+  const Camera camera = MacroScene::Camera(40, 40, Psf::kGaussian, 0);
+  const SceneSimulator simulator(SceneOf(camera, {glossy, MacroScene::Uniform(kFocusMm + 1, 0.1)}),
+                                 {});
   struct Spot {
     double sum = 0, x = 0, y = 0, variance_x = 0;
   };
@@ -616,7 +335,7 @@ INSTANTIATE_TEST_SUITE_P(UvDepths, LightFieldPlanesTest, ::testing::Values(0, 15
 
 TEST_P(LightFieldPlanesTest, SlantedPlaneIsMetWhereTheGridsRaysMeetIt) {
   SceneSimulationOptions options =
-      SceneOf(MacroCamera(44, 30, Psf::kGaussian, 0), {Sine(297, 40, 25)});
+      SceneOf(MacroScene::Camera(44, 30, Psf::kGaussian, 0), {MacroScene::Sine(297, 40, 25)});
   options.uv_depth_mm = GetParam();
   const Eigen::Vector2d slope(3, -2);
   options.layers[0].plane.slope = slope;
@@ -655,7 +374,7 @@ TEST_P(LightFieldPlanesTest, SlantedPlaneIsMetWhereTheGridsRaysMeetIt) {
 
 TEST(SceneSimulatorTest, ViewsBeyondTheApertureAreRefused) {
   SceneSimulationOptions options =
-      SceneOf(MacroCamera(44, 30, Psf::kGaussian, 0), {Sine(297, 40, 25)});
+      SceneOf(MacroScene::Camera(44, 30, Psf::kGaussian, 0), {MacroScene::Sine(297, 40, 25)});
   options.uv_depth_mm = 299.9;
   const SceneSimulator simulator(options, {});
   EXPECT_THAT(ErrorOf([&] {
@@ -671,8 +390,9 @@ TEST(SceneSimulatorTest, ViewsBeyondTheApertureAreRefused) {
 TEST(SceneSimulatorTest, EdgesStandWhereTheNearerLayersDisparityPutsThem) {
   const double near_mm = DepthOfShift(2);
   const SceneSimulationOptions options =
-      SceneOf(MacroCamera(48, 40, Psf::kGaussian, 0),
-              {Uniform(305, 0), WithRectangle(Uniform(near_mm, 1), 24.3, 19.1, 17.5, 12.25)});
+      SceneOf(MacroScene::Camera(48, 40, Psf::kGaussian, 0),
+              {MacroScene::Uniform(305, 0),
+               WithRectangle(MacroScene::Uniform(near_mm, 1), 24.3, 19.1, 17.5, 12.25)});
   const LightField light_field = SceneSimulator(options, {}).RenderLightField(3, 3, {2, {}});
   const LightFieldGrid grid = DefaultGrid(options.camera, 3, 3);
   const double d_px = grid.u_step_mm * ShiftPxPerMm(near_mm);
@@ -699,8 +419,8 @@ TEST(SceneSimulatorTest, EdgesStandWhereTheNearerLayersDisparityPutsThem) {
 
 TEST(SceneSimulatorTest, DiscAndMillimetresDescribeTheSamePart) {
   const double depth_mm = 296;
-  const Camera camera = MacroCamera(40, 32, Psf::kGaussian, 0);
-  SceneLayer in_px = Uniform(depth_mm, 1);
+  const Camera camera = MacroScene::Camera(40, 32, Psf::kGaussian, 0);
+  SceneLayer in_px = MacroScene::Uniform(depth_mm, 1);
   in_px.outline.shape = OutlineOptions::Shape::kDisc;
   in_px.outline.centre = {17.2, 15.6};
   in_px.outline.radius = 9.5;
@@ -710,9 +430,9 @@ TEST(SceneSimulatorTest, DiscAndMillimetresDescribeTheSamePart) {
   in_mm.outline.centre = px_mm * (in_px.outline.centre - camera.sensor.principal_point_px);
   in_mm.outline.radius = px_mm * 9.5;
   const Eigen::Vector2d aperture_mm(1.3, -0.9);
-  const LinearPicture a = SceneSimulator(SceneOf(camera, {in_px, Uniform(302, 0)}), {})
+  const LinearPicture a = SceneSimulator(SceneOf(camera, {in_px, MacroScene::Uniform(302, 0)}), {})
                               .RenderView(aperture_mm, {1, {}});
-  const LinearPicture b = SceneSimulator(SceneOf(camera, {Uniform(302, 0), in_mm}), {})
+  const LinearPicture b = SceneSimulator(SceneOf(camera, {MacroScene::Uniform(302, 0), in_mm}), {})
                               .RenderView(aperture_mm, {1, {}});
   EXPECT_LT(LargestDifference(a, b), 0.03);
   double area = 0, x_sum = 0, y_sum = 0;
@@ -734,9 +454,9 @@ TEST(SceneSimulatorTest, PhotographIsTheMeanOfItsViews) {
   SceneLayer back = Leaves(304, 2);
   back.plane.slope = {1, -2};
   SceneSimulationOptions options =
-      SceneOf(MacroCamera(14, 11, Psf::kGaussian, 0.5),
+      SceneOf(MacroScene::Camera(14, 11, Psf::kGaussian, 0.5),
               {back, WithRectangle(Leaves(DepthOfShift(2), 2), 4, 5, 7, 6),
-               WithRectangle(Uniform(299, 0.9), 10, 8, 5, 5)});
+               WithRectangle(MacroScene::Uniform(299, 0.9), 10, 8, 5, 5)});
   options.rays_per_pixel = 5000;
   const SceneSimulator simulator(options, {});
   const LinearPicture picture = simulator.RenderNoiseless({2, {}});
@@ -764,7 +484,8 @@ TEST(SceneSimulatorTest, PhotographIsTheMeanOfItsViews) {
 
 TEST(SceneSimulatorTest, LightFieldStandsOnTheDefaultGrid) {
   for (const Psf psf : {Psf::kGaussian, Psf::kDisc}) {
-    SceneSimulationOptions options = SceneOf(MacroCamera(12, 10, psf, 0.5), {Leaves(302, 2)});
+    SceneSimulationOptions options =
+        SceneOf(MacroScene::Camera(12, 10, psf, 0.5), {Leaves(302, 2)});
     options.camera.sensor.transfer = TransferCurve::Srgb();
     const SceneSimulator simulator(options, {});
     const LightField light_field = simulator.RenderLightField(5, 3, {1, {}});
@@ -796,14 +517,14 @@ TEST(SceneSimulatorTest, LightFieldStandsOnTheDefaultGrid) {
 // ---------------------------------------------------------------------------------------- depth
 
 TEST(SceneSimulatorTest, DepthIsThatOfTheNearestLayerOnEachChiefRay) {
-  SceneLayer left = Uniform(300, 0.2), right = Uniform(300, 0.4);
+  SceneLayer left = MacroScene::Uniform(300, 0.2), right = MacroScene::Uniform(300, 0.4);
   left.plane.slope = {4, 0};  // they cross in the column of the principal point
   right.plane.slope = {-4, 1};
-  SceneLayer coin = Uniform(290, 0.6);
+  SceneLayer coin = MacroScene::Uniform(290, 0.6);
   coin.outline.shape = OutlineOptions::Shape::kDisc;
   coin.outline.centre = {30, 12};
   coin.outline.radius = 6.2;
-  const Camera camera = MacroCamera(50, 40, Psf::kGaussian, 0.5);
+  const Camera camera = MacroScene::Camera(50, 40, Psf::kGaussian, 0.5);
   std::vector<SceneLayer> layers = {left, right, coin};
   std::vector<float> first;
   for (int turn = 0; turn < 3; ++turn) {
@@ -837,7 +558,7 @@ TEST(SceneSimulatorTest, DepthIsThatOfTheNearestLayerOnEachChiefRay) {
 
 SceneSimulationOptions NoisyScene() {
   SceneSimulationOptions options =
-      SceneOf(MacroCamera(40, 30, Psf::kGaussian, 0.5),
+      SceneOf(MacroScene::Camera(40, 30, Psf::kGaussian, 0.5),
               {Leaves(303, 2), WithRectangle(Leaves(297, 2), 20, 15, 15, 11)});
   options.rays_per_pixel = 64;
   options.noise_sigma_grey_levels = 2;
@@ -986,7 +707,7 @@ TEST(SceneSimulatorTest, RefusesScenesThatCannotBe) {
 }
 
 TEST(SceneSimulatorTest, EveryLayerIsPaintedAnew) {
-  const Camera camera = MacroCamera(24, 24, Psf::kGaussian, 0);
+  const Camera camera = MacroScene::Camera(24, 24, Psf::kGaussian, 0);
   SceneSimulationOptions options = SceneOf(camera, {Leaves(300, 2), Leaves(310, 2)});
   const LinearPicture first = SceneSimulator(options, {}).RenderView({0, 0}, {1, {}});
   options.layers[0].plane.depth_mm = 320;
