@@ -111,7 +111,7 @@ void ExpectCancelledAtEachStep(
   }
 }
 
-TEST(CancelledEstimate, OfAScene) {
+TEST(CancelledEstimate, TheSceneSolverStops) {
   const EstimateInput input = RandomInput(40, 36, 0.5F, 1.5F);
   for (const Prior prior : {Prior::kRidge, Prior::kTotalVariation, Prior::kPatches}) {
     ExpectCancelledAtEachStep([&](const std::function<void(int, int)>& progress) {
@@ -125,7 +125,7 @@ TEST(CancelledEstimate, OfAScene) {
   }
 }
 
-TEST(CancelledEstimate, ByBlocks) {
+TEST(CancelledEstimate, TheBlockSolverStops) {
   const EstimateInput input = RandomInput(40, 36, 0.5F, 1.5F);
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
   ExpectCancelledAtEachStep([&](const std::function<void(int, int)>& progress) {
@@ -138,7 +138,7 @@ TEST(CancelledEstimate, ByBlocks) {
   });
 }
 
-TEST(CancelledEstimate, ByTheFunctionalAndOnTheGrid) {
+TEST(CancelledEstimate, TheFunctionalAndTheGridSolverStop) {
   const EstimateInput input = RandomInput(40, 36, 0.5F, 1.5F);
   for (const auto& solve : {EstimateFunctional, EstimateOnGrid}) {
     ExpectCancelledAtEachStep([&](const std::function<void(int, int)>& progress) {

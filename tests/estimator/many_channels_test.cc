@@ -60,7 +60,7 @@ void ExpectBandByBand(const Estimator& estimate, double accuracy) {
   }
 }
 
-TEST(ManyChannels, ByBlocks) {
+TEST(ManyChannels, TheBlockSolverTakesEachBandAlone) {
   const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
   ExpectBandByBand(
       [&](const EstimateInput& input) {
@@ -70,7 +70,7 @@ TEST(ManyChannels, ByBlocks) {
       0);
 }
 
-TEST(ManyChannels, OfTheFunctional) {
+TEST(ManyChannels, TheFunctionalTakesEachBandAlone) {
   for (const auto estimate : {EstimateFunctional, EstimateOnGrid}) {
     ExpectBandByBand(
         [&](const EstimateInput& input) {
@@ -81,12 +81,12 @@ TEST(ManyChannels, OfTheFunctional) {
   }
 }
 
-TEST(ManyChannels, WarpedByTheDepth) {
+TEST(ManyChannels, WarpingTakesEachBandAlone) {
   ExpectBandByBand([](const EstimateInput& input) { return WarpedLightField(input, true, 2); }, 0);
 }
 
 // With equal weights of all pixels, and a prior that does not tie the bands together.
-TEST(ManyChannels, OfTheScene) {
+TEST(ManyChannels, TheSceneSolverTakesEachBandAlone) {
   ExpectBandByBand(
       [](const EstimateInput& input) {
         SceneOptions options;
@@ -103,7 +103,7 @@ TEST(ManyChannels, OfTheScene) {
       1e-6);
 }
 
-TEST(ManyChannels, OfTheSceneWithItsDefaults) {
+TEST(ManyChannels, TheSceneSolverWithItsDefaultsKeepsSixBands) {
   const EstimateInput input = InputOf(6);
   SceneSummary summary;
   SceneMaps maps;

@@ -251,19 +251,19 @@ TEST(SolverAgreement, TheClosedFormIsNotTheWarpedPicture) {
   EXPECT_GT(LargestDifference(functional, scene), 0.005);
 }
 
-TEST(SolverAgreement, OfTheFunctionalInDouble) {
+TEST(SolverAgreement, TheFunctionalInDoubleIsTheClosedForm) {
   std::vector<Way> ways = FunctionalWays(true);
   for (Way& way : BlockWays(1000)) ways.push_back(std::move(way));
   ExpectAll(ways, ViewsByWaves(EvenAtTheBorders(), RaysOfTheFunctional), kStored);
 }
 
-TEST(SolverAgreement, OfTheFunctionalInFloat) {
+TEST(SolverAgreement, TheFunctionalInFloatIsTheClosedForm) {
   ExpectAll(FunctionalWays(false), ViewsByWaves(EvenAtTheBorders(), RaysOfTheFunctional), kFloat);
 }
 
 // Light fields are stored in float; the radiance of the scene's points, which the middle view
 // shows, is solved for in double.
-TEST(SolverAgreement, OfTheRadianceInDouble) {
+TEST(SolverAgreement, TheRadianceInDoubleIsTheClosedForm) {
   const EstimateInput input = EvenAtTheBorders();
   const Eigen::MatrixXd expected = ExactViewsByWaves(input, RaysOfTheScene)[kViews * kViews / 2];
   const auto projection = MakeSceneProjection<double>(input.disparity, input.weights, {});
@@ -287,7 +287,7 @@ TEST(SolverAgreement, OfTheRadianceInDouble) {
   EXPECT_LT(largest, 1e-10);
 }
 
-TEST(SolverAgreement, OfTheScene) {
+TEST(SolverAgreement, TheSceneSolverIsTheClosedForm) {
   const std::vector<float> expected = ViewsByWaves(EvenAtTheBorders(), RaysOfTheScene);
   ExpectAll({SceneWay(Prior::kRidge, true)}, expected, kStored);
   // A machine on which tests run has an OpenCL device: none is a failure here.
@@ -296,7 +296,7 @@ TEST(SolverAgreement, OfTheScene) {
             expected, kFloat);
 }
 
-TEST(SolverAgreement, OfEachWithItselfOnOneTwoAndFourThreads) {
+TEST(SolverAgreement, EachSolverAgreesWithItselfOnOneTwoAndFourThreads) {
   std::vector<Way> ways = BlockWays(16);
   for (const bool double_precision : {true, false}) {
     for (Way& way : FunctionalWays(double_precision)) ways.push_back(std::move(way));

@@ -73,7 +73,7 @@ TEST(SolveFocus, AWrongReadingIsNamedWithWhatItIsOffBy) {
 }
 
 // A blur that no reading within the sweep explains.
-TEST(SolveFocus, ADamagedFrameIsNotSaidToHaveAWrongReading) {
+TEST(SolveFocus, ADamagedFrameIsNotReportedAsAWrongReading) {
   FocusCase c = Texture();
   c.evidence.setup.meters[0].variances_px2[13] += 60;
   c.Solve();
@@ -240,7 +240,7 @@ TEST(SolveFocus, TheErrorOfNoBlurIsBounded) {
 }
 
 // Readings that scatter: what each is believed to be off by is told.
-TEST(SolveFocus, ReadingErrorsAreTold) {
+TEST(SolveFocus, ReadingErrorsAreReported) {
   BlurBench bench = thicklens::testing::WithReadings(0.1, 1e-5);
   bench.noise = 0;
   FocusCase c = FocusCase(bench).WithTexture(kErrorPx2).WithTrueFloor();
@@ -255,7 +255,7 @@ TEST(SolveFocus, ReadingErrorsAreTold) {
   }
 }
 
-TEST(SolveFocus, FramesThatNoMeterHasAreSaidToBeUnused) {
+TEST(SolveFocus, FramesThatNoMeterHasAreReportedAsUnused) {
   FocusCase c = Texture();
   Remove(0, &c.evidence.setup.meters[0]);
   Remove(1, &c.evidence.setup.meters[0]);

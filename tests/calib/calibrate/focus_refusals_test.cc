@@ -94,7 +94,7 @@ TEST(SolveFocus, AFloorAboveTheBlursCurvatureIsRefused) {
   EXPECT_FALSE(c.calibration.blur.done);
 }
 
-TEST(SolveFocus, AScaleThatDoesNotChangeIsSaidWithTheReason) {
+TEST(SolveFocus, AScaleThatDoesNotChangeIsPartOfTheReason) {
   FocusCase c = FocusCase().WithTexture(0.01).WithFloor(12, 0);
   c.calibration.scale.kind = ScaleKind::kConstant;
   c.calibration.scale.message = "the image scale is constant";

@@ -311,7 +311,7 @@ TEST(SolveFocus, TheBenchZerosErrorIsInTheCovariance) {
 
 // ---- what is told of the blur ----
 
-TEST(SolveFocus, TellsWhatTheMetersSaid) {
+TEST(SolveFocus, MessagesOfTheMetersAreKept) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
   c.evidence.gaussian_misfit = 1.2;
   c.evidence.disc_misfit = 1.3;

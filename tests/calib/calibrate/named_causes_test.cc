@@ -149,7 +149,7 @@ TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
 }
 
 // 1:1, 3 mm of sweep at 200 mm: the scale fixes the zero to some millimetres only.
-TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusTold) {
+TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusReported) {
   model::SweepSimulationOptions options = SweepCase("ii", 384, 1);
   options.camera.lens = testing::ThinLens(100, 17.86);
   options.camera.sensor.pixel_pitch_mm = 0.0043;
@@ -197,7 +197,7 @@ TEST(Reason, AFlickeringLampIsNamedWhereFramesDoNotRegister) {
                           Not(HasSubstr("knife-edge or"))));
 }
 
-TEST(Reason, AGoodSweepIsToldNoCause) {
+TEST(Reason, AGoodSweepHasNoCause) {
   const Calibration c = Measured(Good());
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   EXPECT_THAT(c.warnings, Each(Not(AnyOf(HasSubstr("bands"), HasSubstr("darker"),

@@ -56,7 +56,7 @@ void Expose(SimulatedSweep* s, double gain, int first, int last) {
   }
 }
 
-TEST(Exposure, AnOverExposedSweepIsToldToLowerIt) {
+TEST(Exposure, AnOverExposedSweepGetsTheAdviceToLowerIt) {
   for (const bool zero_is_known : {true, false}) {
     for (const int last : {-1, 2, 6}) {  // none, three or seven good frames, away from focus
       SCOPED_TRACE(last);
@@ -84,7 +84,7 @@ TEST(Exposure, AResultFromTheFewGoodFramesSaysSo) {
                     HasSubstr("the results come from the others alone")));
 }
 
-TEST(Exposure, ADarkSweepIsToldToRaiseIt) {
+TEST(Exposure, ADarkSweepGetsTheAdviceToRaiseIt) {
   SimulatedSweep s = Good();
   Expose(&s, 0.01, 0, 1);
   const Calibration c = Measured(s);

@@ -82,7 +82,7 @@ TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
 
 class StraightLaw : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(StraightLaw, SlowIsNotSaidToBend) {
+TEST_P(StraightLaw, SlowAStraightLawHasNoNoteOfABend) {
   for (const std::uint64_t seed : {1U, 2U}) {
     SimulatedSweep s = Simulate(SweepCase(GetParam(), 256, seed));
     GiveFloor(&s);

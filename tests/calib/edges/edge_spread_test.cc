@@ -121,7 +121,7 @@ TEST(MeasureEdgeSpread, KnowsADiscFromAGaussian) {
   EXPECT_TRUE(!wrong || wrong->chi2_per_dof > 1.3);
 }
 
-TEST(MeasureEdgeSpread, TellsXFromY) {
+TEST(MeasureEdgeSpread, XAndYAreDistinguished) {
   const DrawnBlur blur{1.4, 2.1, 0};
   const auto x = MeasureEdgeSpread(EightBit(DrawnScene(128, blur, Step(4, 63.5, 0.2, 0.8)), 3),
                                    Psf::kGaussian, 0);

@@ -104,7 +104,7 @@ TEST(MeasureBlur, InStrongBlurTheLastPassIsLaidOutForTheTruth) {
 
 // A frame that was gated and one that could not be registered: every sample is still said of its
 // own frame.
-TEST(MeasureBlur, SamplesAreOfTheFramesThatTheyAreSaidOf) {
+TEST(MeasureBlur, SamplesBelongToTheFramesThatTheyName) {
   MeasuredSweep m = Measured(Leaves());
   m.task->frames.erase(m.task->frames.begin() + 2);
   m.task->scales.erase(m.task->scales.begin() + 5);
@@ -211,7 +211,7 @@ TEST(MeasureBlur, TooFewFramesWithAnEdgeAreNoMeter) {
 
 // ---- what cannot be measured ----
 
-TEST(MeasureBlur, FewerThanFiveRegisteredFramesAreToldOf) {
+TEST(MeasureBlur, FewerThanFiveRegisteredFramesAreReported) {
   MeasuredSweep m = Measured(Leaves(), SweepTarget::kTexture);
   m.task->scales = {m.task->scales.begin() + 6, m.task->scales.begin() + 10};
   const BlurEvidence evidence = m.Measure();
@@ -220,7 +220,7 @@ TEST(MeasureBlur, FewerThanFiveRegisteredFramesAreToldOf) {
   EXPECT_THAT(evidence.message, HasSubstr("too few frames see enough of the same target"));
 }
 
-TEST(MeasureBlur, FramesThatDoNotOverlapAreToldOf) {
+TEST(MeasureBlur, FramesThatDoNotOverlapAreReported) {
   MeasuredSweep m = Measured(Leaves(), SweepTarget::kTexture);
   for (std::size_t i = 0; i < m.task->scales.size(); ++i)
     m.task->scales[i].registration.shift_px.x() = 90.0 * static_cast<double>(i);

@@ -113,7 +113,7 @@ TEST(MeasureBlur, TheFloorThatIsAssumedIsTheOneThatIsKnown) {
 }
 
 // What the spectral meter is told of every frame, by hand.
-TEST(MeasureBlur, TheSpectralMeterIsToldWhatToExpect) {
+TEST(MeasureBlur, TheSpectralMeterGetsTheExpectedBlur) {
   Unread u(4);  // too few to be measured
   u.sweep.roi = {100, 80, 320, 200};
   u.sweep.floor.given_px = model::Estimate{0.6, 0};

@@ -219,7 +219,7 @@ TEST(FitScaleLaw, ReadingsOfTheSweepBesideOtherFramesAreRecognised) {
 
 // Readings on a line but for errors that nobody stated. What is told is about their size, and where
 // it is stated the law holds.
-TEST(FitScaleLaw, CoarseReadingsAreToldToStateTheirError) {
+TEST(FitScaleLaw, CoarseReadingsGetTheAdviceToStateTheirError) {
   constexpr double kSigmaMm = 3;
   int told = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
@@ -239,7 +239,7 @@ TEST(FitScaleLaw, CoarseReadingsAreToldToStateTheirError) {
 }
 
 // A third of the readings far off is no coarse scale.
-TEST(FitScaleLaw, ManyWrongReadingsAreNotToldToBeCoarse) {
+TEST(FitScaleLaw, ManyWrongReadingsAreNotReportedAsCoarse) {
   auto samples = Samples(20, BenchDirection::kAway, 30, 0.05, 3);
   for (std::size_t i = 0; i < samples.size(); i += 3) samples[i].reading_mm += 25 + 2.0 * double(i);
   const ScaleLaw law = FitScaleLaw(samples, 15, 0, BenchDirection::kAway);

@@ -135,7 +135,7 @@ TEST(RejectWrongReadings, TwoWrongReadingsAreNotASwap) {
     EXPECT_THAT(bench.frames[i].rejection, Not(HasSubstr("swapped")));
 }
 
-TEST(RejectWrongReadings, TwoSwappedPairsAreToldApart) {
+TEST(RejectWrongReadings, TwoSwappedPairsAreDistinguished) {
   Bench bench;
   bench.Swap(2, 9);
   bench.Swap(5, 14);
@@ -194,7 +194,7 @@ TEST(RejectWrongReadings, WithoutALawNoReadingIsJudged) {
 
 TEST(ReasonAgainstScales, AGoodSweepHasNone) { EXPECT_FALSE(Bench().Reason()); }
 
-TEST(ReasonAgainstScales, OnePictureForAllIsToldAsThat) {
+TEST(ReasonAgainstScales, OnePictureForAllFramesIsRecognised) {
   Bench bench;
   for (FrameMeasurement& frame : bench.frames) frame.statistics.content_hash = 7;
   bench.law.kind = ScaleKind::kConstant;
@@ -236,7 +236,7 @@ ScaleLaw StarLaw() {
   return FitScaleLaw(bench.samples, 12, 0.05, BenchDirection::kAway);
 }
 
-TEST(ReasonOfUnknownOffset, TellsWhatToDo) {
+TEST(ReasonOfUnknownOffset, TheReasonHasAdvice) {
   Bench bench;
   bench.law.message = "the image scale does not change";
   EXPECT_EQ(ReasonOfUnknownOffset(bench.law),

@@ -153,7 +153,7 @@ TEST(ScaleCauses, ReversedReadingsNameTheDirectionAlone) {
 }
 
 // At a magnification of 1 the blur grows alike whether the lens or the target moves.
-TEST(ScaleCauses, WhereLensAndTargetCannotBeToldApartBothAreNamed) {
+TEST(ScaleCauses, LensAndTargetAreBothNamedWhereTheyLookAlike) {
   FocusSweep sweep = Bench();
   const auto samples = MovingTarget(&sweep, 100, 0.8, [](double z) { return 500 - z; });
   EXPECT_THAT(ReasonOf(samples, sweep),
@@ -192,7 +192,7 @@ TEST(ScaleCauses, AFocusMotorInDioptresIsRecognised) {
 }
 
 // The same of a lens of 50 mm could be a target whose readings are in centimetres.
-TEST(ScaleCauses, WhatUnitAndLensExplainAlikeIsSaidToBeEither) {
+TEST(ScaleCauses, ACauseThatUnitAndLensExplainAlikeIsLeftOpen) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     FocusSweep sweep = Bench();
     sweep.direction = direction;

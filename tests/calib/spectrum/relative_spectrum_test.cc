@@ -91,7 +91,7 @@ TEST(FitRelativeBlur, MisfitTellsTheShape) {
   }
 }
 
-TEST(FitRelativeBlur, AFrameSharperThanTheReferenceIsSaidToBeSo) {
+TEST(FitRelativeBlur, AFrameSharperThanTheReferenceIsReported) {
   TextureScene scene = TextureSweep();
   scene.reference = 4;  // 0.7 px^2 beside 0.35
   const TextureFrame old_reference = scene.frames[3];

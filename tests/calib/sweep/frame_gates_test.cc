@@ -280,7 +280,7 @@ cv::Mat Mosaic(const cv::Mat& grey, double red, double green, double blue) {
   return mosaic;
 }
 
-TEST(FrameGates, ARawMosaicIsToldToBeDeveloped) {
+TEST(FrameGates, ARawMosaicGetsTheAdviceToDevelopIt) {
   const cv::Mat leaves = Leaves(1);
   for (const cv::Mat& mosaic :
        {Mosaic(leaves, 0.5, 1, 0.6), Mosaic(leaves, 1, 0.9, 1), Mosaic(leaves, 0.9, 1, 1)}) {

@@ -90,7 +90,7 @@ TEST(Contradiction, AJumpOfTheReadingsMovesTheZeroByMoreThanItself) {
   }
 }
 
-TEST(Contradiction, ADiscThatIsStatedToBeAGaussianIsTold) {
+TEST(Contradiction, ADiscThatIsStatedToBeAGaussianIsReported) {
   for (const auto target : {model::TargetKind::kDeadLeaves, model::TargetKind::kKnifeEdge}) {
     SimulatedSweep s = Sweep(target, model::Psf::kDisc);
     s.sweep.camera.psf = model::Psf::kGaussian;

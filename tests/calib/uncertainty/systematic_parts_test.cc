@@ -257,7 +257,7 @@ TEST(AddSystematicParts, FramesThatWereThrownOutStayOut) {
   EXPECT_NEAR(s.Part("frequency band")->focus_depth_mm[1], 0.8, 0.01);
 }
 
-TEST(AddSystematicParts, TwoMetersThatDisagreeAreToldApart) {
+TEST(AddSystematicParts, TwoMetersThatDisagreeAreDistinguished) {
   Solved s = Texture(0);
   BlurBench in_front = s.bench;
   in_front.focus_mm += 1;

@@ -176,7 +176,7 @@ TEST(AddSystematicParts, SidesFartherApartAreAPartAsLargeAsTheirAnswers) {
   }
 }
 
-TEST(AddSystematicParts, SidesThatCannotBeComparedAreToldWithTheirFrames) {
+TEST(AddSystematicParts, SidesThatCannotBeComparedAreReportedWithTheirFrames) {
   BlurBench bench = ExactBench();
   bench.first_mm = 386.5;  // 5 frames nearer than 400 mm
   bench.last_mm = 386.5 + 3 * 30;

@@ -30,11 +30,11 @@ namespace thicklens::estimator {
 namespace {
 
 using ::testing::AllOf;
-using thicklens::testing::ErrorOf;
 using testing::GaussianWeights;
 using ::testing::HasSubstr;
 using testing::NoiseInput;
 using testing::WithSolverCamera;
+using thicklens::testing::ErrorOf;
 
 std::shared_ptr<kernels::Backend> Twin() {
   return kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr);
@@ -613,7 +613,7 @@ TEST(BlockSolver, BlocksOfAStoreThatCannotBeAreSolvedAgain) {
 }
 
 // Whatever changes the blocks changes what a store is told of the run.
-TEST(BlockSolver, AStoreIsToldOfAllThatBlocksDependOn) {
+TEST(BlockSolver, AStoreGetsEverythingThatBlocksDependOn) {
   MadeUp made_up;
   made_up.width_px = made_up.height_px = 8;
   const model::LightFieldPlanes planes{0, 780};

@@ -293,7 +293,7 @@ TEST(FunctionalSolver, FloatIsAsGoodAsDouble) {
   }
 }
 
-TEST(FunctionalSolver, TellsWhereItCameFrom) {
+TEST(FunctionalSolver, TheLightFieldHasItsOrigin) {
   const EstimateInput input = MakeCameraInput(20, 10);
   FunctionalSummary summary;
   EXPECT_EQ(summary.message, "not run");
@@ -310,7 +310,7 @@ TEST(FunctionalSolver, TellsWhereItCameFrom) {
   EXPECT_GT(summary.predicted_memory_mib, 0);
 }
 
-TEST(FunctionalSolver, TellsThatItDidNotConverge) {
+TEST(FunctionalSolver, MissingConvergenceIsReported) {
   const EstimateInput input = MakeInput(40, 30, 1, GaussianWeights(3, 3));
   FunctionalOptions options;
   options.max_iterations = 2;

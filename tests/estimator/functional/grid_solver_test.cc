@@ -332,7 +332,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
 }
 
 // Rays that land beside the picture are no unknowns.
-TEST(GridSolver, TellsTheResidualOfTheBlocksSystem) {
+TEST(GridSolver, TheReportedResidualIsThatOfTheBlocksSystem) {
   const EstimateInput input = WithCamera(17, 12, 250);
   FunctionalOptions options = Precise();
   options.max_iterations = 4;
@@ -387,7 +387,7 @@ TEST(GridSolver, SameBitsOnAnyNumberOfThreads) {
   }
 }
 
-TEST(GridSolver, TellsWhereItCameFrom) {
+TEST(GridSolver, TheLightFieldHasItsOrigin) {
   FunctionalSummary summary;
   const model::LightField found = EstimateOnGrid(WithCamera(20, 12, 500), {}, &summary);
   std::string why;

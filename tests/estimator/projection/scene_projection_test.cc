@@ -309,7 +309,7 @@ TEST(SceneProjection, SameBitsOnAnyNumberOfThreads) {
   }
 }
 
-TEST(SceneProjection, TellsWhatTheCentreViewDoesNotSee) {
+TEST(SceneProjection, SamplesHiddenFromTheCentreViewAreMarked) {
   const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kUniform, 5, 1);
   const DisparityMap map = MapOf(60, 20, [](int x, int) { return x >= 20 && x < 40 ? 2 : 0; });
   const auto projection = Make<float>(map, weights);

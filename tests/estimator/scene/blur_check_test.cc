@@ -123,7 +123,7 @@ TEST(BlurCheck, TooWideABlurIsProposedNarrower) {
   }
 }
 
-TEST(BlurCheck, OfTooNarrowABlurNothingIsSaid) {
+TEST(BlurCheck, TooNarrowABlurGivesNoReport) {
   const BlurCheck check = CheckBlur(PlaneWith(0.7, 0), {});
   EXPECT_FALSE(check.narrower_blur);
   EXPECT_FALSE(check.other_focus);
@@ -191,7 +191,7 @@ TEST(BlurCheck, LargePicturesAreLookedAtAtHalfTheirSize) {
   EXPECT_EQ(large.trials.back().focus_offset_px, 2 * small.trials.back().focus_offset_px);
 }
 
-TEST(BlurCheck, NothingToSeeIsTold) {
+TEST(BlurCheck, AnInputInFocusOrWithoutTextureIsReported) {
   EstimateInput input = Plane();
   std::fill(input.disparity.disparity.begin(), input.disparity.disparity.end(), 0.0F);
   const BlurCheck in_focus = CheckBlur(input, {});
@@ -224,7 +224,7 @@ TEST(BlurCheck, KeepsToTheMemoryLimitInTheMiddle) {
   EXPECT_GE(fewest, 64);
 }
 
-TEST(BlurCheck, TellsHowFarItIsAndStopsWhenAsked) {
+TEST(BlurCheck, ProgressIsReportedAndMayStopIt) {
   BlurCheckOptions options;
   int last = -1, total = 0;
   options.progress = [&](int done, int of) {

@@ -107,7 +107,7 @@ TEST(PointConfidence, GoesByTheDepthAlsoOnASlant) {
   EXPECT_THAT(confidence, Each(Confidence{255}));
 }
 
-TEST(PointConfidence, TellsWhereTheBlurIsTooStrong) {
+TEST(PointConfidence, TooStrongABlurLowersTheConfidence) {
   EstimateInput input = Scene(0.1F);
   // On 3 steps with these weights the standard deviation is less than .7 of a step.
   input.disparity.disparity.assign(input.disparity.disparity.size(), 6);

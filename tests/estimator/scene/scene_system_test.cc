@@ -189,7 +189,7 @@ TEST(SceneSystem, SolvesTheGradientPrior) {
   EXPECT_LT(LargestError(found, expected), 1e-8);
 }
 
-TEST(SceneSystem, TellsTheResidualOfAnyAnswer) {
+TEST(SceneSystem, TheResidualIsThatOfAnyAnswer) {
   const Made made = MakeCase();
   const DataTerm<double> data = DataOf<double>(made);
   const std::vector<double> slope_squared = Values<double>(made.slope_squared);

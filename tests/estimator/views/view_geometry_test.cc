@@ -738,7 +738,7 @@ TEST(WarpPicture, UsesTheTapsOfTheSurfaceAlone) {
 }
 
 // .3 px per view step is the limit between one surface and two, by the larger of the steps.
-TEST(WarpPicture, TellsSurfacesByTheLargerStep) {
+TEST(WarpPicture, SurfacesAreSeparatedByTheLargerStep) {
   for (const double difference_px : {0.28, 0.32}) {
     const double step = 0.25;
     const DisparityMap map = MapOf(

@@ -132,7 +132,7 @@ TEST(OneLine, HasNoControlCharacters) {
   EXPECT_EQ(OneLine("\xc3\xa9"), "\xc3\xa9");
 }
 
-TEST(RunInChild, HandsOverWhatTheChildTold) {
+TEST(RunInChild, TheReportOfTheChildArrives) {
   const ChildOutcome outcome = RunInChild(
       [](const Tell& tell) {
         tell("one\n");
@@ -237,7 +237,7 @@ TEST(RunInChild, LeavesRequestsToStopToTheParent) {
   EXPECT_EQ(tested.failure, "");
 }
 
-TEST(RunInChild, EndsTheChildAndWhatItStartedWhenToldToStop) {
+TEST(RunInChild, ARequestToStopEndsTheChildAndItsChildren) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   int calls = 0;
@@ -313,7 +313,7 @@ TEST(RunInChild, NeverBlamesTheWorkForARequestToStop) {
   }
 }
 
-TEST(Survey, TellsEveryFieldOfADevice) {
+TEST(Survey, EveryFieldOfADeviceIsReported) {
   DeviceDescription device = Device(1, 2, "a\tname\nin lines", "gpu", true, "a problem");
   device.platform_name = "platform";
   device.platform_version = "OpenCL 1.2";
@@ -412,7 +412,7 @@ TEST(OpenBackend, AutoIsADeviceWhereThereIsOne) {
 }
 
 // First the survey is broken off, then the trial of a device.
-TEST(OpenBackend, StopsWhenToldTo) {
+TEST(OpenBackend, ARequestToStopIsObeyed) {
   const auto stop = [] { throw Interrupted(); };
   if (IsOpenClInUse()) GTEST_SKIP() << "OpenCL is in use: no child is waited for any more";
   EXPECT_THROW(SurveyDevices(true, stop), Interrupted);
@@ -480,7 +480,7 @@ TEST(BuildProgram, NamesFilesWhereTheCompilerCountsTheLinesOfAllOfThem) {
   }
 }
 
-TEST(BuildProgram, TellsTheProgramItsReal) {
+TEST(BuildProgram, TheProgramGetsItsRealType) {
   const auto device = OpenAnyDevice();
   const std::vector<EmbeddedFile> wants_float = {
       {"a.cl",
@@ -504,7 +504,7 @@ TEST(BuildProgram, RefusesDoubleWhereThereIsNone) {
               HasSubstr("no double"));
 }
 
-TEST(TryDevice, TellsOfADeviceThatCannotBuildTheKernels) {
+TEST(TryDevice, ADeviceThatCannotBuildTheKernelsIsReported) {
   const DeviceDescription& device = AnyDevice();
   EXPECT_EQ(TryDevice(device.platform, device.device, EmbeddedKernelFiles()), "");
   EXPECT_THAT(TryDevice(device.platform, device.device, {{"broken.cl", "no C\n"}}),

@@ -117,7 +117,7 @@ class WatchedInputs : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(WatchedInputs, EveryFileThatIsReadIsTold) {
+TEST_F(WatchedInputs, EveryFileThatIsReadIsReported) {
   const std::string path = folder_.Put("a", "x");
   ReadWholeFile(path);
   ReadTextFile(path);
@@ -127,7 +127,7 @@ TEST_F(WatchedInputs, EveryFileThatIsReadIsTold) {
 }
 
 // Frames, camera, table and folder are known before the first frame is read.
-TEST_F(WatchedInputs, WhatASweepNamesIsTold) {
+TEST_F(WatchedInputs, FilesThatASweepNamesAreReported) {
   for (const char* name : {"a.png", "b.png", "c.png"}) folder_.Put(std::string("f/") + name, "x");
   folder_.Put("t.csv", "a.png,1\nb.png,2\nc.png,3\n");
   const std::string yaml = folder_.Put("s.yaml",
@@ -141,7 +141,7 @@ TEST_F(WatchedInputs, WhatASweepNamesIsTold) {
   }
 }
 
-TEST_F(WatchedInputs, ItMayRefuse) {
+TEST_F(WatchedInputs, AWatcherMayRefuseAFile) {
   WatchInputs([](const std::string& path) { throw Error(path + ": not this one"); });
   EXPECT_EQ(ErrorOf([&] { ReadCamera(folder_ / "a"); }), folder_ / "a" + ": not this one");
 }

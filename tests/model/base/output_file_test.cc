@@ -147,7 +147,7 @@ TEST(OutputFile, LinkStaysALink) {
   EXPECT_THAT(folder.Entries(), ElementsAre("link.yaml", "real"));
 }
 
-TEST(OutputFile, ReadOnlyFolderIsToldAtOnce) {
+TEST(OutputFile, AReadOnlyFolderIsRefusedAtOnce) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
   const TemporaryFolder folder;
   fs::permissions(folder.path(), fs::perms::owner_read | fs::perms::owner_exec);

@@ -233,7 +233,7 @@ TEST(OutputPlace, AFolderOfALowerLayerIsWrittenInto) {
 }
 
 // A run that was killed between the older marker's end and the new one's beginning.
-TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNext) {
+TEST(OutputPlace, TheNextRunRemovesThePartsOfAKilledRunInAMountPoint) {
   const TemporaryFolder folder;
   const std::string out = folder / "out";
   EXPECT_CHILD_SUCCEEDS(TextOfChildWithMount(out, [&]() -> std::string {
@@ -253,7 +253,7 @@ TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNext) {
 }
 
 // The folder was a mount point when that run was killed, and is none any more.
-TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNextThatReplacesTheFolder) {
+TEST(OutputPlace, TheNextReplacementRemovesThePartsOfAKilledRun) {
   for (const bool is_whole : {false, true}) {
     const TemporaryFolder folder;
     const std::string out = folder / "out";
@@ -275,7 +275,7 @@ TEST(OutputPlace, WhatAKilledRunLeftInAMountPointGoesWithTheNextThatReplacesTheF
 }
 
 // A run that was killed before it replaced anything says nothing about whose the content is.
-TEST(OutputPlace, WhatAKilledRunDidNotTouchIsKept) {
+TEST(OutputPlace, FilesThatAKilledRunDidNotTouchAreKept) {
   const TemporaryFolder folder;
   const std::string out = folder / "out";
   fs::create_directories(out + "/.thicklens.0123456789abcdef.part/frames");

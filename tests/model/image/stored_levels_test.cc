@@ -56,7 +56,7 @@ TEST(StoredLevels, ChangeWhereTheCurveRoundsToTheNext) {
   }
 }
 
-TEST(StoredLevels, OfAnyLight) {
+TEST(StoredLevels, AnyLightHasItsStoredLevel) {
   std::mt19937 random(5);
   std::vector<float> light = {0,
                               -0.0F,

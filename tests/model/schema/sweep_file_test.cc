@@ -184,7 +184,7 @@ TEST_F(SweepFolder, RoiDirectionTarget) {
     EXPECT_EQ(SweepTargetName(Read(frames_ + "target: " + name + "\n").target), name);
 }
 
-TEST_F(SweepFolder, OrderAndRepeatsAreTold) {
+TEST_F(SweepFolder, OrderAndRepeatsAreReported) {
   ReadTable("a.png,1\nb.png,3\nc.png,2\n", "reading_sigma_mm: 1\n");
   EXPECT_THAT(notices_, ElementsAre(HasSubstr("not in order")));
   ReadTable("a.png,3\nb.png,2\nc.png,2\n", "reading_sigma_mm: 1\n");

@@ -320,7 +320,7 @@ TEST(BenchCalibration, MeasuresEveryMethodOnTheSameSweeps) {
   ExpectTheSameRowsAsCsv(report + "/prices.csv", rows);
 }
 
-TEST(BenchCalibrationUsage, TellsWhatIsWrong) {
+TEST(BenchCalibrationUsage, WrongUsageIsReported) {
   const TemporaryFolder folder;
   const auto expect_usage = [&](const std::vector<std::string>& arguments,
                                 const std::string& message) {

@@ -213,7 +213,7 @@ TEST(BenchSceneTest, ThinTwinHasTheSameGridAndDisparities) {
   }
 }
 
-TEST(SourceTableText, TellsWhatCouldNotBeRun) {
+TEST(SourceTableText, RowsThatCouldNotBeRunAreListed) {
   SourceRow row;
   row.table = 3;
   row.picture = "L";

@@ -85,7 +85,7 @@ TEST(ErrorGreyLevels, IsTheRootMeanSquare) {
   EXPECT_NEAR(ErrorGreyLevels(20 * std::log10(255.0)), 1, 1e-12);
 }
 
-TEST(PriceTable, TellsFailuresAndMarksTheFront) {
+TEST(PriceTable, FailuresAreListedAndTheFrontIsMarked) {
   std::vector<PriceRow> rows = SomeRows();
   MarkFront(&rows);
   const std::string table = PriceTable(rows);

@@ -95,7 +95,7 @@ TEST(DescribedCamera, MarksItsDefaultsAsAssumedInTheFileToo) {
                           "sensor.principal_point_px[0]", "sensor.principal_point_px[1]"));
 }
 
-TEST(DescribedCamera, TellsEverythingThatIsMissingAtOnce) {
+TEST(DescribedCamera, EverythingThatIsMissingIsReportedAtOnce) {
   EXPECT_THAT(MessageOf({}, std::nullopt), AllOf(HasSubstr("--focal-mm"), HasSubstr("--f-number"),
                                                  HasSubstr("--pitch-um"), HasSubstr("--size")));
   io::PhotoExif photo;

@@ -183,7 +183,7 @@ TEST_F(CameraVerifyTest, ACameraThatWasRefocusedIsFound) {
   EXPECT_LT(json_["p_value"].get<double>(), 0.0027);
 }
 
-TEST_F(CameraVerifyTest, WhatCannotBeToldIsSaid) {
+TEST_F(CameraVerifyTest, CasesWithoutAVerdictAreReported) {
   // The sweep that it was made from agrees whatever has happened since.
   ProgramResult result = Verify(*shared_ / "camera.yaml", Sweep(1));
   EXPECT_EQ(result.exit_code, 1);
@@ -215,7 +215,7 @@ TEST_F(CameraVerifyTest, WhatCannotBeToldIsSaid) {
 }
 
 // An unknown bench zero leaves zf open; that is told, with what closes it.
-TEST_F(CameraVerifyTest, AnUnknownBenchZeroIsTold) {
+TEST_F(CameraVerifyTest, AnUnknownBenchZeroIsReported) {
   offset_mm_ = "unknown";
   const ProgramResult result = Verify(*shared_ / "camera.yaml", Sweep(2));
   EXPECT_NE(result.exit_code, 2) << result.err;

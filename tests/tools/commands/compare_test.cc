@@ -430,7 +430,7 @@ TEST_F(CompareProgram, CropsLightFieldsPhotographAndDepthAlike) {
   EXPECT_NEAR(before["mean"]["psnr_db"].get<double>(), all["mean"]["psnr_db"].get<double>(), 1e-3);
 }
 
-TEST_F(CompareProgram, AcceptsMissingViewsIfToldTo) {
+TEST_F(CompareProgram, MissingViewsAreAcceptedOnRequest) {
   const std::string truth = PutHci("truth", 3, 0);
   const std::string estimate = PutHci("estimate", 3, 4);
   std::remove((estimate + "/input_Cam017.png").c_str());
@@ -446,7 +446,7 @@ TEST_F(CompareProgram, GivesTheSameOnAnyNumberOfThreads) {
             Summary({truth, estimate, "--grid", "7", "--threads", "3"}));
 }
 
-TEST_F(CompareProgram, TellsInOneLineWhatDoesNotFit) {
+TEST_F(CompareProgram, MismatchesAreReportedInOneLine) {
   const std::string picture = PutPicture("a.png", View(0, 0));
   const std::string grey = PutPicture("grey.png", View(0, 0, 1));
   const std::string small =

@@ -436,7 +436,7 @@ TEST_F(EstimateSceneTest, NamesAPatchWhoseDepthIsWrong) {
   EXPECT_THAT(Summary(arguments)["residual_patches"], IsEmpty());
 }
 
-TEST_F(EstimateSceneTest, TellsAPhotographThatIsSharperThanItsDepthSays) {
+TEST_F(EstimateSceneTest, APhotographSharperThanItsDepthAllowsIsReported) {
   model::RawDepthMap map{128, 96, std::vector<float>(128 * 96, -0.9F), false};
   Arguments arguments = {folder_.Put("bars.png", io::EncodePng(Bars(128, 96))),
                          folder_.Put("bars.pfm", io::EncodePfm(map)),
@@ -455,7 +455,7 @@ TEST_F(EstimateSceneTest, TellsAPhotographThatIsSharperThanItsDepthSays) {
   EXPECT_THAT(right["warnings"], IsEmpty());
 }
 
-TEST_F(EstimateSceneTest, HolesAreToldWithTheirShare) {
+TEST_F(EstimateSceneTest, HolesAreReportedWithTheirShare) {
   const std::string depth = Depth([](int x, int y) {
     return x < 10 && y < 32 ? std::numeric_limits<double>::quiet_NaN() : 0.4;
   });

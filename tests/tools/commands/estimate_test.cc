@@ -208,7 +208,7 @@ TEST_F(EstimateTest, GreyAndSixteenBits) {
   EXPECT_EQ(deep.channels, 3);
 }
 
-TEST_F(EstimateTest, OneViewAcrossIsToldAndOneViewInAllIsRefused) {
+TEST_F(EstimateTest, OneViewAcrossIsReportedAndOneViewInAllIsRefused) {
   const ProgramResult result = Run(
       {Picture(), Disparity(), "--depth-kind", "disparity", "--views", "1x3", "--device", "cpu"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
@@ -311,7 +311,7 @@ TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
               HasSubstr("from 1 to 99"));
 }
 
-TEST_F(EstimateTest, DepthFarFromFocusIsTold) {
+TEST_F(EstimateTest, DepthFarFromFocusIsReported) {
   const Arguments camera = {"--depth-kind", "z",       "--depth-unit", "mm",       "--camera",
                             Camera(),       "--views", "3x3",          "--device", "cpu"};
   const ProgramResult far = Run(With({Picture(), Depth([](int, int) { return 4000; })}, camera));
@@ -386,7 +386,7 @@ TEST_F(EstimateTest, TheMemoryLimitHolds) {
               AllOf(HasSubstr("memory limit 150 MiB"), HasSubstr("blocks of 144 px")));
 }
 
-TEST_F(EstimateTest, IterationsByBlocksAreTold) {
+TEST_F(EstimateTest, IterationsOfTheBlocksAreReported) {
   const Arguments good = With(AsDisparity(Picture(), Disparity()), {"--block-solver", "cg"});
   const std::string json = folder_ / "estimate.json";
   const ProgramResult done = Run(With(good, {"--json", json}));

@@ -73,7 +73,7 @@ class ExplainEffectsTest : public ::testing::Test {
   std::string camera_ = folder_.Put("camera.yaml", kCameraWithEffects);
 };
 
-TEST_F(ExplainEffectsTest, TellsTheLargestImpactOfEachAndWhere) {
+TEST_F(ExplainEffectsTest, TheLargestImpactOfEachEffectHasItsPlace) {
   const nlohmann::json effects = EffectsOf({"--depth-range", "250:330"});
   EXPECT_EQ(effects.size(), 19U);
   EXPECT_NEAR(effects["defocus"]["impact"], SigmaPx(250), 1e-9);

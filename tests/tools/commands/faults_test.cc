@@ -225,7 +225,7 @@ TEST_F(Faults, TwoAtATimeLeaveTheOutputOfOne) {
   }
 }
 
-TEST_F(Faults, AnOutputFolderThatVanishesIsTold) {
+TEST_F(Faults, AnOutputFolderThatVanishesIsReported) {
   const Job job = EstimateJob();
   const std::string parent = folder_ / "gone";
   fs::create_directory(parent);
@@ -245,7 +245,7 @@ TEST_F(Faults, AnOutputFolderThatVanishesIsTold) {
   EXPECT_THAT(result.err, HasSubstr(parent + "/lf"));
 }
 
-TEST_F(Faults, TooLittleMemoryIsToldAndTakesNothingAway) {
+TEST_F(Faults, TooLittleMemoryIsReportedAndRemovesNoFile) {
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer takes memory by the terabyte";
   const Job job = EstimateJob();
   ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
@@ -276,7 +276,7 @@ TEST_F(Faults, TooLittleMemoryIsToldAndTakesNothingAway) {
   EXPECT_TRUE(was_told);
 }
 
-TEST_F(Faults, AFileThatEndsTooEarlyIsTold) {
+TEST_F(Faults, AFileThatEndsTooEarlyIsReported) {
   const Job job = EstimateJob();
   ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
   const Contents before = ContentsOf(job.output);
@@ -310,7 +310,7 @@ class OpenClFaults : public Faults {
 };
 
 // Calls that fail from one on, at any stage of the work, on each way that has a device.
-TEST_F(OpenClFaults, ADeviceThatIsLostHalfwayIsToldAndTakesNothingAway) {
+TEST_F(OpenClFaults, ADeviceThatIsLostHalfwayIsReportedAndRemovesNoFile) {
   const Job job = EstimateJob();
   ASSERT_EQ(Run(job.ways[0]).exit_code, 0);
   const Contents before = ContentsOf(job.output);

@@ -162,7 +162,7 @@ TEST(Program, StartsWithoutOpenCvsDecoders) {
   EXPECT_THAT(ContentOf(list), Not(HasSubstr("libopencv_imgcodecs")));
 }
 
-TEST_F(ProgramTest, TellsItsVersionAndWhatItWasBuiltWith) {
+TEST_F(ProgramTest, TheVersionListsTheLibrariesOfTheBuild) {
   const ProgramResult result = Run({"--version"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.out, AllOf(StartsWith("thicklens 0."), HasSubstr("OpenCV 4."),
@@ -217,7 +217,7 @@ TEST_F(ProgramTest, WrongUsageIsExitCode2) {
   EXPECT_THAT(folder_.Entries(), IsEmpty());
 }
 
-TEST_F(ProgramTest, AWrongOptionIsToldWithItsValueAndWhatWouldBeRight) {
+TEST_F(ProgramTest, AWrongOptionIsReportedWithItsValueAndTheRightOnes) {
   EXPECT_THAT(ErrorLine(Run({"camera", "init", "--pitch-um", "6000"})),
               AllOf(HasSubstr("--pitch-um"), HasSubstr("6000"), HasSubstr("micrometres")));
   EXPECT_THAT(ErrorLine(Run({"explain", "x", "--depth-range", "9:1"})),
@@ -508,7 +508,7 @@ TEST_F(ProgramTest, NamesAnOutputFolderThatDoesNotExistBeforeItMeasures) {
       HasSubstr("none does not exist"));
 }
 
-TEST_F(ProgramTest, TellsThatStandardOutputCouldNotBeWritten) {
+TEST_F(ProgramTest, AFailureOfStandardOutputIsReported) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
   const TemporaryFolder full;
   fs::create_symlink("/dev/full", full / "stdout");

@@ -208,7 +208,7 @@ TEST_F(RenderTest, TheProtocolsCommandWorksAsWritten) {
   EXPECT_NE(ContentOf(out), first);
 }
 
-TEST_F(RenderTest, TellsWhatItRendersAndWhatIsClipped) {
+TEST_F(RenderTest, RenderedFocusAndClippingAreReported) {
   model::LightField light_field = AtRandom(1, 1, 3);
   for (std::size_t i = 0; i < 90; ++i) light_field.values[i] = i < 45 ? 2.0F : -1.0F;
   const std::string folder = Write("lf", light_field);
@@ -493,7 +493,7 @@ TEST_F(RenderTest, WhatSomebodyPutAmongTheViewsStays) {
   EXPECT_EQ(Run({ours, "--convert", "thicklens-tiff", "-o", out}).exit_code, 0);
 }
 
-TEST_F(RenderTest, WhatCannotBeRenderedIsToldInOneLine) {
+TEST_F(RenderTest, ImpossibleRenderingsAreReportedInOneLine) {
   const std::string folder = Write("lf", AtRandom(3, 4, 9));
   EXPECT_THAT(Failure({folder_ / "none", "--mosaic"}), HasSubstr("does not exist"));
   EXPECT_THAT(Failure({folder, "--view", "3,0"}),

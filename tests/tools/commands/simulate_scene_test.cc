@@ -114,7 +114,7 @@ TEST_F(SimulateSceneTest, PictureFolderHoldsWhatTheSimulatorMakes) {
   EXPECT_EQ(json["truth"]["blur_ratio"], 0.45);
 }
 
-TEST_F(SimulateSceneTest, EffectsAreChosenAndTold) {
+TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
   const std::string config = folder_.Put("scene.yaml", SceneConfig("without: [falloff]\n"));
   Succeed({"picture", config, "-o", folder_ / "auto", "--json", folder_ / "auto.json"});
   const nlohmann::json automatic = JsonOf("auto.json")["effects"];

@@ -218,7 +218,7 @@ TEST(TargetPng, RefusesTooManyPixelsAndTooFew) {
   EXPECT_THROW(TargetPngSize(page, 72), Error);  // features of 0.5 mm: 1.4 px
 }
 
-TEST(TargetPng, HasItsEdgeAtTheAngleThatIsSaid) {
+TEST(TargetPng, TheEdgeHasItsStatedAngle) {
   for (const double angle_deg : {5.0, 2.0, 20.0}) {
     TargetRequest request = SmallRequest();
     request.edge_angle_deg = angle_deg;

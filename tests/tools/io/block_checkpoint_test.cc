@@ -95,7 +95,7 @@ TEST_F(BlockCheckpointTest, ABlockComesBackAsTheLightFieldHoldsIt) {
   EXPECT_FALSE(checkpoint.Find(0)->report.rcond);
 }
 
-TEST_F(BlockCheckpointTest, AnotherEstimateIsToldByWhatDiffers) {
+TEST_F(BlockCheckpointTest, AnotherEstimateIsRecognisedByItsDifferences) {
   {
     BlockCheckpoint checkpoint(Path(), kVersion);
     checkpoint.Begin(SomeRun("1", picture_));
@@ -177,7 +177,7 @@ TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
   }
 }
 
-TEST_F(BlockCheckpointTest, TellsTheDeviceToAskFor) {
+TEST_F(BlockCheckpointTest, TheDeviceToAskForIsThatOfTheRun) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"cpu", "cpu"},
       {"opencl:0:1", "opencl:0:1"},

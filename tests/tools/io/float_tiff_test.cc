@@ -59,7 +59,7 @@ TEST(FloatTiff, HoldsLittleBesidesTheValues) {
   EXPECT_GT(std::filesystem::file_size(path), 4u * 3 * 301 * 407);
 }
 
-TEST(FloatTiff, TellsWhatCannotBeWrittenByTheNameThatIsShown) {
+TEST(FloatTiff, WriteErrorsHaveTheNameThatIsShown) {
   TemporaryFolder folder;
   const auto message = [&](const std::string& path) {
     try {

@@ -97,7 +97,7 @@ class InputKinds : public ::testing::Test {
 
 std::unique_ptr<TemporaryFolder> InputKinds::made_;
 
-TEST_F(InputKinds, OfCalibrate) {
+TEST_F(InputKinds, CalibrateRefusesPipesAndDevices) {
   for (const char* input : {"sweep.yaml", "case.yaml", "frames/a.png"})
     ExpectRefused(input, {"calibrate", (*this)("sweep.yaml")});
   ExpectRefused("table.csv", {"calibrate", (*this)("frames"), "--readings", (*this)("table.csv"),
@@ -108,7 +108,7 @@ TEST_F(InputKinds, OfCalibrate) {
                 {"calibrate", (*this)("sweep.yaml"), "--floor-from", (*this)("calibrated.yaml")});
 }
 
-TEST_F(InputKinds, OfSimulate) {
+TEST_F(InputKinds, SimulateRefusesPipesAndDevices) {
   const std::string out = work_ / "new";
   for (const char* input : {"sw.yaml", "case.yaml", "frames/a.png"})
     ExpectRefused(input, {"simulate", "sweep", (*this)("sw.yaml"), "-o", out});
@@ -117,7 +117,7 @@ TEST_F(InputKinds, OfSimulate) {
   EXPECT_FALSE(fs::exists(out));
 }
 
-TEST_F(InputKinds, OfEstimate) {
+TEST_F(InputKinds, EstimateRefusesPipesAndDevices) {
   const Words command = {"estimate",
                          (*this)("pic/picture.png"),
                          (*this)("pic/depth.pfm"),
@@ -137,7 +137,7 @@ TEST_F(InputKinds, OfEstimate) {
   EXPECT_FALSE(fs::exists(work_ / "new"));
 }
 
-TEST_F(InputKinds, OfLightFields) {
+TEST_F(InputKinds, CommandsOfLightFieldsRefusePipesAndDevices) {
   for (const char* input : {"lf/lightfield.yaml", "lf/camera.yaml", "lf/views/view_01_00.png"})
     ExpectRefused(input, {"render", (*this)("lf"), "--mosaic", "-o", work_ / "new.png"});
   for (const char* input : {"hci/input_Cam001.png", "hci/parameters.cfg"})
@@ -155,7 +155,7 @@ TEST_F(InputKinds, OfLightFields) {
   with("--sweep", "sweep.yaml");
 }
 
-TEST_F(InputKinds, OfTheOthers) {
+TEST_F(InputKinds, OtherCommandsRefusePipesAndDevices) {
   const std::string picture = (*this)("pic/picture.png");
   ExpectRefused("calibrated.yaml",
                 {"explain", (*this)("calibrated.yaml"), "--depth-range", "280:320"});
@@ -167,7 +167,7 @@ TEST_F(InputKinds, OfTheOthers) {
   ExpectRefused("scene.yaml", {"bench", "accuracy", "--scene", (*this)("scene.yaml")});
 }
 
-TEST_F(InputKinds, OfCheckpoints) {
+TEST_F(InputKinds, ResumedEstimatesRefusePipesAndDevices) {
   const std::string path = work_ / "checkpoint";
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
   EXPECT_THAT(ErrorOf([&] { BlockCheckpoint file(path, "a version"); }), HasSubstr("a named pipe"));

@@ -130,7 +130,7 @@ TEST_F(JournalFileTest, MuchThatCannotBeReadIsNotThrownAway) {
   EXPECT_EQ(ContentOf(Path()), damaged);
 }
 
-TEST_F(JournalFileTest, BeginsAnew) {
+TEST_F(JournalFileTest, ClearRemovesAllRecords) {
   Write({"first", "second"});
   {
     JournalFile journal(Path(), kSort);
@@ -188,7 +188,7 @@ TEST_F(JournalFileTest, OtherFilesAreLeftAlone) {
   EXPECT_THAT(ErrorOf([] { JournalFile("/dev/null", kSort); }), HasSubstr("no regular file"));
 }
 
-TEST_F(JournalFileTest, OneRunHoldsIt) {
+TEST_F(JournalFileTest, AJournalBelongsToOneRun) {
   JournalFile journal(Path(), kSort);
   journal.Append({"one"});
   EXPECT_THAT(ErrorOf([&] { Records(); }), AllOf(HasSubstr(Path()), HasSubstr("another run")));

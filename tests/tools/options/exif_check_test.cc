@@ -147,8 +147,8 @@ TEST(CompareExif, ThePitchAndTheCropFactorAreThoseOfTheSensor) {
   EXPECT_EQ(VerdictOn("crop factor", exif, BenchLens(), {30, 20, true}), "");
 }
 
-TEST(CompareExif, APictureThatWasScaledOrCutIsTold) {
-  io::PhotoExif exif;
+TEST(CompareExif, AScaledOrCroppedPictureIsReported) {
+  PhotoExif exif;
   exif.made_width_px = 600;
   exif.made_height_px = 400;
   EXPECT_EQ(VerdictOn("image size", exif), "undecided");
@@ -232,7 +232,7 @@ TEST_F(EstimateExifTest, WhatAgreesIsSilentInEveryKindOfFile) {
   }
 }
 
-TEST_F(EstimateExifTest, WithoutExifNothingIsSaid) {
+TEST_F(EstimateExifTest, APhotographWithoutExifGivesNoReport) {
   const ProgramResult result = Estimate(Photo("photo.png", Exiv2::ExifData()));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, Not(HasSubstr("EXIF")));

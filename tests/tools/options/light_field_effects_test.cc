@@ -90,7 +90,7 @@ TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
 
 // What auto leaves out is within the tolerance as it is told, too: there each is alone without,
 // while they are left out one after the other, which changes bounds by a little.
-TEST(LightFieldEffectsTest, WhatIsLeftOutIsWithinTheToleranceThatIsTold) {
+TEST(LightFieldEffectsTest, OmittedEffectsStayWithinTheReportedTolerance) {
   int left_out = 0;
   for (const double pitch_mm : {0.001, 0.003, 0.01, 0.03, 0.1}) {
     for (const double radius_mm : {0.02, 0.2, 1.0, 4.0}) {

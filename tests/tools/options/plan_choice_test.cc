@@ -273,7 +273,7 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
   }
 }
 
-TEST(MeasureProfile, TellsWhereItCannotWrite) {
+TEST(MeasureProfile, AMissingTemporaryFolderIsReported) {
   const Environment nowhere("TMPDIR", "/no/such/folder");
   try {
     MeasureProfile({EstimatePlan()}, ProfileRun());

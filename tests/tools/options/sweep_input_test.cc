@@ -74,7 +74,7 @@ TEST_F(SweepInputTest, FloorFromAnUnfitCameraIsRefused) {
               AllOf(StartsWith("--floor-from: "), HasSubstr("none.yaml")));
 }
 
-TEST_F(SweepInputTest, CompressedFramesAreTold) {
+TEST_F(SweepInputTest, CompressedFramesAreReported) {
   EXPECT_THAT(ReadSweepInput(arguments_).notices, Not(Contains(HasSubstr("JPEG"))));
   folder_.Put("b.JPG");
   folder_.Put("c.jpeg");
@@ -121,7 +121,7 @@ TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
 }
 
 // Numbers of the camera that a result hangs on and that nobody vouches for are told once.
-TEST_F(SweepInputTest, TellsMissingTolerancesUnlessTheTruthIsKnown) {
+TEST_F(SweepInputTest, MissingTolerancesAreReportedUnlessTheTruthIsKnown) {
   Sweep("");
   const auto told = [&] {
     const SweepInput input = ReadSweepInput(arguments_);

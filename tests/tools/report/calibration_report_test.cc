@@ -577,7 +577,7 @@ TEST(CalibrationReport, AccountsForFramesThatAreNotInTheFit) {
   EXPECT_THAT(Page(made), HasSubstr("5 more frames passed"));
 }
 
-TEST(CalibrationReport, TellsTheWorstKnownOnlyWhereThatSaysSomething) {
+TEST(CalibrationReport, TheWorstKnownValueIsNamedOnlyWhereItIsInformative) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   const auto page_with = [&](double correlation) {
     made.calibration.blur.weak_direction = "a with b";

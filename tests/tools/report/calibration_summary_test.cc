@@ -93,7 +93,7 @@ TEST(CalibrationText, WithoutTruthHasNoErrorColumns) {
   EXPECT_THAT(CalibrationText(made.sweep, made.calibration, nullptr), Not(HasSubstr("truth")));
 }
 
-TEST(CalibrationText, TellsWhyFramesWereRejected) {
+TEST(CalibrationText, RejectedFramesHaveTheirReasons) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   RejectFrame(0, "dark: mean 0.001 below 0.016", &made.calibration);
   RejectFrame(1, "dark: mean 0.002 below 0.016", &made.calibration);
@@ -109,7 +109,7 @@ TEST(CalibrationText, TellsWhyFramesWereRejected) {
   EXPECT_THAT(text, HasSubstr("partial: floor unknown (2.7 s)\n"));
 }
 
-TEST(CalibrationText, TellsTheDetailsInFewLines) {
+TEST(CalibrationText, DetailsTakeFewLines) {
   MadeUpCalibration made = MakeUpCalibration(41, 320, 4);
   const std::string text = CalibrationText(made.sweep, made.calibration, &made.truth);
   EXPECT_THAT(LineWith(text, "source's recipe: "),

@@ -79,7 +79,7 @@ TEST(Determined, ARefusalTellsItToPrograms) {
 }
 
 // A run that ended before a frame was opened has none of it.
-TEST(Determined, NothingIsSaidOfWhatWasNotMeasured) {
+TEST(Determined, UnmeasuredValuesGiveNoReport) {
   MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
   RefuseAll("too few frames", &made.calibration);
   EXPECT_THAT(

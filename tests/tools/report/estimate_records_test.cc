@@ -132,7 +132,7 @@ TEST_F(Records, ComparisonIsRead) {
   EXPECT_THAT(record.views_above_dibr, Optional(1));
 }
 
-TEST_F(Records, BrokenFilesAreToldInOneLine) {
+TEST_F(Records, BrokenFilesAreReportedInOneLine) {
   for (const char* text : {"", "{", "{\"solver\": ", "\x89PNG\r\n", "nonsense"}) {
     EXPECT_THAT(EstimateError(text), AllOf(HasSubstr("r.json: no JSON"), Not(HasSubstr("\n"))));
     EXPECT_THAT(ComparisonError(text), AllOf(HasSubstr("r.json: no JSON"), Not(HasSubstr("\n"))));
@@ -142,7 +142,7 @@ TEST_F(Records, BrokenFilesAreToldInOneLine) {
               StartsWith(folder_ / "missing.json"));
 }
 
-TEST_F(Records, FilesOfOtherCommandsAreTold) {
+TEST_F(Records, FilesOfOtherCommandsAreReported) {
   EXPECT_THAT(EstimateError(kComparison),
               AllOf(HasSubstr("'solver' is missing"), HasSubstr("`thicklens estimate --json`")));
   EXPECT_THAT(ComparisonError(kEstimate),
@@ -151,7 +151,7 @@ TEST_F(Records, FilesOfOtherCommandsAreTold) {
   EXPECT_THAT(ComparisonError(R"({"psnr_db": 30, "ssim": 0.9})"), HasSubstr("'mean' is missing"));
 }
 
-TEST_F(Records, RefusedRunsAreTold) {
+TEST_F(Records, RefusedRunsAreReported) {
   const std::string refused = R"({"status": "refused", "reason": "no depth"})";
   EXPECT_THAT(EstimateError(refused), HasSubstr("this run was refused: \"no depth\""));
   EXPECT_THAT(ComparisonError(refused), HasSubstr("this run was refused"));

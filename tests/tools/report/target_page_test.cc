@@ -145,7 +145,7 @@ TEST(LayOutTarget, RefusesWhatCannotBePrintedOrSeen) {
   EXPECT_THAT(RefusalOf(request), HasSubstr("more than 5 million"));
 }
 
-TEST(LayOutTarget, TellsWhenGivenFeaturesAreNotWhatTheCameraWants) {
+TEST(LayOutTarget, FeaturesThatDoNotSuitTheCameraAreReported) {
   TargetRequest request;
   request.sheet = kA4;
   request.view = MadeUpView(640, 480, 0.2);

@@ -247,7 +247,7 @@ TEST(HardCaseSweeps, TheTruthMustLieWithinTheStatedErrors) {
   EXPECT_THROW(Warned({"aperture"}).error("", told), Error);
 }
 
-TEST(RunProgram, TellsHowAProgramEnded) {
+TEST(RunProgram, TheEndOfAProgramIsReported) {
   const thicklens::testing::TemporaryFolder folder;
   const auto shell = [&](const std::string& script) {
     return RunProgram("/bin/sh", {"-c", script}, folder.path(), 60);

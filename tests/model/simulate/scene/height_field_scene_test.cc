@@ -373,7 +373,7 @@ TEST(HeightFieldSceneTest, SamplingErrorIsAsStated) {
   }
 }
 
-TEST(HeightFieldSceneTest, TellsWhatIsWrong) {
+TEST(HeightFieldSceneTest, WrongInputIsReported) {
   const Camera camera = MacroScene::Camera(kWidth, kHeight, Psf::kGaussian);
   const LayerPixels good = PixelsOf([](int, int) { return 301.0; });
   const auto message = [&](const std::function<void(SceneLayer*, LayerPixels*)>& change) {

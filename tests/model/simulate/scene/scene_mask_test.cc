@@ -172,7 +172,7 @@ TEST(SceneMaskTest, ExtentEndsWhereTheOutermostBorderIs) {
   EXPECT_DOUBLE_EQ(open.high_px.x(), extent.high_px.x());
 }
 
-TEST(SceneMaskTest, TellsWhatIsWrong) {
+TEST(SceneMaskTest, WrongMasksAreReported) {
   const auto message = [](const LinearPicture& picture) {
     return ErrorOf([&] { SceneMask(picture, kWidth, kHeight, "outline.mask 'm.png'"); });
   };
@@ -269,7 +269,7 @@ TEST(SceneMaskTest, ReachesBeyondThePictureAsItEnds) {
   }
 }
 
-TEST(SceneMaskTest, LayerWithoutItsFileIsToldByName) {
+TEST(SceneMaskTest, ALayerWithoutItsFileIsReportedByName) {
   SceneSimulationOptions options = CardScene({0, 0});
   options.layers[1].name = "card";
   options.layers[1].outline.shape = OutlineOptions::Shape::kMask;

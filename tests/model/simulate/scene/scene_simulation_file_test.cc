@@ -231,7 +231,7 @@ TEST_F(SceneSimulationFileTest, LayersMayHaveAMaskOrADepthMap) {
   EXPECT_EQ(options.layers[1].outline.mask_path, folder_ / "card.png");
 }
 
-TEST_F(SceneSimulationFileTest, TellsWhatIsWrongAndWhere) {
+TEST_F(SceneSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
   const std::string head = std::string(kHead) + kTruth;
   const auto layer = [&](const std::string& text) { return head + "layers: [{" + text + "}]\n"; };
   const std::string plane = "plane: {depth_mm: 310}, ";

@@ -608,7 +608,7 @@ TEST(SceneSimulatorTest, NoiseHasItsSigmaInStoredGreyLevels) {
   }
 }
 
-TEST(SceneSimulatorTest, TellsItsProgressAndStopsWhenAsked) {
+TEST(SceneSimulatorTest, ProgressIsReportedAndMayStopIt) {
   const SceneSimulator simulator(NoisyScene(), {});
   std::vector<int> done;
   simulator.RenderNoiseless({2, [&](int count, int total) {

@@ -136,7 +136,7 @@ TEST_F(SweepSimulationFileTest, EveryKindOfTargetHasItsName) {
   }
 }
 
-TEST_F(SweepSimulationFileTest, TellsWhatIsWrongAndWhere) {
+TEST_F(SweepSimulationFileTest, ErrorsHaveTheirPlaceInTheFile) {
   const std::string head = kHead;
   const std::string rest = std::string(kTarget) + kBench;
   const std::pair<std::string, const char*> cases[] = {
