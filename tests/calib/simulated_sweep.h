@@ -111,6 +111,13 @@ inline void GiveDrawnFloor(SimulatedSweep* simulated, std::uint64_t seed) {
   simulated->sweep.floor.given_px = model::Estimate{floor_px, kVarianceSigmaPx2 / (2 * floor_px)};
 }
 
+// One of configs/sweeps, simulated, with its floor given.
+inline SimulatedSweep SweepWithFloor(const std::string& name, int size_px, std::uint64_t seed) {
+  SimulatedSweep simulated = Simulate(SweepCase(name, size_px, seed));
+  GiveFloor(&simulated);
+  return simulated;
+}
+
 }  // namespace thicklens::testing
 
 #endif  // THICKLENS_TESTS_CALIB_SIMULATED_SWEEP_H_

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/error_message.h"
+#include "tests/calib/damaged_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/model/camera_file.h"
@@ -20,31 +21,17 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using thicklens::testing::DeepCopy;
 using thicklens::testing::ErrorOf;
-using thicklens::testing::GiveFloor;
-using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
-using thicklens::testing::SweepCase;
+using thicklens::testing::SweepWithFloor;
 
 constexpr int kSizePx = 160;
 
-// A copy of a sweep whose frames may be damaged.
-SimulatedSweep CopyOf(const SimulatedSweep& original) {
-  SimulatedSweep copy = original;
-  copy.stored = std::make_shared<std::vector<cv::Mat>>();
-  for (const cv::Mat& frame : *original.stored) copy.stored->push_back(frame.clone());
-  copy.sweep.read_frame = [stored = copy.stored](std::size_t i) { return (*stored)[i]; };
-  return copy;
-}
-
 // Case iii on a small field, dead leaves, floor and bench zero given.
 SimulatedSweep Good() {
-  static const SimulatedSweep rendered = [] {
-    SimulatedSweep sweep = Simulate(SweepCase("iii", kSizePx, 1));
-    GiveFloor(&sweep);
-    return sweep;
-  }();
-  return CopyOf(rendered);
+  static const SimulatedSweep rendered = SweepWithFloor("iii", kSizePx, 1);
+  return DeepCopy(rendered);
 }
 
 void Keep(SimulatedSweep* simulated, std::size_t first, std::size_t count) {
@@ -223,8 +210,7 @@ TEST(Calibrate, AFocusFarBeyondTheSweepIsRefusedWithItsSide) {
 }
 
 TEST(Calibrate, AWrongFocalLengthIsRefusedAsUnphysical) {
-  SimulatedSweep s = Simulate(SweepCase("ii", kSizePx, 1));
-  GiveFloor(&s);
+  SimulatedSweep s = SweepWithFloor("ii", kSizePx, 1);
   s.sweep.camera.lens.front_focal_length_mm = s.sweep.camera.lens.rear_focal_length_mm = 35;
   // The aperture's radius follows from the f-number.
   s.sweep.camera.lens.aperture_radius_mm *= 35.0 / 50;

@@ -83,8 +83,7 @@ TEST(CoverageSlow, CaseV) { ExpectHonestErrors("v", 192, 40, 2); }
 // whole, too, so that the difference is smaller than either error.
 TEST(CoverageSlow, ThinningMovesTheFocusByLessThanTheErrors) {
   for (const std::string name : {"i", "iii"}) {
-    SimulatedSweep whole = Simulate(SweepCase(name, 192, 7));
-    GiveFloor(&whole);
+    SimulatedSweep whole = SweepWithFloor(name, 192, 7);
     const Calibration all = Calibrate(whole.sweep, {});
     ASSERT_TRUE(all.focus_depth_mm) << name << ": " << all.reason;
     for (const std::size_t every : {2U, 3U, 6U}) {

@@ -10,6 +10,7 @@
 #include <regex>
 #include <string>
 
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/damaged_sweep.h"
 #include "thicklens/calib/calibrate.h"
 
@@ -26,15 +27,8 @@ const SimulatedSweep& Clean(const std::string& name) {
   static std::map<std::string, SimulatedSweep> rendered;
   const auto found = rendered.find(name);
   if (found != rendered.end()) return found->second;
-  SimulatedSweep sweep = Simulate(SweepCase(name, kSizePx, 1));
-  GiveFloor(&sweep);
+  SimulatedSweep sweep = SweepWithFloor(name, kSizePx, 1);
   return rendered.emplace(name, sweep).first->second;
-}
-
-Calibration Calibrated(const SimulatedSweep& simulated) {
-  CalibrationOptions options;
-  options.map_field = false;
-  return Calibrate(simulated.sweep, options);
 }
 
 // Of the clean sweep of a case, calibrated once.
@@ -42,7 +36,7 @@ const Calibration& CleanResult(const std::string& name) {
   static std::map<std::string, Calibration> results;
   const auto found = results.find(name);
   if (found != results.end()) return found->second;
-  return results.emplace(name, Calibrated(Clean(name))).first->second;
+  return results.emplace(name, CalibrateWithoutMap(Clean(name))).first->second;
 }
 
 // "frame-3" and not "frame-31".
@@ -87,7 +81,7 @@ void ExpectRightInSpiteOfFaults(const std::string& name) {
   const PlantedFaults faults = PlantFaults(&damaged);
   const Calibration& clean = CleanResult(name);
   ASSERT_TRUE(clean.focus_depth_mm) << clean.reason;
-  const Calibration c = Calibrated(damaged);
+  const Calibration c = CalibrateWithoutMap(damaged);
   ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio && c.image_distance_mm) << c.reason;
   const model::SweepTruth& truth = damaged.truth;
   const auto within = [](const Result& r, double true_value) {
@@ -120,7 +114,7 @@ class WrongSweep : public ::testing::TestWithParam<std::string> {};
 TEST_P(WrongSweep, TheSamePictureRepeatedIsRefusedForItsScale) {
   SimulatedSweep s = DeepCopy(Clean(GetParam()));
   for (cv::Mat& frame : *s.stored) frame = s.frame(12).clone();
-  ExpectRefused(Calibrated(s), "scale|repeated|does not change");
+  ExpectRefused(CalibrateWithoutMap(s), "scale|repeated|does not change");
 }
 
 // Noise of their own does not make pictures different.
@@ -134,27 +128,27 @@ TEST_P(WrongSweep, TheSameSceneWithFreshNoiseIsRefusedForItsScale) {
     cv::add(repeated, noise, sum, cv::noArray(), CV_8U);
     frame = sum;
   }
-  ExpectRefused(Calibrated(s), "scale|repeated|does not change");
+  ExpectRefused(CalibrateWithoutMap(s), "scale|repeated|does not change");
 }
 
 TEST_P(WrongSweep, ReversedReadingsAreRefusedNamingTheDirection) {
   SimulatedSweep s = DeepCopy(Clean(GetParam()));
   ReverseReadings(&s);
-  ExpectRefused(Calibrated(s), "direction");
+  ExpectRefused(CalibrateWithoutMap(s), "direction");
 }
 
 TEST_P(WrongSweep, ReadingsInCentimetresAreRefused) {
   SimulatedSweep s = DeepCopy(Clean(GetParam()));
   ScaleReadings(&s, 0.1);
   s.sweep.reading_sigma_mm *= 0.1;
-  ExpectRefused(Calibrated(s), "unit");
+  ExpectRefused(CalibrateWithoutMap(s), "unit");
 }
 
 TEST_P(WrongSweep, ReadingsOfCentimetresInMillimetresAreRefused) {
   SimulatedSweep s = DeepCopy(Clean(GetParam()));
   ScaleReadings(&s, 10);
   s.sweep.reading_sigma_mm *= 10;
-  ExpectRefused(Calibrated(s), "unit");
+  ExpectRefused(CalibrateWithoutMap(s), "unit");
 }
 
 INSTANTIATE_TEST_SUITE_P(LongLens, WrongSweep, ::testing::Values("ii"));
@@ -168,7 +162,7 @@ TEST(WrongSweepOfALongLens, AWrongFocalLengthIsRefusedOrWarnedOf) {
   model::ThickLens& lens = s.sweep.camera.lens;
   lens.front_focal_length_mm = lens.rear_focal_length_mm = 35;
   lens.aperture_radius_mm *= 35.0 / 50;  // it follows from the f-number
-  const Calibration c = Calibrated(s);
+  const Calibration c = CalibrateWithoutMap(s);
   std::string said = c.outcome == Outcome::kRefused ? c.reason : "";
   for (const std::string& warning : c.warnings) said += " | " + warning;
   EXPECT_THAT(said, ContainsRegex("0\\.9[0-9]|1\\.0[0-9]"));
@@ -195,7 +189,7 @@ TEST(PeriodicTarget, SlowIsNeverConfidentlyWrong) {
     options.target.kind = model::TargetKind::kCheckerboard;
     SimulatedSweep s = Simulate(options);
     GiveFloor(&s);
-    ExpectHonest(Calibrated(s), s.truth);
+    ExpectHonest(CalibrateWithoutMap(s), s.truth);
   }
 }
 
@@ -205,7 +199,7 @@ TEST(PeriodicTarget, SlowIsNeverConfidentlyWrong) {
 void ExpectHarmless(const SimulatedSweep& touched, const std::string& name) {
   const Calibration& clean = CleanResult(name);
   ASSERT_TRUE(clean.focus_depth_mm) << clean.reason;
-  const Calibration c = Calibrated(touched);
+  const Calibration c = CalibrateWithoutMap(touched);
   ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio) << c.reason;
   const Result& zf = *c.focus_depth_mm;
   const double step_mm =

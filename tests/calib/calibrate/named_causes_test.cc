@@ -10,6 +10,7 @@
 #include <string>
 
 #include "support/test_cameras.h"
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/damaged_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
@@ -28,19 +29,9 @@ using namespace thicklens::testing;
 
 constexpr int kSizePx = 192;
 
-Calibration Measured(const SimulatedSweep& s) {
-  CalibrationOptions options;
-  options.map_field = false;
-  return Calibrate(s.sweep, options);
-}
-
 // 50 mm f/2.8, in focus at 300 mm, 31 frames of 1 mm.
 SimulatedSweep Good() {
-  static const SimulatedSweep rendered = [] {
-    SimulatedSweep sweep = Simulate(SweepCase("ii", kSizePx, 1));
-    GiveFloor(&sweep);
-    return sweep;
-  }();
+  static const SimulatedSweep rendered = SweepWithFloor("ii", kSizePx, 1);
   return DeepCopy(rendered);
 }
 
@@ -57,7 +48,7 @@ TEST(Reason, ReadingsInInchesWithAStatedErrorAreStillAskedAbout) {
   for (model::SweepFrame& frame : s.sweep.frames)
     frame.reading_mm = (frame.reading_mm - 190) / 25.4;
   s.sweep.reading_sigma_mm = 0.05;  // 4 % of the readings' range
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at 1"),
                               HasSubstr("are the readings in mm? With readings in inches"),
@@ -75,7 +66,7 @@ TEST(Reason, AlignedFramesAreNotCalledDistorted) {
     const cv::Matx23d map(scale, 0, centre * (1 - scale), 0, scale, centre * (1 - scale));
     cv::warpAffine(frame.clone(), frame, map, frame.size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
   }
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   std::string said = c.reason;
   for (const std::string& warning : c.warnings) said += " | " + warning;
   EXPECT_THAT(said, AllOf(HasSubstr("the image scale does not change with the reading, although "
@@ -136,7 +127,7 @@ TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
   SimulatedSweep s = FocusRing();
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     s.sweep.direction = direction;
-    const Calibration c = Measured(s);
+    const Calibration c = CalibrateWithoutMap(s);
     EXPECT_EQ(c.outcome, Outcome::kRefused);
     EXPECT_THAT(c.reason,
                 AllOf(StartsWith("the image scale follows the lens, not the target"),
@@ -164,7 +155,7 @@ TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusReported) {
     SimulatedSweep s = simulated;
     s.sweep.offset_mm.reset();
     if (is_stated) s.sweep.offset_mm = model::Estimate{100, 2};
-    const Calibration c = Measured(s);
+    const Calibration c = CalibrateWithoutMap(s);
     ASSERT_EQ(c.outcome, Outcome::kRefused) << c.reason;
     EXPECT_THAT(c.reason,
                 AllOf(StartsWith("the bench zero is not known well enough"),
@@ -190,7 +181,7 @@ TEST(Reason, AFlickeringLampIsNamedWhereFramesDoNotRegister) {
       row.convertTo(row, CV_8U, gain);
     }
   }
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   std::string said = c.reason;
   for (const std::string& warning : c.warnings) said += " | " + warning;
   EXPECT_THAT(said, AllOf(HasSubstr("whole rows brighten together"), HasSubstr("rolling shutter"),
@@ -198,7 +189,7 @@ TEST(Reason, AFlickeringLampIsNamedWhereFramesDoNotRegister) {
 }
 
 TEST(Reason, AGoodSweepHasNoCause) {
-  const Calibration c = Measured(Good());
+  const Calibration c = CalibrateWithoutMap(Good());
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   EXPECT_THAT(c.warnings, Each(Not(AnyOf(HasSubstr("bands"), HasSubstr("darker"),
                                          HasSubstr("moves"), HasSubstr("distort")))));

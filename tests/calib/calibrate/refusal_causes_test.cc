@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string>
 
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/damaged_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
@@ -18,20 +19,17 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
+using thicklens::testing::CalibrateWithoutMap;
 using thicklens::testing::DeepCopy;
-using thicklens::testing::GiveFloor;
 using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
 using thicklens::testing::SweepCase;
+using thicklens::testing::SweepWithFloor;
 
 constexpr int kSizePx = 160;
 
 SimulatedSweep Good() {
-  static const SimulatedSweep rendered = [] {
-    SimulatedSweep sweep = Simulate(SweepCase("iii", kSizePx, 1));
-    GiveFloor(&sweep);
-    return sweep;
-  }();
+  static const SimulatedSweep rendered = SweepWithFloor("iii", kSizePx, 1);
   return DeepCopy(rendered);
 }
 
@@ -41,12 +39,6 @@ SimulatedSweep KnifeEdge() {
   SimulatedSweep sweep = Simulate(options);
   sweep.sweep.target = model::SweepTarget::kKnifeEdge;
   return sweep;
-}
-
-Calibration Measured(const SimulatedSweep& s) {
-  CalibrationOptions options;
-  options.map_field = false;
-  return Calibrate(s.sweep, options);
 }
 
 // All but the frames from `first` to `last`.
@@ -63,7 +55,7 @@ TEST(Exposure, AnOverExposedSweepGetsTheAdviceToLowerIt) {
       SimulatedSweep s = Good();
       if (!zero_is_known) s.sweep.offset_mm.reset();
       Expose(&s, 6, 0, last);
-      const Calibration c = Measured(s);
+      const Calibration c = CalibrateWithoutMap(s);
       const std::string told =
           c.outcome == Outcome::kRefused || c.warnings.empty() ? c.reason : c.warnings.front();
       EXPECT_THAT(told, AllOf(HasSubstr("of 41 frames are over-exposed: lower the exposure"),
@@ -76,7 +68,7 @@ TEST(Exposure, AnOverExposedSweepGetsTheAdviceToLowerIt) {
 TEST(Exposure, AResultFromTheFewGoodFramesSaysSo) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 14, 26);
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   ASSERT_NE(c.outcome, Outcome::kRefused) << c.reason;
   ASSERT_FALSE(c.warnings.empty());
   EXPECT_THAT(c.warnings.front(),
@@ -87,7 +79,7 @@ TEST(Exposure, AResultFromTheFewGoodFramesSaysSo) {
 TEST(Exposure, ADarkSweepGetsTheAdviceToRaiseIt) {
   SimulatedSweep s = Good();
   Expose(&s, 0.01, 0, 1);
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, StartsWith("39 of 41 frames are under-exposed: raise the exposure"));
 }
@@ -95,7 +87,7 @@ TEST(Exposure, ADarkSweepGetsTheAdviceToRaiseIt) {
 TEST(Exposure, AFewBadFramesAreNotTheCause) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 4, 40);
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_NE(c.outcome, Outcome::kRefused) << c.reason;
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("exposed"))));
 }
@@ -104,7 +96,7 @@ TEST(Exposure, AFewBadFramesAreNotTheCause) {
 TEST(Exposure, WhatFollowsFromItIsNotAdvisedOn) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 0, 6);
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   ASSERT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, AllOf(StartsWith("34 of 41 frames are over-exposed"),
                               EndsWith("take the sweep again")));
@@ -114,7 +106,7 @@ TEST(Unit, ReadingsInInchesAreAskedAbout) {
   SimulatedSweep s = Good();
   s.sweep.offset_mm.reset();
   for (model::SweepFrame& frame : s.sweep.frames) frame.reading_mm /= 25.4;
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at "),
                               HasSubstr("are the readings in mm?")));
@@ -123,7 +115,7 @@ TEST(Unit, ReadingsInInchesAreAskedAbout) {
 TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {
   SimulatedSweep s = Good();
   s.sweep.roi = {60, 60, 80, 23};
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) is 80 x 23 px"));
   EXPECT_EQ(c.frames[0].statistics.mean_stored, 0);
@@ -132,7 +124,7 @@ TEST(Region, TooSmallForAnythingIsRefusedBeforeItIsMeasured) {
 TEST(Region, TooSmallForATextureIsNamedAsTheCause) {
   SimulatedSweep s = Good();
   s.sweep.roi = {60, 60, 40, 40};
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, StartsWith("the region of interest (roi_px) is 40 x 40 px: an edge needs"));
 }
@@ -140,7 +132,7 @@ TEST(Region, TooSmallForATextureIsNamedAsTheCause) {
 TEST(Region, ASmallOneThatIsEnoughIsLeftAlone) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.roi = {60, 60, 40, 40};
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("roi_px"))));
 }

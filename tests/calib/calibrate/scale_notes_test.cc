@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string>
 
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/damaged_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
@@ -16,21 +17,18 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using thicklens::testing::CalibrateWithoutMap;
 using thicklens::testing::DeepCopy;
-using thicklens::testing::GiveFloor;
 using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
 using thicklens::testing::SweepCase;
+using thicklens::testing::SweepWithFloor;
 using thicklens::testing::Thinned;
 
 constexpr int kSizePx = 160;
 
 SimulatedSweep Good() {
-  static const SimulatedSweep rendered = [] {
-    SimulatedSweep sweep = Simulate(SweepCase("iii", kSizePx, 1));
-    GiveFloor(&sweep);
-    return sweep;
-  }();
+  static const SimulatedSweep rendered = SweepWithFloor("iii", kSizePx, 1);
   return DeepCopy(rendered);
 }
 
@@ -43,15 +41,9 @@ SimulatedSweep KnifeEdge() {
   return sweep;
 }
 
-Calibration Measured(const SimulatedSweep& s) {
-  CalibrationOptions options;
-  options.map_field = false;
-  return Calibrate(s.sweep, options);
-}
-
 TEST(LoneEdge, ItsMissingScaleIsANoteNotAWarning) {
   const SimulatedSweep s = KnifeEdge();
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   EXPECT_FALSE(c.scale.done);
   EXPECT_EQ(c.scale.message, "a lone edge shows no image scale: offset_mm is taken as given");
@@ -61,7 +53,7 @@ TEST(LoneEdge, ItsMissingScaleIsANoteNotAWarning) {
 TEST(LoneEdge, NeedsAGivenOffset) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.offset_mm.reset();
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason,
               AllOf(HasSubstr("a lone edge shows no image scale;"), HasSubstr("state offset_mm")));
@@ -71,7 +63,7 @@ TEST(LoneEdge, NeedsAGivenOffset) {
 TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.target = model::SweepTarget::kAuto;
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   ASSERT_EQ(c.outcome, Outcome::kPartial) << c.reason;
   const double reach_mm = 2 * c.focus_depth_mm->sigma;
   EXPECT_LT(c.focus_depth_mm->systematic->x() - reach_mm, s.truth.focus_depth_mm);
@@ -84,9 +76,8 @@ class StraightLaw : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(StraightLaw, SlowAStraightLawHasNoNoteOfABend) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    SimulatedSweep s = Simulate(SweepCase(GetParam(), 256, seed));
-    GiveFloor(&s);
-    const Calibration c = Measured(s);
+    SimulatedSweep s = SweepWithFloor(GetParam(), 256, seed);
+    const Calibration c = CalibrateWithoutMap(s);
     EXPECT_TRUE(c.scale.done) << c.scale.message;
     EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("bend")))) << seed;
   }
@@ -100,7 +91,7 @@ TEST(BentLaw, IsWarnedOfWithItsSize) {
     const double u = (frame.reading_mm - 400) / 80;
     frame.reading_mm += 0.8 * u * u;
   }
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   const auto warning =
       std::find_if(c.warnings.begin(), c.warnings.end(), [](const std::string& text) {
         return text.find("readings bend against the image scale") != std::string::npos;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calib/registration/reading_gates.h"
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
 
@@ -15,22 +16,11 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using thicklens::testing::GiveFloor;
-using thicklens::testing::Simulate;
+using thicklens::testing::CalibrateWithoutMap;
 using thicklens::testing::SimulatedSweep;
-using thicklens::testing::SweepCase;
+using thicklens::testing::SweepWithFloor;
 
-SimulatedSweep Sweep() {
-  SimulatedSweep s = Simulate(SweepCase("iii", 256, 5));
-  GiveFloor(&s);
-  return s;
-}
-
-Calibration Measured(const SimulatedSweep& s) {
-  CalibrationOptions options;
-  options.map_field = false;
-  return Calibrate(s.sweep, options);
-}
+SimulatedSweep Sweep() { return SweepWithFloor("iii", 256, 5); }
 
 TEST(SlippedReadings, AJumpIsNamedAndWidensTheInterval) {
   constexpr double kJumpMm = 1.5;
@@ -38,7 +28,7 @@ TEST(SlippedReadings, AJumpIsNamedAndWidensTheInterval) {
   SimulatedSweep s = Sweep();
   for (std::size_t i = kFirst; i < s.sweep.frames.size(); ++i)
     s.sweep.frames[i].reading_mm += kJumpMm;
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_THAT(c.warnings, Contains(HasSubstr("the readings jump by +1.")));
   ASSERT_TRUE(c.focus_depth_mm && c.focus_depth_mm->systematic) << c.reason;
   const double truth = s.truth.focus_depth_mm;
@@ -54,18 +44,18 @@ TEST(SlippedReadings, AJumpIsNamedAndWidensTheInterval) {
 }
 
 TEST(SlippedReadings, AGoodSweepHasNoJump) {
-  const Calibration c = Measured(Sweep());
+  const Calibration c = CalibrateWithoutMap(Sweep());
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("jump"))));
 }
 
 // The others would refer to the most blurred frame, or to no depth at all.
 TEST(WrongReference, TheNextSharpestTakesItsPlace) {
   SimulatedSweep s = Sweep();
-  const Calibration clean = Measured(s);
+  const Calibration clean = CalibrateWithoutMap(s);
   ASSERT_TRUE(clean.focus_depth_mm && clean.blur_ratio) << clean.reason;
   const int sharpest = clean.source.sharpest_normalised_frame;
   s.sweep.frames[static_cast<std::size_t>(sharpest)].reading_mm += 30;
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio) << c.reason;
   EXPECT_THAT(c.frames[static_cast<std::size_t>(sharpest)].rejection,
               HasSubstr("reading off by 30"));
@@ -83,7 +73,7 @@ TEST(ShuffledReadings, AreRefusedAlsoWithAGivenOffset) {
     const std::size_t from = (i * 17) % s.sweep.frames.size();
     s.sweep.frames[i].reading_mm = s.truth.frames[from].reading_mm;
   }
-  const Calibration c = Measured(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, HasSubstr("does not follow the readings"));
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
 
@@ -13,6 +14,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using thicklens::testing::CalibrateWithoutMap;
 using thicklens::testing::GiveFloor;
 using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
@@ -26,12 +28,6 @@ SimulatedSweep StarSweep(const std::string& name, std::uint64_t seed) {
   return simulated;
 }
 
-Calibration Calibrated(const SimulatedSweep& simulated) {
-  CalibrationOptions options;
-  options.map_field = false;
-  return Calibrate(simulated.sweep, options);
-}
-
 void ExpectRight(const Calibration& c, const model::SweepTruth& truth, double step_mm) {
   ASSERT_TRUE(c.focus_depth_mm && c.blur_ratio && c.image_distance_mm) << c.reason;
   EXPECT_NEAR(c.focus_depth_mm->value, truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma);
@@ -43,7 +39,7 @@ void ExpectRight(const Calibration& c, const model::SweepTruth& truth, double st
 
 TEST(StarSweep, CalibratesWithinItsErrors) {
   const SimulatedSweep iii = StarSweep("iii", 3);
-  const Calibration c = Calibrated(iii);
+  const Calibration c = CalibrateWithoutMap(iii);
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
   ExpectRight(c, iii.truth, 4);
   EXPECT_EQ(c.blur.meter, "relative spectrum");
@@ -54,7 +50,7 @@ TEST(StarSweep, CalibratesWithinItsErrors) {
 
 TEST(StarSweep, StrongDefocusCalibratesToo) {
   const SimulatedSweep ii = StarSweep("ii", 4);
-  ExpectRight(Calibrated(ii), ii.truth, 1);
+  ExpectRight(CalibrateWithoutMap(ii), ii.truth, 1);
 }
 
 // No scale says so, but the blur does.
@@ -62,7 +58,7 @@ TEST(StarSweep, AWrongReadingIsNamedByItsBlur) {
   for (const double error_mm : {12.0, -25.0}) {
     SimulatedSweep s = StarSweep("iii", 3);
     s.sweep.frames[9].reading_mm += error_mm;
-    const Calibration c = Calibrated(s);
+    const Calibration c = CalibrateWithoutMap(s);
     ExpectRight(c, s.truth, 4);
     EXPECT_THAT(c.frames[9].rejection, HasSubstr("reading off by"));
     int rejected = 0;
@@ -74,7 +70,7 @@ TEST(StarSweep, AWrongReadingIsNamedByItsBlur) {
 // All others are compared with the sharpest frame. If that one is wrong, another takes its place.
 TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
   SimulatedSweep s = StarSweep("iii", 3);
-  const Calibration clean = Calibrated(s);
+  const Calibration clean = CalibrateWithoutMap(s);
   const auto sharpest = static_cast<std::size_t>(
       std::max_element(clean.frames.begin(), clean.frames.end(),
                        [](const FrameMeasurement& a, const FrameMeasurement& b) {
@@ -82,7 +78,7 @@ TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
                        }) -
       clean.frames.begin());
   s.sweep.frames[sharpest].reading_mm += 40;
-  const Calibration c = Calibrated(s);
+  const Calibration c = CalibrateWithoutMap(s);
   ExpectRight(c, s.truth, 4);
   EXPECT_THAT(c.frames[sharpest].rejection, HasSubstr("reading off by"));
   EXPECT_FALSE(c.frames[sharpest].in_blur_fit);
@@ -94,7 +90,7 @@ TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
 TEST(StarSweep, WithoutAnOffsetItSaysWhatToDo) {
   SimulatedSweep s = StarSweep("iii", 3);
   s.sweep.offset_mm.reset();
-  const Calibration c = Calibrated(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_FALSE(c.focus_depth_mm);
   EXPECT_THAT(c.reason, HasSubstr("offset_mm is unknown"));

@@ -9,6 +9,7 @@
 
 #include "calib/fit/blur_prediction.h"
 #include "support/test_cameras.h"
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
 
@@ -35,12 +36,6 @@ SimulatedSweep Wide(model::Psf psf, model::PupilLaw law, std::uint64_t seed) {
   return s;
 }
 
-Calibration Calibrated(const SimulatedSweep& s) {
-  CalibrationOptions how;
-  how.map_field = false;
-  return Calibrate(s.sweep, how);
-}
-
 // How far the truth lies beyond the interval, in sigmas.
 double Beyond(const std::optional<Result>& result, double truth) {
   if (!result || !result->systematic) return std::nan("");
@@ -54,7 +49,7 @@ TEST(WideLens, KappaIsThatOfTheBlurUnderAnyPupilLaw) {
     for (const model::PupilLaw law : model::AllPupilLaws()) {
       SCOPED_TRACE(PsfName(psf) + ", " + PupilLawName(law));
       const SimulatedSweep s = Wide(psf, law, 71);
-      const Calibration c = Calibrated(s);
+      const Calibration c = CalibrateWithoutMap(s);
       ASSERT_EQ(c.outcome, Outcome::kOk) << c.reason;
       EXPECT_EQ(c.blur.family, psf);
       EXPECT_LT(c.blur_ratio->sigma, 0.005 * kRatio);
@@ -79,7 +74,7 @@ TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
     SCOPED_TRACE(PupilLawName(law));
     SimulatedSweep s = Wide(model::Psf::kGaussian, law, 72);
     s.sweep.offset_mm.reset();
-    const Calibration c = Calibrated(s);
+    const Calibration c = CalibrateWithoutMap(s);
     ASSERT_EQ(c.outcome, Outcome::kOk) << c.reason;
     EXPECT_THAT(c.systematic_parts, Contains(Field(&SystematicPart::name, "pupil law")));
     EXPECT_LT(Beyond(c.bench_offset_mm, s.truth.bench_offset_mm), 2);
@@ -97,7 +92,8 @@ TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
 
 // A zero that was measured has no part of the pupil law.
 TEST(WideLens, AGivenZeroHasNone) {
-  const Calibration c = Calibrated(Wide(model::Psf::kGaussian, model::PupilLaw::kUniform, 73));
+  const Calibration c =
+      CalibrateWithoutMap(Wide(model::Psf::kGaussian, model::PupilLaw::kUniform, 73));
   EXPECT_THAT(c.systematic_parts, Not(Contains(Field(&SystematicPart::name, "pupil law"))));
 }
 

@@ -7,6 +7,7 @@
 
 #include "calib/registration/change_of_reference.h"
 #include "calib/uncertainty/calibration_checks.h"
+#include "tests/calib/calibrated_sweep.h"
 #include "tests/calib/simulated_sweep.h"
 #include "thicklens/calib/calibrate.h"
 
@@ -16,6 +17,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using thicklens::testing::CalibrateWithoutMap;
 using thicklens::testing::GiveFloor;
 using thicklens::testing::Simulate;
 using thicklens::testing::SimulatedSweep;
@@ -34,12 +36,6 @@ SimulatedSweep Sweep(model::TargetKind target, model::Psf psf) {
   return simulated;
 }
 
-Calibration Calibrated(const SimulatedSweep& simulated) {
-  CalibrationOptions options;
-  options.map_field = false;
-  return Calibrate(simulated.sweep, options);
-}
-
 void ExpectCovers(const std::optional<Result>& result, double truth) {
   ASSERT_TRUE(result && result->systematic);
   EXPECT_LT(result->systematic->x() - 3 * result->sigma, truth);
@@ -56,7 +52,7 @@ TEST(Contradiction, OfTheGivenOffsetWidensEverything) {
   SimulatedSweep s = Sweep(model::TargetKind::kDeadLeaves, model::Psf::kGaussian);
   const double truth_mm = s.sweep.offset_mm->value;
   s.sweep.offset_mm->value += 6;
-  const Calibration c = Calibrated(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_NE(c.outcome, Outcome::kRefused) << c.reason;
   ExpectCovers(c, s.truth);
   EXPECT_LT(c.bench_offset_mm->systematic->x(), truth_mm + 1);
@@ -68,7 +64,7 @@ TEST(Contradiction, OfTheGivenOffsetWidensEverything) {
 TEST(Contradiction, OfTheGivenOffsetByTensOfMillimetresIsRefused) {
   SimulatedSweep s = Sweep(model::TargetKind::kDeadLeaves, model::Psf::kGaussian);
   s.sweep.offset_mm->value += 60;
-  const Calibration c = Calibrated(s);
+  const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, HasSubstr("check offset_mm, and that it and the readings are in mm"));
   EXPECT_FALSE(c.focus_depth_mm);
@@ -80,7 +76,7 @@ TEST(Contradiction, AJumpOfTheReadingsMovesTheZeroByMoreThanItself) {
     const double truth_mm = s.sweep.offset_mm->value;
     if (!offset_is_known) s.sweep.offset_mm.reset();
     for (std::size_t i = 16; i < s.sweep.frames.size(); ++i) s.sweep.frames[i].reading_mm += 1.5;
-    const Calibration c = Calibrated(s);
+    const Calibration c = CalibrateWithoutMap(s);
     ASSERT_NE(c.outcome, Outcome::kRefused) << c.reason;
     EXPECT_THAT(c.warnings, Contains(HasSubstr("the readings jump by +1.")));
     ExpectCovers(c, s.truth);
@@ -94,7 +90,7 @@ TEST(Contradiction, ADiscThatIsStatedToBeAGaussianIsReported) {
   for (const auto target : {model::TargetKind::kDeadLeaves, model::TargetKind::kKnifeEdge}) {
     SimulatedSweep s = Sweep(target, model::Psf::kDisc);
     s.sweep.camera.psf = model::Psf::kGaussian;
-    const Calibration c = Calibrated(s);
+    const Calibration c = CalibrateWithoutMap(s);
     ASSERT_TRUE(c.blur_ratio) << c.reason;
     ExpectCovers(c, s.truth);
     EXPECT_EQ(c.advice, "state psf: disc in the camera file: it fits better");
@@ -107,7 +103,7 @@ TEST(Contradiction, NoneWhereAllIsWell) {
   for (const auto psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
     for (const auto target : {model::TargetKind::kDeadLeaves, model::TargetKind::kKnifeEdge}) {
       const SimulatedSweep s = Sweep(target, psf);
-      const Calibration c = Calibrated(s);
+      const Calibration c = CalibrateWithoutMap(s);
       ASSERT_TRUE(c.blur_ratio) << c.reason;
       ExpectCovers(c, s.truth);
       EXPECT_THAT(c.advice, Not(HasSubstr("psf:")));
