@@ -35,7 +35,6 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using thicklens::testing::CentredSensor;
 using thicklens::testing::ContentOf;
-using thicklens::testing::TemporaryFolder;
 using thicklens::testing::TestCameraFocusedAt;
 using thicklens::testing::WideLens;
 using thicklens::testing::WithMethod;
@@ -63,7 +62,8 @@ std::string WideCameraYaml() {
       TestCameraFocusedAt(800, "wide", WideLens(), CentredSensor(kWidthPx, kHeightPx, 0.2))));
 }
 
-class EstimateFunctionalTest : public ::testing::TestWithParam<const char*> {
+class EstimateFunctionalTest : public ::testing::TestWithParam<const char*>,
+                               protected EstimateCommand {
  protected:
   std::string Depth(const std::function<double(int x)>& value) const {
     model::RawDepthMap map{kWidthPx, kHeightPx, {}, false};
@@ -71,43 +71,17 @@ class EstimateFunctionalTest : public ::testing::TestWithParam<const char*> {
       map.values.push_back(static_cast<float>(value(i % kWidthPx)));
     return folder_.Put("depth.pfm", io::EncodePfm(map));
   }
-  std::string Picture() const { return folder_.Put("picture.png", io::EncodePng(Stripes())); }
-  std::string Output() const { return folder_ / "lf"; }
+  std::string Picture() const { return folder_.Put("picture.png", EncodePng(Stripes())); }
   Arguments Usual() const {
     return {Picture(),      Depth([](int x) { return 0.02 * x - 0.5; }),
             "--solver",     GetParam(),
             "--views",      "3x3",
             "--depth-kind", "disparity"};
   }
-  static Arguments With(Arguments arguments, const Arguments& more) {
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
-  ProgramResult Run(Arguments arguments) const {
-    arguments.insert(arguments.begin(), "estimate");
-    arguments.insert(arguments.end(), {"-o", Output()});
-    return ChildProgram(arguments, scratch_.path(), 0).Wait();
-  }
-  json Summary(const Arguments& arguments, ProgramResult* result = nullptr) const {
-    const std::string path = folder_ / "summary.json";
-    const ProgramResult ended = Run(With(arguments, {"--json", path}));
-    EXPECT_EQ(ended.exit_code, 0) << ended.err;
-    if (result != nullptr) *result = ended;
-    return json::parse(ContentOf(path));
-  }
-  std::string Refusal(const Arguments& arguments, int exit_code) const {
-    const ProgramResult result = Run(arguments);
-    EXPECT_EQ(result.exit_code, exit_code) << result.err;
-    EXPECT_FALSE(fs::exists(Output()));
-    return result.err;
-  }
   model::LightField Estimated(const Arguments& arguments) const {
     Summary(With(arguments, {"--format", "tiff"}));
     return io::ReadLightField(Output(), {});
   }
-
-  TemporaryFolder folder_;
-  TemporaryFolder scratch_;
 };
 
 TEST_P(EstimateFunctionalTest, SaysWhatItDid) {

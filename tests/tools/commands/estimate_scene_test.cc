@@ -38,7 +38,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using thicklens::testing::ContentOf;
-using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
 constexpr int kColumns = 96, kRows = 64;
@@ -64,7 +63,7 @@ std::string CameraYaml(const model::TransferCurve& transfer) {
   return model::CameraToYaml(thicklens::testing::PhotographCamera(kColumns, kRows, transfer));
 }
 
-class EstimateSceneTest : public ::testing::Test {
+class EstimateSceneTest : public ::testing::Test, protected EstimateCommand {
  protected:
   std::string Picture(int channels = 3) const {
     return folder_.Put("picture.png", io::EncodePng(Stripes(channels)));
@@ -79,39 +78,16 @@ class EstimateSceneTest : public ::testing::Test {
   std::string Slant() const {
     return Depth([](int x, int) { return 0.01 * x - 0.5; });
   }
-  std::string Output() const { return folder_ / "lf"; }
   std::string Report() const { return folder_ / "page"; }
 
   Arguments Usual() const {
     return {Picture(), Slant(), "--depth-kind", "disparity", "--views", "3x3"};
   }
-  static Arguments With(Arguments arguments, const Arguments& more) {
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
-  ProgramResult Run(Arguments arguments) const {
-    arguments.insert(arguments.begin(), "estimate");
-    arguments.insert(arguments.end(), {"-o", Output()});
-    return ChildProgram(arguments, scratch_.path(), 0).Wait();
-  }
-  // What --json writes of a run that must succeed.
-  json Summary(const Arguments& arguments, ProgramResult* result = nullptr) const {
-    const std::string path = folder_ / "summary.json";
-    const ProgramResult ended = Run(With(arguments, {"--json", path}));
-    EXPECT_EQ(ended.exit_code, 0) << ended.err;
-    if (result != nullptr) *result = ended;
-    return json::parse(ContentOf(path));
-  }
   std::string Refusal(const Arguments& arguments, int exit_code) const {
-    const ProgramResult result = Run(arguments);
-    EXPECT_EQ(result.exit_code, exit_code) << result.err;
-    EXPECT_FALSE(fs::exists(Output()));
+    std::string message = EstimateCommand::Refusal(arguments, exit_code);
     EXPECT_FALSE(fs::exists(Report()));
-    return result.err;
+    return message;
   }
-
-  TemporaryFolder folder_;
-  TemporaryFolder scratch_;
 };
 
 // A near strip before a far wall.

@@ -37,9 +37,9 @@ class InputKinds : public ::testing::Test {
     fs::copy_file(configs + "cameras/case-ii.yaml", *made_ / "case.yaml");
     fs::copy_file(configs + "cameras/macro-bench.yaml", *made_ / "calibrated.yaml");
     const std::string scene = configs + "scenes/in-focus.yaml";
-    Make({"simulate", "picture", scene, "-o", *made_ / "pic"});
-    Make({"simulate", "light-field", scene, "--views", "2x2", "-o", *made_ / "lf"});
-    Make({"render", *made_ / "lf", "--convert", "hci", "-o", *made_ / "hci"});
+    MakeWithProgram({"simulate", "picture", scene, "-o", *made_ / "pic"});
+    MakeWithProgram({"simulate", "light-field", scene, "--views", "2x2", "-o", *made_ / "lf"});
+    MakeWithProgram({"render", *made_ / "lf", "--convert", "hci", "-o", *made_ / "hci"});
     made_->Put("frames/a.png", ReadWholeFile(*made_ / "pic/picture.png"));
     made_->Put("table.csv", "a.png,300\n");
     made_->Put("sweep.yaml",
@@ -59,13 +59,6 @@ class InputKinds : public ::testing::Test {
     made_->Put("page.html", "<html></html>");
   }
   static void TearDownTestSuite() { made_.reset(); }
-  static void Make(Words words) {
-    words.emplace_back("--quiet");
-    const TemporaryFolder scratch;
-    const ProgramResult result = ChildProgram(words, scratch.path(), 0).Wait();
-    ASSERT_EQ(result.exit_code, 0) << ShellCommand(words) << "\n" << result.err;
-  }
-
   InputKinds() { fs::copy(made_->path(), work_ / "w", fs::copy_options::recursive); }
   std::string operator()(const std::string& name) const { return work_ / "w/" + name; }
 

@@ -56,15 +56,15 @@ class RunFilesTest : public ::testing::Test {
     fs::copy_file(cameras + "case-ii.yaml", *made_ / "case.yaml");
     fs::copy_file(cameras + "macro-bench.yaml", *made_ / "calibrated.yaml");
     const std::string demo = std::string(THICKLENS_SOURCE_DIR) + "/configs/scenes/in-focus.yaml";
-    Make({"simulate", "picture", demo, "-o", *made_ / "pic"});
-    Make({"simulate", "light-field", demo, "--views", "2x2", "-o", *made_ / "lf"});
-    Make({"render", *made_ / "lf", "--convert", "hci", "-o", *made_ / "hci"});
-    Make({"render", *made_ / "lf", "--view", "0,0", "-o", *made_ / "target.png"});
+    MakeWithProgram({"simulate", "picture", demo, "-o", *made_ / "pic"});
+    MakeWithProgram({"simulate", "light-field", demo, "--views", "2x2", "-o", *made_ / "lf"});
+    MakeWithProgram({"render", *made_ / "lf", "--convert", "hci", "-o", *made_ / "hci"});
+    MakeWithProgram({"render", *made_ / "lf", "--view", "0,0", "-o", *made_ / "target.png"});
     fs::copy_file(*made_ / "target.png", *made_ / "mask.png");
     fs::copy_file(*made_ / "pic/depth.pfm", *made_ / "map.pfm");
     made_->Put("sw.yaml", kSmallSweep);
     made_->Put("scene.yaml", kSmallScene);
-    Make({"simulate", "sweep", *made_ / "sw.yaml", "-o", *made_ / "sweep"});
+    MakeWithProgram({"simulate", "sweep", *made_ / "sw.yaml", "-o", *made_ / "sweep"});
     std::string rows = "file,reading\n";
     for (int i = 0; i < 6; ++i) {
       rows += "frame_00" + std::to_string(i) + ".png," + std::to_string(290 + 4 * i) + "\n";
@@ -79,13 +79,6 @@ class RunFilesTest : public ::testing::Test {
     made_->Put("floor.yaml", ContentOf(*made_ / "case.yaml"));
   }
   static void TearDownTestSuite() { made_.reset(); }
-
-  static void Make(Words words) {
-    words.emplace_back("--quiet");
-    const TemporaryFolder scratch;
-    const ProgramResult result = ChildProgram(words, scratch.path(), 0).Wait();
-    ASSERT_EQ(result.exit_code, 0) << ShellCommand(words) << "\n" << result.err;
-  }
 
   RunFilesTest() { fs::copy(made_->path(), work_ / "w", fs::copy_options::recursive); }
   std::string operator()(const std::string& name) const { return work_ / "w/" + name; }

@@ -1,13 +1,16 @@
 #include "tools/support/child_process.h"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <filesystem>
 #include <stdexcept>
 
+#include "program_run.h"
 #include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
@@ -68,6 +71,39 @@ ProgramResult ChildProgram::Wait() {
   return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -1,
           WIFSIGNALED(status_) ? WTERMSIG(status_) : 0, ReadWholeFile(out_path_),
           ReadWholeFile(err_path_)};
+}
+
+void MakeWithProgram(std::vector<std::string> arguments) {
+  arguments.emplace_back("--quiet");
+  const thicklens::testing::TemporaryFolder scratch;
+  const ProgramResult result = ChildProgram(arguments, scratch.path(), 0).Wait();
+  ASSERT_EQ(result.exit_code, 0) << ShellCommand(arguments) << "\n" << result.err;
+}
+
+EstimateCommand::Words EstimateCommand::With(Words arguments, const Words& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+ProgramResult EstimateCommand::Run(Words arguments) const {
+  arguments.insert(arguments.begin(), "estimate");
+  arguments.insert(arguments.end(), {"-o", Output()});
+  return ChildProgram(arguments, scratch_.path(), 0).Wait();
+}
+
+nlohmann::json EstimateCommand::Summary(const Words& arguments, ProgramResult* result) const {
+  const std::string path = folder_ / "summary.json";
+  const ProgramResult ended = Run(With(arguments, {"--json", path}));
+  EXPECT_EQ(ended.exit_code, 0) << ended.err;
+  if (result != nullptr) *result = ended;
+  return nlohmann::json::parse(thicklens::testing::ContentOf(path));
+}
+
+std::string EstimateCommand::Refusal(const Words& arguments, int exit_code) const {
+  const ProgramResult result = Run(arguments);
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(Output()));
+  return result.err;
 }
 
 }  // namespace thicklens::tools

@@ -3,8 +3,11 @@
 
 #include <sys/types.h>
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
+
+#include "support/temporary_folder.h"
 
 namespace thicklens::tools {
 
@@ -35,6 +38,26 @@ class ChildProgram {
   pid_t pid_ = -1;
   int status_ = 0;
   bool ended_ = false;
+};
+
+// Runs the program with --quiet. The test fails if the program does.
+void MakeWithProgram(std::vector<std::string> arguments);
+
+// What fixtures of `thicklens estimate` have in common: folders of their own, and an output there.
+class EstimateCommand {
+ protected:
+  using Words = std::vector<std::string>;
+
+  std::string Output() const { return folder_ / "lf"; }
+  static Words With(Words arguments, const Words& more);
+  ProgramResult Run(Words arguments) const;
+  // What --json writes of a run that must succeed.
+  nlohmann::json Summary(const Words& arguments, ProgramResult* result = nullptr) const;
+  // What a run says that must end with the exit code and without output.
+  std::string Refusal(const Words& arguments, int exit_code) const;
+
+  thicklens::testing::TemporaryFolder folder_;
+  thicklens::testing::TemporaryFolder scratch_;
 };
 
 }  // namespace thicklens::tools
