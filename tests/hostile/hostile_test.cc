@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <sstream>
 
-#include "depth_io.h"
-#include "image_io.h"
-#include "light_field_io.h"
-#include "printable_text.h"
-#include "program_run.h"
+#include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/light_field_io.h"
+#include "thicklens/base/printable_text.h"
+#include "tools/system/program_run.h"
 #include "support/test_cameras.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"

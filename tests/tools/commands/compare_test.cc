@@ -349,9 +349,9 @@ TEST_F(CompareProgram, SaysWhatTheDisparityMeansByItsOptions) {
 TEST_F(CompareProgram, AsksWhatTheDepthMapOfACameraSays) {
   const model::Camera camera = WithMethod(
       TestCamera("small", WideLens(), TestSensor(kWide, kHigh, 0.006, {21.5, 17.5}), {16.3, 0}));
-  LightFieldReading reading;
+  io::LightFieldReading reading;
   reading.grid = kGrid;
-  model::LightField light_field = ReadLightField(PutHci("views", 3, 0), reading);
+  model::LightField light_field = io::ReadLightField(PutHci("views", 3, 0), reading);
   light_field.camera = camera;
   light_field.grid = model::DefaultGrid(camera, 3, 3);
   const std::string truth = Write("truth", light_field);

@@ -71,7 +71,7 @@ class EstimateFunctionalTest : public ::testing::TestWithParam<const char*>,
       map.values.push_back(static_cast<float>(value(i % kWidthPx)));
     return folder_.Put("depth.pfm", io::EncodePfm(map));
   }
-  std::string Picture() const { return folder_.Put("picture.png", EncodePng(Stripes())); }
+  std::string Picture() const { return folder_.Put("picture.png", io::EncodePng(Stripes())); }
   Arguments Usual() const {
     return {Picture(),      Depth([](int x) { return 0.02 * x - 0.5; }),
             "--solver",     GetParam(),

@@ -148,7 +148,7 @@ TEST(CompareExif, ThePitchAndTheCropFactorAreThoseOfTheSensor) {
 }
 
 TEST(CompareExif, AScaledOrCroppedPictureIsReported) {
-  PhotoExif exif;
+  io::PhotoExif exif;
   exif.made_width_px = 600;
   exif.made_height_px = 400;
   EXPECT_EQ(VerdictOn("image size", exif), "undecided");

@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-#include "option_values.h"
+#include "tools/options/option_values.h"
 #include "support/test_cameras.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/render.h"

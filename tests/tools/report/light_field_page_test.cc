@@ -26,7 +26,7 @@
 #include "tools/support/child_process.h"
 #include "tools/support/made_up_calibration.h"
 #include "tools/support/xml_elements.h"
-#include "xml_elements.h"
+#include "tools/support/xml_elements.h"
 
 namespace thicklens::tools {
 namespace {

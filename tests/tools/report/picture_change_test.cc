@@ -45,8 +45,8 @@ TEST(PictureChangeTest, AShiftIsAShift) {
 }
 
 TEST(PictureChangeTest, RmsLargestAndPsnrAreThoseOfTheDifference) {
-  estimator::StoredValues dark{4, 3, 1, std::vector<float>(12, 0.25F)};
-  estimator::StoredValues bright = dark;
+  model::StoredValues dark{4, 3, 1, std::vector<float>(12, 0.25F)};
+  model::StoredValues bright = dark;
   bright.values[5] += 0.1F;
   const PictureChange change = Change(dark, bright);
   EXPECT_NEAR(change.largest_grey_levels, 25.5, 1e-4);

@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "program_run.h"
+#include "tools/system/program_run.h"
 #include "thicklens/base/output_file.h"
 
 namespace thicklens::tools {
