@@ -64,7 +64,7 @@ void ReadCheckpoint(const std::string& bytes, const TemporaryFolder& folder) {
     journal.Append({half == std::string::npos ? "" : bytes.substr(half + 1)});
   }
   for (const std::string& path : {records, folder.Put("estimate.blocks", bytes)}) {
-    tools::BlockCheckpoint checkpoint(path);
+    tools::BlockCheckpoint checkpoint(path, "a version");
     checkpoint.device();
     // What is left out of a file is no error to the reader; here it is.
     const bool is_whole = checkpoint.block_px() && checkpoint.Find(0) && checkpoint.Find(1);

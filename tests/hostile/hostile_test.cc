@@ -10,9 +10,9 @@
 #include "depth_io.h"
 #include "image_io.h"
 #include "light_field_io.h"
-#include "printable_text.h"
 #include "program_run.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
 

@@ -33,6 +33,8 @@ using thicklens::testing::ErrorOf;
 using thicklens::testing::TemporaryFolder;
 using Arguments = std::vector<std::string>;
 
+constexpr char kVersion[] = "a version";
+
 estimator::BlockRun SomeRun(const std::string& gamma, const std::vector<float>& picture) {
   estimator::BlockRun run;
   run.settings = {{"block_px", "24"}, {"gamma", gamma}};
@@ -60,14 +62,14 @@ TEST_F(BlockCheckpointTest, ABlockComesBackAsTheLightFieldHoldsIt) {
   estimator::SolvedBlock iterated = SomeBlock();
   iterated.report.rcond.reset();
   {
-    BlockCheckpoint checkpoint(Path());
+    BlockCheckpoint checkpoint(Path(), kVersion);
     EXPECT_FALSE(checkpoint.block_px());
     checkpoint.Begin(SomeRun("1", picture_));
     checkpoint.Keep(2, SomeBlock());
     checkpoint.Keep(0, iterated);
     EXPECT_EQ(checkpoint.kept(), 2);
   }
-  BlockCheckpoint checkpoint(Path());
+  BlockCheckpoint checkpoint(Path(), kVersion);
   EXPECT_EQ(checkpoint.block_px(), 24);
   checkpoint.Begin(SomeRun("1", picture_));
   EXPECT_EQ(checkpoint.kept(), 2);
@@ -93,13 +95,13 @@ TEST_F(BlockCheckpointTest, ABlockComesBackAsTheLightFieldHoldsIt) {
 
 TEST_F(BlockCheckpointTest, AnotherEstimateIsToldByWhatDiffers) {
   {
-    BlockCheckpoint checkpoint(Path());
+    BlockCheckpoint checkpoint(Path(), kVersion);
     checkpoint.Begin(SomeRun("1", picture_));
     checkpoint.Keep(0, SomeBlock());
   }
   const std::string before = ContentOf(Path());
   const auto refusal = [&](const estimator::BlockRun& run) {
-    BlockCheckpoint checkpoint(Path());
+    BlockCheckpoint checkpoint(Path(), kVersion);
     const std::string message = ErrorOf([&] { checkpoint.Begin(run); });
     EXPECT_EQ(checkpoint.kept(), 0);
     EXPECT_THAT(message, HasSubstr(Path() + ": holds blocks of another estimate"));
@@ -118,15 +120,15 @@ TEST_F(BlockCheckpointTest, AnotherEstimateIsToldByWhatDiffers) {
 
 // A run that ended before its first block was there leaves nothing that binds the next one.
 TEST_F(BlockCheckpointTest, WithoutABlockItHoldsNothing) {
-  { BlockCheckpoint(Path()).Begin(SomeRun("1", picture_)); }
+  { BlockCheckpoint(Path(), kVersion).Begin(SomeRun("1", picture_)); }
   EXPECT_FALSE(fs::exists(Path()));
   { JournalFile(Path(), "thicklens-blocks/1").Append({"[[\"gamma\",\"1\"]]"}); }
   {
-    BlockCheckpoint checkpoint(Path());
+    BlockCheckpoint checkpoint(Path(), kVersion);
     checkpoint.Begin(SomeRun("2", picture_));
     checkpoint.Keep(0, SomeBlock());
   }
-  BlockCheckpoint checkpoint(Path());
+  BlockCheckpoint checkpoint(Path(), kVersion);
   checkpoint.Begin(SomeRun("2", picture_));
   EXPECT_EQ(checkpoint.kept(), 1);
 }
@@ -134,7 +136,7 @@ TEST_F(BlockCheckpointTest, WithoutABlockItHoldsNothing) {
 // Records with right hashes whose content is wrong: nobody but a person writes such.
 TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
   {
-    BlockCheckpoint checkpoint(Path());
+    BlockCheckpoint checkpoint(Path(), kVersion);
     checkpoint.Begin(SomeRun("1", picture_));
     checkpoint.Keep(1, SomeBlock());
   }
@@ -150,7 +152,7 @@ TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
     SCOPED_TRACE(i);
     folder_.Put("blocks", whole);
     { JournalFile(Path(), "thicklens-blocks/1").Append({wrong[i]}); }
-    BlockCheckpoint checkpoint(Path());
+    BlockCheckpoint checkpoint(Path(), kVersion);
     checkpoint.Begin(SomeRun("1", picture_));
     const bool has_its_number = i >= 1 && i <= 5 && wrong[i].size() >= 64;
     EXPECT_EQ(checkpoint.Find(1).has_value(), !has_its_number);
@@ -165,7 +167,7 @@ TEST_F(BlockCheckpointTest, RecordsThatAreNoBlocksAreNotFound) {
       journal.Append({first});
       journal.Append({right});
     }
-    BlockCheckpoint other(folder_ / "other");
+    BlockCheckpoint other(folder_ / "other", kVersion);
     EXPECT_FALSE(other.block_px());
     EXPECT_FALSE(other.device());
     EXPECT_THAT(ErrorOf([&] { other.Begin(SomeRun("1", picture_)); }),
@@ -184,11 +186,11 @@ TEST_F(BlockCheckpointTest, TellsTheDeviceToAskFor) {
     run.settings.emplace_back("device", device);
     folder_.Put("blocks", "");
     {
-      BlockCheckpoint checkpoint(Path());
+      BlockCheckpoint checkpoint(Path(), kVersion);
       checkpoint.Begin(run);
       checkpoint.Keep(0, SomeBlock());
     }
-    EXPECT_EQ(BlockCheckpoint(Path()).device().value_or("none"), expected);
+    EXPECT_EQ(BlockCheckpoint(Path(), kVersion).device().value_or("none"), expected);
   }
 }
 
@@ -305,7 +307,7 @@ TEST_F(ResumedEstimate, UnderAMemoryLimitItKeepsTheSizeOfTheBlocks) {
   const int mebibytes = static_cast<int>(least["predicted_memory_mib"].get<double>()) + 40;
   fs::remove_all(folder_ / "lf");
   StopHalfway(SIGKILL, {"--checkpoint", Checkpoint(), "--memory-limit", std::to_string(mebibytes)});
-  const std::optional<int> block_px = BlockCheckpoint(Checkpoint()).block_px();
+  const std::optional<int> block_px = BlockCheckpoint(Checkpoint(), kVersion).block_px();
   ASSERT_TRUE(block_px);
   const Arguments more = {"--memory-limit", std::to_string(mebibytes + 300)};
   const auto anew = summary(more);

@@ -1,5 +1,4 @@
 // What all commands have in common.
-#include "commands.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +7,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "command_frame.h"
 #include "interrupt.h"
 #include "support/temporary_folder.h"
 #include "thicklens/base/error.h"

@@ -168,11 +168,13 @@ TEST_F(InputKinds, OfTheOthers) {
 TEST_F(InputKinds, OfCheckpoints) {
   const std::string path = work_ / "checkpoint";
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
-  EXPECT_THAT(ErrorOf([&] { BlockCheckpoint file(path); }), HasSubstr("a named pipe"));
-  EXPECT_THAT(ErrorOf([] { BlockCheckpoint file("/dev/zero"); }), HasSubstr("a character device"));
-  EXPECT_THAT(ErrorOf([] { BlockCheckpoint file("-"); }), HasSubstr("standard output"));
+  EXPECT_THAT(ErrorOf([&] { BlockCheckpoint file(path, "a version"); }), HasSubstr("a named pipe"));
+  EXPECT_THAT(ErrorOf([] { BlockCheckpoint file("/dev/zero", "a version"); }),
+              HasSubstr("a character device"));
+  EXPECT_THAT(ErrorOf([] { BlockCheckpoint file("-", "a version"); }),
+              HasSubstr("standard output"));
   fs::create_symlink("ring", work_ / "ring");
-  EXPECT_THAT(ErrorOf([&] { BlockCheckpoint file(work_ / "ring"); }),
+  EXPECT_THAT(ErrorOf([&] { BlockCheckpoint file(work_ / "ring", "a version"); }),
               HasSubstr("no regular file but a symbolic link"));
 }
 

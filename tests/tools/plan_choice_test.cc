@@ -16,6 +16,7 @@
 #include "build_info.h"
 #include "child_process.h"
 #include "estimate_profile.h"
+#include "machine.h"
 #include "profile_measurement.h"
 #include "support/temporary_folder.h"
 #include "thicklens/base/error.h"

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "support/special_numbers.h"
+#include "thicklens/base/printable_text.h"
 #include "xml_elements.h"
 
 namespace thicklens::tools {

@@ -6,8 +6,8 @@
 #include <system_error>
 
 #include "light_field_io.h"
-#include "printable_text.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/estimator/aperture_weights.h"
 
 namespace thicklens::tools {

@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "attribution.h"
-#include "memory_available.h"
-#include "stopwatch.h"
+#include "thicklens/base/memory_available.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/estimate_input.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "thicklens/model/light_field_grid.h"

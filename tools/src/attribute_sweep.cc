@@ -9,9 +9,9 @@
 
 #include "attribution.h"
 #include "simulated_sweep.h"
-#include "stopwatch.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/calib/calibrate.h"
 
 namespace thicklens::tools {

@@ -7,15 +7,16 @@
 #include <opencv2/core/mat.hpp>
 
 #include "build_info.h"
-#include "interrupt.h"
 #include "light_field_figures.h"
+#include "machine.h"
 #include "page_figures.h"
 #include "page_pictures.h"
 #include "page_style.h"
-#include "printable_text.h"
 #include "simulated_sweep.h"
 #include "svg_plot.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {
@@ -188,7 +189,7 @@ std::string AttributionPage(const Attribution& attribution, const std::string& n
 
 AttributionRun AttributionRunWith(const CommonOptions& common, ProgressLine* progress) {
   return {common.threads, [progress](int done, int total) {
-            ThrowIfInterrupted();
+            ThrowIfCancelled();
             progress->Show(done, total);
           }};
 }

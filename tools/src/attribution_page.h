@@ -4,7 +4,7 @@
 #include <string>
 
 #include "attribution_table.h"
-#include "commands.h"
+#include "command_frame.h"
 #include "progress_line.h"
 #include "thicklens/base/output_file.h"
 

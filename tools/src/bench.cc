@@ -19,15 +19,16 @@
 #include "bench_scene.h"
 #include "bench_solvers.h"
 #include "bench_source.h"
+#include "command_frame.h"
 #include "commands.h"
-#include "interrupt.h"
 #include "light_field_options.h"
 #include "option_values.h"
 #include "progress_line.h"
 #include "solvers_table.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/kernels/device.h"
@@ -120,7 +121,7 @@ void Measure(const BenchOptions& options, const SampledPicture& picture, int thr
   int done = 0;
   for (int round = 0; round < options.repeat; ++round) {
     for (Contender& contender : *contenders) {
-      ThrowIfInterrupted();
+      ThrowIfCancelled();
       const bool is_sampled = contender.by_blocks && picture.sample.has_value();
       const BenchScene& scene = is_sampled ? picture.parts.front() : picture.whole;
       if (round == 0) {
@@ -151,7 +152,7 @@ CommandResult BenchSolvers(const BenchOptions& options) {
     picture = WithPartInTheMiddle(
         MakeBenchScene(run.width_px, run.height_px, run.u_count, run.v_count, options.seed, 0,
                        [&](int done, int total) {
-                         ThrowIfInterrupted();
+                         ThrowIfCancelled();
                          progress.Show(done, total);
                        }),
         options.full);
@@ -161,7 +162,7 @@ CommandResult BenchSolvers(const BenchOptions& options) {
   run.pixels_ratio = picture.pixels_per_part_pixel;
   run.solved_px = kSamplePx;
   const auto backend =
-      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
+      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   std::vector<Contender> contenders = Contenders(run.threads, backend.get());
   Measure(options, picture, run.threads, &contenders);
 

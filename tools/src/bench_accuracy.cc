@@ -23,8 +23,8 @@
 #include "bench_solvers.h"
 #include "build_info.h"
 #include "estimate_profile.h"
-#include "interrupt.h"
 #include "light_field_options.h"
+#include "machine.h"
 #include "option_values.h"
 #include "peak_memory.h"
 #include "price_page.h"
@@ -32,11 +32,12 @@
 #include "price_rows.h"
 #include "profile_measurement.h"
 #include "progress_line.h"
-#include "simulate_scene.h"
-#include "stopwatch.h"
+#include "scene_pixels.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/kernels/device.h"
 
@@ -113,7 +114,7 @@ BenchScene Simulate(const BenchAccuracyOptions& options, const Scene& scene, int
                     int threads) {
   ProgressLine progress("simulating", options.common.quiet);
   const auto tell = [&](int done, int total) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     progress.Show(done, total);
   };
   const std::uint64_t seed = options.seed.value_or(kUsualSeed);
@@ -212,7 +213,7 @@ void Measure(const BenchAccuracyOptions& options, const SampledPicture& picture,
   int done = 0;
   for (int round = 0; round < options.repeat; ++round) {
     for (std::size_t i = 0; i < rows->size(); ++i) {
-      ThrowIfInterrupted();
+      ThrowIfCancelled();
       PriceRow& row = (*rows)[i];
       if (row.failure.empty() && spent[i] < kEnoughSeconds) {
         const Clock::time_point start = Clock::now();
@@ -303,7 +304,7 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
   {
     ProgressLine progress("measuring", options.common.quiet);
     run.progress = [&](int done, int total) {
-      ThrowIfInterrupted();
+      ThrowIfCancelled();
       progress.Show(done, total);
     };
     measured = MeasureProfile(PlansOfProfile(), run);
@@ -348,10 +349,10 @@ CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
   Backends backends;
   backends.threads = ResolveThreads(options.common.threads);
   backends.processor =
-      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
+      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   std::string notice;
-  backends.device = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
-                                         ThrowIfInterrupted);
+  backends.device =
+      kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
   if (!backends.device->is_opencl()) {
     backends.device = nullptr;
     if (!notice.empty()) spdlog::warn("rows of OpenCL are left out: {}", notice);

@@ -22,10 +22,10 @@
 #include "bench_machine.h"
 #include "bench_report.h"
 #include "bench_sweep.h"
-#include "interrupt.h"
 #include "option_values.h"
 #include "progress_line.h"
 #include "simulated_sweep.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
@@ -133,7 +133,7 @@ CalibrationTrial OfSource(const calib::Calibration& c, const BenchSweep& bench) 
 std::vector<Method> Methods() {
   calib::CalibrationOptions fit;
   fit.threads = 1;  // the sweeps run side by side
-  fit.progress = [](int, int) { return !InterruptRequested(); };
+  fit.progress = [](int, int) { return !IsCancelled(); };
   calib::CalibrationOptions no_field = fit;
   no_field.map_field = false;
   calib::CalibrationOptions no_fit = no_field;
@@ -257,7 +257,7 @@ void MeasureSweep(const BenchSweep& bench, const Grid& grid, const std::vector<M
   for (const Method& method : methods) {
     for (std::size_t field = 0; field < grid.fields_px.size(); ++field) {
       for (std::size_t frames = 0; frames < grid.frames.size(); ++frames) {
-        ThrowIfInterrupted();
+        ThrowIfCancelled();
         const auto trials = RunMethod(
             method, PartOfSweep(bench, grid.frames[frames], grid.fields_px[field]), bench);
         for (std::size_t i = 0; i < trials.size(); ++i)
@@ -335,7 +335,7 @@ CommandResult BenchCalibration(const BenchCalibrationOptions& options) {
   BenchReport report(options.report_folder);
 
   const std::vector<CalibrationRow> rows = Measure(options, description, grid, sweeps);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   json summary = BenchSummary({{"sweep", SweepJson(options, description)},
                                {"sweeps", sweeps},
                                {"seconds_are", "CPU time of one thread"}});

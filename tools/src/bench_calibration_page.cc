@@ -10,7 +10,7 @@
 #include "light_field_figures.h"
 #include "page_figures.h"
 #include "page_style.h"
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

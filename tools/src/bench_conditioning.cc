@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "bench_machine.h"
-#include "interrupt.h"
 #include "option_values.h"
 #include "progress_line.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/estimator/conditioning.h"
 
 namespace thicklens::tools {
@@ -124,7 +124,7 @@ CommandResult BenchConditioning(const BenchConditioningOptions& options) {
   {
     ProgressLine progress("measuring", options.common.quiet);
     for (std::size_t i = 0; i < settings.size(); ++i) {
-      ThrowIfInterrupted();
+      ThrowIfCancelled();
       progress.Show(static_cast<int>(i), static_cast<int>(settings.size()));
       const ConditioningRow row = RowOf(settings[i], options.size_px);
       text += fmt::format("{:<18}{}{}{}\n", row.setting.changed, Cells(row.warp), Cells(row.source),

@@ -17,9 +17,9 @@
 #include "bench_parts.h"
 #include "bench_scene.h"
 #include "bench_solvers.h"
-#include "interrupt.h"
 #include "option_values.h"
 #include "progress_line.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/estimator/compare.h"
@@ -63,7 +63,7 @@ void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Bac
   blocks.ridge = row->ridge;
   blocks.rcond_min = 0;  // to see what the refusal spares
   blocks.threads = options.common.threads;
-  blocks.progress = [](int, int) { ThrowIfInterrupted(); };
+  blocks.progress = [](int, int) { ThrowIfCancelled(); };
   estimator::EstimateSummary summary;
   model::LightField estimate;
   try {
@@ -120,10 +120,10 @@ json RowJson(const GammaRow& row) {
 
 CommandResult BenchGamma(const BenchGammaOptions& options) {
   const auto backend =
-      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
+      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   const BenchScene scene =
       MakeBenchScene(options.size_px, options.size_px, options.views, options.views, options.seed,
-                     options.common.threads, [](int, int) { ThrowIfInterrupted(); });
+                     options.common.threads, [](int, int) { ThrowIfCancelled(); });
   const double dibr_db =
       estimator::CompareLightFields(
           scene.truth, estimator::WarpedLightField(scene.input, true, options.common.threads),
@@ -140,7 +140,7 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
             backend.get());  // not counted, so that no row has a cold start
     for (int round = 0; round < options.repeat; ++round) {
       for (GammaRow& row : rows) {
-        ThrowIfInterrupted();
+        ThrowIfCancelled();
         if (row.failure.empty()) Run(scene, options, backend.get(), &row);
         progress.Show(++done, options.repeat * static_cast<int>(rows.size()));
       }

@@ -17,10 +17,10 @@
 #include "bench_options.h"
 #include "bench_scene.h"
 #include "bench_solvers.h"
-#include "interrupt.h"
 #include "progress_line.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/kernels/device.h"
@@ -126,7 +126,7 @@ void Run(const LightFieldSolver& solver, const BenchScene& scene, const Regions&
   if (is_first) Judge(scene, regions, estimate, threads, own);
   estimator::InpaintOptions options;
   options.threads = threads;
-  options.progress = [](int, int) { ThrowIfInterrupted(); };
+  options.progress = [](int, int) { ThrowIfCancelled(); };
   estimator::InpaintSummary summary;
   estimator::InpaintHiddenRays(scene.input.disparity, options, &estimate, &summary);
   telea->seconds.push_back(seconds + summary.seconds);
@@ -152,13 +152,13 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
     ProgressLine progress("simulating", options.common.quiet);
     scene = MakeOccludedScene(options.size_px, options.size_px, options.views, options.views,
                               options.seed, threads, [&](int done, int total) {
-                                ThrowIfInterrupted();
+                                ThrowIfCancelled();
                                 progress.Show(done, total);
                               });
   }
   const Regions regions = RegionsOf(scene);
   const auto backend =
-      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
+      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   std::vector<LightFieldSolver> solvers = {
       SolverByBlocks(estimator::DefaultBlockSolver(), threads, backend.get())};
   for (LightFieldSolver& solver : WholePictureSolvers(threads)) {
@@ -178,7 +178,7 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
     }
     for (int round = 0; round < options.repeat; ++round) {
       for (std::size_t i = 0; i < solvers.size(); ++i) {
-        ThrowIfInterrupted();
+        ThrowIfCancelled();
         Run(solvers[i], scene, regions, threads, &rows[2 * i], &rows[2 * i + 1]);
         progress.Show(++done, options.repeat * static_cast<int>(solvers.size()));
       }

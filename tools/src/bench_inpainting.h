@@ -3,7 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "commands.h"
+#include "command_frame.h"
 
 namespace thicklens::tools {
 

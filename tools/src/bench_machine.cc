@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <fstream>
 #include <string>
 #include <thread>
 
 #include "build_info.h"
-#include "commands.h"
-#include "stopwatch.h"
+#include "machine.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/blas.h"
 
 namespace thicklens::tools {
@@ -20,16 +19,6 @@ void TriadOf(const float* b, const float* c, std::size_t count, float* a) {
 }
 
 }  // namespace
-
-std::string ProcessorName() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    if (line.rfind("model name", 0) != 0) continue;
-    const std::size_t colon = line.find(": ");
-    if (colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return kUnknownProcessor;
-}
 
 nlohmann::json BenchSummary(nlohmann::json fields) {
   fields["status"] = "ok";

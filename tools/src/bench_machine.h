@@ -10,8 +10,6 @@ namespace thicklens::tools {
 // Returns the summary of a successful bench: its fields, and in `machine` the conditions of its
 // times: processor, cores, build, BLAS, date.
 nlohmann::json BenchSummary(nlohmann::json fields);
-constexpr char kUnknownProcessor[] = "unknown";
-std::string ProcessorName();  // kUnknownProcessor if the name is not known
 
 // Returns the memory bandwidth of `threads` threads in bytes per second, measured and counted as by
 // the STREAM benchmark: a = b + 3 c reads two arrays and writes one, each far larger than any

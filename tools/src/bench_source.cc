@@ -20,13 +20,13 @@
 #include "bench_source_rows.h"
 #include "bench_source_tables.h"
 #include "estimate_input.h"
-#include "interrupt.h"
 #include "light_field_options.h"
 #include "option_values.h"
 #include "progress_line.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -69,7 +69,7 @@ void Measure(const BenchSourceOptions& options, std::vector<SourceContender>* co
   std::vector<double> spent(contenders->size(), 0.0);
   for (int round = 0; round < options.repeat; ++round) {
     for (std::size_t i = 0; i < contenders->size(); ++i) {
-      ThrowIfInterrupted();
+      ThrowIfCancelled();
       SourceContender& contender = (*contenders)[i];
       // Of what takes so long, fewer runs tell as much as more.
       constexpr double kEnoughSeconds = 60;
@@ -123,7 +123,7 @@ SourcePicture Simulated(const BenchSourceOptions& options, const PictureSize& si
   picture.views = views;
   picture.whole = MakeBenchScene(camera, views, views, options.seed.value_or(kUsualSeed),
                                  options.common.threads, [&](int done, int total) {
-                                   ThrowIfInterrupted();
+                                   ThrowIfCancelled();
                                    progress.Show(done, total);
                                  });
   Cut(options.full, &picture);
@@ -223,10 +223,10 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
   SourceBench bench;
   bench.threads = ResolveThreads(options.common.threads);
   bench.processor =
-      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfInterrupted);
+      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
   std::string notice;
-  bench.device = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
-                                      ThrowIfInterrupted);
+  bench.device =
+      kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
   if (!bench.device->is_opencl()) {
     bench.device = nullptr;
     spdlog::warn("rows of OpenCL are left out: {}",

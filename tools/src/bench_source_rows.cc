@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "bench_machine.h"
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/estimator/block_solver.h"
 #include "whole_time.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "bench_solvers.h"
-#include "stopwatch.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/render.h"
 #include "thicklens/model/light_field_grid.h"
 #include "thicklens/model/thick_lens.h"

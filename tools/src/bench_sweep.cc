@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "interrupt.h"
 #include "simulated_sweep.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/thick_lens.h"
 
@@ -103,7 +103,7 @@ BenchSweep MakeBenchSweep(const model::SweepSimulationOptions& description,
     bench.sweep.floor.given_px = DrawnFloorPx(bench.truth.blur_floor_px, draws.Normal());
   const auto stored = std::make_shared<std::vector<cv::Mat>>();
   for (int i = 0; i < options.frame_count; ++i) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     stored->push_back(AsFile(simulator.RenderFrame(i)));
   }
   bench.sweep.read_frame = [stored](std::size_t i) { return (*stored)[i]; };

@@ -14,11 +14,10 @@
 #include <utility>
 #include <vector>
 
-#include "build_info.h"
 #include "data_hash.h"
-#include "interrupt.h"
-#include "printable_text.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {
@@ -98,7 +97,7 @@ std::optional<estimator::SolvedBlock> BlockOf(const std::string& record) {
 void AddInPieces(std::string_view bytes, Sha256* hash) {
   constexpr std::size_t kPiece = std::size_t{1} << 26;
   for (std::size_t at = 0; at < bytes.size(); at += kPiece) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     hash->Add(bytes.substr(at, kPiece));
   }
 }
@@ -117,9 +116,9 @@ std::string HashOfThisProgram() {
 }
 
 // A list of pairs, so that the order in which differences are told is kept.
-json DescriptionOf(const estimator::BlockRun& run) {
+json DescriptionOf(const std::string& version, const estimator::BlockRun& run) {
   json description = json::array();
-  description.push_back({"version", PrintableUtf8(BuildInfo())});
+  description.push_back({"version", PrintableUtf8(version)});
   description.push_back({"program", HashOfThisProgram()});
   for (const auto& [name, value] : run.settings)
     description.push_back({name, PrintableUtf8(value)});
@@ -160,8 +159,8 @@ std::string Difference(const json& there, const json& here) {
 
 }  // namespace
 
-BlockCheckpoint::BlockCheckpoint(const std::string& path)
-    : journal_(path, kKind, ThrowIfInterrupted) {
+BlockCheckpoint::BlockCheckpoint(const std::string& path, std::string version)
+    : journal_(path, kKind, ThrowIfCancelled), version_(std::move(version)) {
   // Without a block it holds nothing that would be lost.
   if (journal_.size() < 2) {
     journal_.Clear();
@@ -207,7 +206,7 @@ void BlockCheckpoint::CountKept() {
 }
 
 void BlockCheckpoint::Begin(const estimator::BlockRun& run) {
-  const json here = DescriptionOf(run);
+  const json here = DescriptionOf(version_, run);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (journal_.size() == 0) {
     here_ = here.dump();

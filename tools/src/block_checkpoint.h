@@ -18,8 +18,9 @@ namespace thicklens::tools {
 // as JSON and whose other records hold one block each.
 class BlockCheckpoint final : public estimator::BlockStore {
  public:
-  // Throws Error if the file is not a checkpoint or is in use.
-  explicit BlockCheckpoint(const std::string& path);
+  // `version` names the program: blocks of another version are not used. Throws Error if the file
+  // is not a checkpoint or is in use.
+  BlockCheckpoint(const std::string& path, std::string version);
 
   const std::string& path() const { return journal_.path(); }
   // Settings of the run that left blocks in the file: the edge of its blocks, and the --device that
@@ -43,6 +44,7 @@ class BlockCheckpoint final : public estimator::BlockStore {
   std::string Setting(const std::string& name) const;  // of the run that left blocks; empty: none
 
   JournalFile journal_;
+  std::string version_;
   nlohmann::json there_;      // what that run is of; null: there was none
   std::string here_;          // what this one is of; empty: its blocks follow
   mutable std::mutex mutex_;  // of what follows

@@ -16,17 +16,19 @@
 #include "calibration_json.h"
 #include "calibration_report.h"
 #include "calibration_summary.h"
+#include "command_frame.h"
 #include "commands.h"
-#include "interrupt.h"
+#include "machine.h"
 #include "option_values.h"
-#include "printable_text.h"
 #include "progress_line.h"
 #include "report_folder.h"
 #include "sweep_input.h"
 #include "sweep_options.h"
 #include "sweep_understanding.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/camera_file.h"
 
 namespace thicklens::tools {
@@ -93,7 +95,7 @@ calib::Calibration Measure(const SweepInput& input, const CalibrateOptions& aske
   options.threads = asked.common.threads;
   options.progress = [&](int done, int total) {
     progress.Show(done, total);
-    return !InterruptRequested();
+    return !IsCancelled();
   };
   return calib::Calibrate(input.sweep, options);
 }
@@ -134,7 +136,7 @@ void WriteOutputs(const CalibrateOptions& options, const SweepInput& input,
       outputs->figures->Write(figure.name, figure.content);
     outputs->figures->Write(kCaptions, report.captions);
   }
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   if (outputs->report) {
     outputs->report->Commit(report.html);
     outputs->figures->Commit();
@@ -149,7 +151,7 @@ void WriteOutputs(const CalibrateOptions& options, const SweepInput& input,
 CommandResult RunCalibration(const CalibrateOptions& options, const SweepInput& input) {
   Outputs outputs(options);
   const calib::Calibration calibration = Measure(input, options);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   const std::string refusal = RefusalOf(calibration, options.use_source_recipe());
   WriteOutputs(options, input, calibration, !refusal.empty(), &outputs);
   if (options.common.quiet) {  // else they stand in the text

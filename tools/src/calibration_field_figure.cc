@@ -8,6 +8,7 @@
 #include "calibration_figures.h"
 #include "page_pictures.h"
 #include "rounding.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -12,7 +12,7 @@
 #include "calibration_summary.h"
 #include "calibration_words.h"
 #include "determined.h"
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -9,8 +9,8 @@
 #include "calibration_sections.h"
 #include "page_pictures.h"
 #include "page_style.h"
-#include "printable_text.h"
 #include "rejection_groups.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -8,6 +8,7 @@
 #include "calibration_figures.h"
 #include "page_style.h"
 #include "svg_plot.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "calibration_words.h"
 #include "determined.h"
-#include "printable_text.h"
 #include "rejection_groups.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -6,9 +6,10 @@
 
 #include "calibration_sections.h"
 #include "calibration_words.h"
+#include "missing_tolerances.h"
 #include "page_style.h"
-#include "printable_text.h"
 #include "rounding.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -6,8 +6,8 @@
 #include "calibration_sections.h"
 #include "calibration_words.h"
 #include "determined.h"
-#include "printable_text.h"
 #include "rounding.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

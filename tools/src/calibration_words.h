@@ -33,8 +33,6 @@ std::string OutsideLine(const calib::BlurFit& blur);
 std::string WorstKnownLine(const calib::BlurFit& blur);
 // Reports that the frames deviate from the law by more than their errors, if they do.
 std::string WidenedLine(const calib::BlurFit& blur);
-// Lists the numbers of the camera that affect the results and are stated without a tolerance.
-std::string MissingTolerancesLine(const model::Camera& camera);
 
 // Formats the (lowest, highest) range of one systematic part, with the digits of the larger: "-3.1
 // .. +3.9".

@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "camera_verify.h"
+#include "command_frame.h"
 #include "commands.h"
 #include "image_io.h"
 #include "option_values.h"
-#include "svg_plot.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/camera_file.h"
 
 namespace thicklens::tools {

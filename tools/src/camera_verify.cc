@@ -8,13 +8,13 @@
 #include <memory>
 #include <vector>
 
-#include "interrupt.h"
 #include "option_values.h"
-#include "printable_text.h"
 #include "progress_line.h"
 #include "sweep_input.h"
 #include "sweep_options.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/calib/calibrate.h"
 #include "thicklens/model/camera_file.h"
 
@@ -80,7 +80,7 @@ calib::Calibration CalibrateNewSweep(const CameraVerifyOptions& options, const S
   settings.threads = options.common.threads;
   settings.progress = [&](int done, int total) {
     progress.Show(done, total);
-    return !InterruptRequested();
+    return !IsCancelled();
   };
   return calib::Calibrate(input.sweep, settings);
 }
@@ -92,7 +92,7 @@ CommandResult VerifyCamera(const CameraVerifyOptions& options) {
   TellAssumedFields(stored);
   input.sweep.camera.calibration.reset();
   const calib::Calibration found = CalibrateNewSweep(options, input);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   calib::Verification verification =
       calib::VerifyCalibration(stored, input.sweep, found, options.verification);
   const std::string& of_stored = stored.calibration->evidence.data_sha256;

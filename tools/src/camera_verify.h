@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "commands.h"
+#include "command_frame.h"
 #include "thicklens/calib/verification.h"
 
 namespace thicklens::tools {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "aperture_statement.h"
+#include "command_frame.h"
 #include "commands.h"
 #include "compare_table.h"
 #include "depth_io.h"
@@ -23,9 +24,9 @@
 #include "light_field_options.h"
 #include "naming_the_file.h"
 #include "option_values.h"
-#include "svg_plot.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/estimator/estimate_input.h"
 
 namespace thicklens::tools {

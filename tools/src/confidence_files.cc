@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "interrupt.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
 
 namespace thicklens::tools {
@@ -12,7 +12,7 @@ void WriteConfidence(const std::vector<estimator::Confidence>& of_rays, int u_co
   const auto pixels = static_cast<std::ptrdiff_t>(width_px) * height_px;
   const auto views = static_cast<int>(static_cast<std::ptrdiff_t>(of_rays.size()) / pixels);
   for (int i = 0; i < views; ++i) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     const auto first = of_rays.begin() + i * pixels;
     writer->WriteConfidence(i % u_count, i / u_count, {first, first + pixels}, width_px);
   }
@@ -24,7 +24,7 @@ void WriteConfidence(const estimator::EstimateInput& input, int threads, LightFi
   const auto u_count = static_cast<int>(input.weights.cols());
   const auto v_count = static_cast<int>(input.weights.rows());
   ParallelFor(u_count * v_count, ResolveThreads(threads), [&](int i) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     const int k = i % u_count, l = i / u_count;
     const estimator::CompactView view =
         renderer.RenderCompact(k - (u_count - 1) / 2.0, l - (v_count - 1) / 2.0);

@@ -14,10 +14,10 @@
 
 #include "picture_kind.h"
 #include "png_check.h"
-#include "svg_plot.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -7,8 +7,8 @@
 #include <cstddef>
 
 #include "calibration_summary.h"
-#include "printable_text.h"
 #include "rounding.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

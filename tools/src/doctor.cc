@@ -11,14 +11,15 @@
 #include <vector>
 
 #include "build_info.h"
+#include "command_frame.h"
 #include "commands.h"
 #include "hard_cases.h"
-#include "interrupt.h"
 #include "light_field_options.h"
 #include "opencv_codecs.h"
-#include "svg_plot.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/kernels/device.h"
@@ -79,10 +80,10 @@ void ExamineDevice(const DoctorOptions& options, Findings* findings) {
   const kernels::DeviceRequest request = kernels::ParseDeviceRequest(options.device);
   try {
     if (request.kind != kernels::DeviceRequest::Kind::kCpu) {
-      findings->survey = kernels::SurveyDevices(false, ThrowIfInterrupted);
+      findings->survey = kernels::SurveyDevices(false, ThrowIfCancelled);
     }
     std::string notice;
-    const auto backend = kernels::OpenBackend(request, &notice, ThrowIfInterrupted);
+    const auto backend = kernels::OpenBackend(request, &notice, ThrowIfCancelled);
     if (!notice.empty()) spdlog::warn("{}", PrintableUtf8(notice));
     findings->notice = notice;
     findings->used = backend->name();

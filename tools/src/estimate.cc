@@ -14,6 +14,7 @@
 
 #include "block_checkpoint.h"
 #include "build_info.h"
+#include "command_frame.h"
 #include "commands.h"
 #include "confidence_files.h"
 #include "estimate_input.h"
@@ -26,15 +27,17 @@
 #include "interrupt.h"
 #include "light_field_io.h"
 #include "light_field_page.h"
-#include "memory_available.h"
+#include "machine.h"
 #include "picture_load.h"
 #include "plan_choice.h"
-#include "printable_text.h"
 #include "progress_line.h"
 #include "report_folder.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/memory_available.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/printable_text.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
@@ -52,7 +55,7 @@ struct Outputs {
         report_folder(options.report_folder) {
     if (!options.report_folder.empty()) report.emplace(options.report_path());
     if (!options.checkpoint_path.empty()) {
-      checkpoint = std::make_unique<BlockCheckpoint>(options.checkpoint_path);
+      checkpoint = std::make_unique<BlockCheckpoint>(options.checkpoint_path, BuildInfo());
     }
   }
   // However a run ends whose light field is not there.
@@ -99,7 +102,7 @@ void CheckBlur(const EstimateOptions& options, const estimator::EstimateInput& i
   ProgressLine line("checking the blur", options.common.quiet);
   estimator::BlurCheckOptions settings =
       BlurCheckOptionsOf(options, on, [&line](int done, int total) {
-        ThrowIfInterrupted();
+        ThrowIfCancelled();
         line.Show(done, total);
       });
   if (!settings.memory_limit_mib) settings.memory_limit_mib = UsualMemoryLimitMib();
@@ -116,7 +119,7 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
   // A device is worth its start where it is asked for.
   const auto backend = kernels::OpenBackend(
       kernels::ParseDeviceRequest(options.device == "auto" ? "cpu" : options.device), nullptr,
-      ThrowIfInterrupted);
+      ThrowIfCancelled);
   spdlog::debug("device: {}", backend->description());
   const estimator::SceneOptions settings = SceneSettings(options, input, on, progress);
   if (options.check_blur) CheckBlur(options, input, on, outcome);
@@ -128,7 +131,7 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
     estimator::SceneViewSink sink;
     sink.take = [writer](int k, int l, const model::LinearPicture& view,
                          const std::vector<estimator::Confidence>& confidence) {
-      ThrowIfInterrupted();
+      ThrowIfCancelled();
       writer->WriteView(k, l, view);
       writer->WriteConfidence(k, l, confidence, view.width_px);
     };
@@ -153,7 +156,7 @@ void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput&
                                  ? checkpoint->device().value_or(options.device)
                                  : options.device;
   const auto backend =
-      kernels::OpenBackend(kernels::ParseDeviceRequest(device), &notice, ThrowIfInterrupted);
+      kernels::OpenBackend(kernels::ParseDeviceRequest(device), &notice, ThrowIfCancelled);
   if (!notice.empty()) spdlog::warn("{}", notice);
   spdlog::debug("device: {}", backend->description());
   estimator::BlockOptions settings = BlockOptionsOf(options, on, progress);
@@ -240,7 +243,7 @@ void Inpaint(const EstimateOptions& options, const estimator::EstimateInput& inp
   estimator::InpaintOptions settings;
   settings.threads = options.common.threads;
   settings.progress = [&line](int done, int total) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     line.Show(done, total);
   };
   outcome->inpainting.emplace();
@@ -333,11 +336,11 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   Outputs outputs(options);
   ProgressLine line("estimating", options.common.quiet);
   const Progress progress = [&line](int done, int total) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     line.Show(done, total);
   };
   PreparedEstimate prepared = PrepareEstimate(options);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   std::optional<PlanChoice> choice;
   if (options.wish.IsMade()) {
     choice = ChoosePlanHere(options, prepared.input, start);
@@ -360,7 +363,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   origin.version = Version();
   origin.date = NowIso8601();
   CheckOutcome(prepared, &outcome);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
 
   const auto files_start = Clock::now();
   WriteRays(options, prepared.input, outcome, &writer);
@@ -383,7 +386,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   const std::vector<std::string> warnings = EstimateWarnings(options, prepared, outcome);
   std::string page;
   if (outputs.report) page = Page(options, std::move(prepared), outcome, result.summary, warnings);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   outputs.light_field.Commit();
   result.is_written = true;
   if (outputs.report) outputs.report->Commit(page);

@@ -10,7 +10,7 @@
 #include "light_field_effects.h"
 #include "light_field_io.h"
 #include "light_field_options.h"
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/light_field.h"
 
 namespace thicklens::tools {

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "commands.h"
+#include "command_frame.h"
 #include "depth_io.h"
 #include "exif_check.h"
 #include "image_io.h"

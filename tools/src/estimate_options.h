@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
+#include "command_frame.h"
 #include "effect_options.h"
 #include "light_field_options.h"
 #include "plan_wish.h"

@@ -4,10 +4,10 @@
 
 #include <utility>
 
-#include "interrupt.h"
-#include "memory_available.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/memory_available.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
 #include "thicklens/estimator/scene_solver.h"
@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-void StopWhenAsked(int /*done*/, int /*total*/) { ThrowIfInterrupted(); }
+void StopWhenAsked(int /*done*/, int /*total*/) { ThrowIfCancelled(); }
 
 template <typename Summary>
 void TakeIterations(const Summary& summary, PlanRun* run) {

@@ -10,11 +10,11 @@
 #include <memory>
 #include <system_error>
 
-#include "bench_machine.h"
 #include "build_info.h"
-#include "stopwatch.h"
+#include "machine.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "thicklens/base/stopwatch.h"
 
 namespace thicklens::tools {
 

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "svg_plot.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -1,7 +1,7 @@
 #ifndef THICKLENS_TOOLS_ESTIMATE_RUN_H_
 #define THICKLENS_TOOLS_ESTIMATE_RUN_H_
 
-#include "commands.h"
+#include "command_frame.h"
 #include "estimate_options.h"
 
 namespace thicklens::tools {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "peak_memory.h"
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

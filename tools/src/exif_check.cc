@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "printable_text.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "command_frame.h"
 #include "commands.h"
 #include "depth_io.h"
 #include "effect_costs.h"
@@ -15,10 +16,10 @@
 #include "explain_figure.h"
 #include "explain_scene.h"
 #include "explain_table.h"
-#include "interrupt.h"
 #include "light_field_options.h"
 #include "option_values.h"
 #include "progress_line.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
 
@@ -114,7 +115,7 @@ EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
   ProgressLine progress("measuring costs", options.common.quiet);
   try {
     return MeasureEffectCosts(camera, range, sensor, decision, [&progress](int done, int total) {
-      ThrowIfInterrupted();
+      ThrowIfCancelled();
       progress.Show(done, total);
     });
   } catch (const Interrupted&) {
@@ -162,7 +163,7 @@ CommandResult Explain(const ExplainOptions& options) {
     costs = CostsOf(options, camera, scene.range, decision);
     AddCosts(*costs, &result.summary);
   }
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   if (figure) figure->Commit(BlurCurveSvg(camera, scene.range));
   result.is_written = figure.has_value();
   PrintResult(

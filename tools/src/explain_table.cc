@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "svg_plot.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::tools {

@@ -9,11 +9,10 @@
 #include <system_error>
 #include <utility>
 
-#include "interrupt.h"
-#include "printable_text.h"
-#include "stopwatch.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
+#include "thicklens/base/stopwatch.h"
 
 namespace thicklens::tools {
 namespace {

@@ -11,12 +11,12 @@
 #include <string>
 #include <system_error>
 
-#include "bench_machine.h"
 #include "build_info.h"
-#include "interrupt.h"
+#include "machine.h"
 #include "option_values.h"
 #include "progress_line.h"
 #include "temporary_folder.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/kernels/device.h"
 
@@ -156,7 +156,7 @@ HardMachine ExamineHardMachine() {
   HardMachine machine;
   try {
     const auto backend =
-        kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr, ThrowIfInterrupted);
+        kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr, ThrowIfCancelled);
     machine.opencl = backend->is_opencl();
     backend->NewDouble();
     machine.opencl_double = machine.opencl;

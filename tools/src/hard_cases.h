@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "commands.h"
+#include "command_frame.h"
 #include "hard_case.h"
 
 namespace thicklens::tools {

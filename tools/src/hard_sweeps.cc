@@ -11,8 +11,8 @@
 
 #include "bench_sweep.h"
 #include "image_io.h"
-#include "interrupt.h"
 #include "simulated_sweep.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
@@ -59,7 +59,7 @@ model::SweepTruth WriteSweep(const fs::path& folder, const HardSweep& sweep) {
   const model::SweepTruth& truth = simulator.truth();
   std::vector<model::StoredPicture> frames;
   for (int i = 0; i < sweep.simulation.frame_count; ++i) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     frames.push_back(simulator.RenderFrame(i));
   }
   if (sweep.damage) sweep.damage(&frames);

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "svg_plot.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

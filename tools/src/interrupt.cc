@@ -19,9 +19,9 @@
 #include <utility>
 
 #include "message_line.h"
-#include "printable_text.h"
 #include "program_run.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/base/temporaries.h"
 
 namespace thicklens::tools {
@@ -161,12 +161,6 @@ void WatchSignals() {
 }
 
 const CancelToken* ProgramToken() { return &program_token; }
-
-bool InterruptRequested() { return program_token.IsCancelled(); }
-
-void ThrowIfInterrupted() {
-  if (InterruptRequested()) throw Interrupted();
-}
 
 std::string InterruptedText(const std::vector<std::string>& outputs_in_place) {
   if (outputs_in_place.empty()) return Interrupted().what();

@@ -29,9 +29,6 @@ void WatchSignals();
 // The token that the signals cancel. A command runs in a CancelScope of it.
 const CancelToken* ProgramToken();
 
-bool InterruptRequested();
-void ThrowIfInterrupted();  // throws Interrupted
-
 // Returns one line on the outputs that an interrupted run has written.
 std::string InterruptedText(const std::vector<std::string>& outputs_in_place);
 

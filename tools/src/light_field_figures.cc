@@ -13,6 +13,7 @@
 #include "page_pictures.h"
 #include "page_style.h"
 #include "svg_plot.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/estimator/render.h"
 
 namespace thicklens::tools {

@@ -18,14 +18,13 @@
 
 #include "float_tiff.h"
 #include "image_io.h"
-#include "interrupt.h"
 #include "picture_kind.h"
-#include "stopwatch.h"
-#include "svg_plot.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/printable_text.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 
@@ -277,7 +276,7 @@ class ViewReader {
       : source_(source), first_k_(first_k), first_l_(first_l) {}
 
   model::LinearPicture Read(int k, int l) const {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     try {
       return source_.read(first_k_ + k, first_l_ + l);
     } catch (const Interrupted&) {
@@ -352,7 +351,7 @@ void RequireValid(const model::LightField& light_field) {
 void ForEachView(const model::LightField& light_field,
                  const std::function<void(int, int, const model::LinearPicture&)>& write) {
   ParallelFor(light_field.u_count * light_field.v_count, Threads(), [&](int i) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     const int k = i % light_field.u_count;
     const int l = i / light_field.u_count;
     if (light_field.IsPresent(k, l)) write(k, l, model::ViewPicture(light_field, k, l));

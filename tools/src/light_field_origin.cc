@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "svg_plot.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 

@@ -16,6 +16,7 @@
 #include "page_pictures.h"
 #include "page_style.h"
 #include "svg_plot.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <iterator>
 
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

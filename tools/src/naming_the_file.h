@@ -6,8 +6,8 @@
 #include <string>
 
 #include "option_values.h"
-#include "printable_text.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "svg_plot.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 

@@ -11,9 +11,9 @@
 
 #include "opencv_codecs.h"
 #include "png_pixels.h"
-#include "svg_plot.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/transfer_curve.h"
 
 namespace thicklens::tools {

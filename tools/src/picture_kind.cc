@@ -14,12 +14,12 @@
 #include <cstring>
 #include <memory>
 
-#include "memory_available.h"
 #include "opencv_codecs.h"
 #include "png_check.h"
 #include "png_pixels.h"
-#include "printable_text.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/memory_available.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "image_io.h"
-#include "stopwatch.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/model/light_field.h"
 #include "thicklens/model/scene.h"
 #include "thicklens/model/stored_levels.h"

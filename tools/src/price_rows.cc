@@ -8,7 +8,7 @@
 
 #include "bench_machine.h"
 #include "pareto_front.h"
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

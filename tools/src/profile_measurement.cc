@@ -22,11 +22,12 @@
 #include "depth_io.h"
 #include "estimate_input.h"
 #include "image_io.h"
-#include "interrupt.h"
 #include "light_field_io.h"
+#include "machine.h"
 #include "picture_load.h"
 #include "program_run.h"
 #include "temporary_folder.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
@@ -88,7 +89,7 @@ Prepared Prepare(const ProfileCase& what, const ProfileRun& run, const fs::path&
   for (model::SceneLayer& layer : scene.layers) {
     if (what.colour) layer.texture.saturation = model::SceneLayer().texture.saturation;
   }
-  const model::SceneRun stoppable = {run.threads, [](int, int) { ThrowIfInterrupted(); }};
+  const model::SceneRun stoppable = {run.threads, [](int, int) { ThrowIfCancelled(); }};
   const model::SceneSimulator simulator(scene, std::vector<model::LayerPixels>(scene.layers.size()),
                                         run.threads);
   const model::StoredPicture stored = simulator.Store(simulator.RenderNoiseless(stoppable));

@@ -18,10 +18,10 @@
 #include <thread>
 #include <utility>
 
-#include "interrupt.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/stopwatch.h"
 
 extern char** environ;  // NOLINT: POSIX has it so
 
@@ -147,7 +147,7 @@ ProgramRun RunProgram(const std::string& program, const std::vector<std::string>
   const auto seconds = [&] { return SecondsSince(start); };
   Child child(program, arguments, folder);
   while (!child.HasEnded()) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     if (!run.timed_out && seconds() > limit_seconds) {
       run.timed_out = true;
       child.Kill();
@@ -155,7 +155,7 @@ ProgramRun RunProgram(const std::string& program, const std::vector<std::string>
     std::this_thread::sleep_for(kPoll);
   }
   if (child.is_lost()) throw Error(fmt::format("{}: its process was lost", program));
-  ThrowIfInterrupted();  // a person's Ctrl-C ends the child as well, and that may be seen first
+  ThrowIfCancelled();  // a person's Ctrl-C ends the child as well, and that may be seen first
   run.seconds = seconds();
   if (WIFEXITED(child.status())) run.exit_code = WEXITSTATUS(child.status());
   if (WIFSIGNALED(child.status())) run.signal = WTERMSIG(child.status());

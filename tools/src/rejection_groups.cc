@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "calibration_summary.h"
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/calib/frame_gates.h"
 
 namespace thicklens::tools {

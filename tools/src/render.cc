@@ -15,17 +15,18 @@
 #include <vector>
 
 #include "aperture_statement.h"
+#include "command_frame.h"
 #include "commands.h"
 #include "image_io.h"
-#include "interrupt.h"
 #include "light_field_effects.h"
 #include "light_field_io.h"
 #include "light_field_options.h"
 #include "option_values.h"
 #include "picture_description.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/scene.h"
 
@@ -250,8 +251,8 @@ void WarnOfWander(const model::LightField& light_field) {
 
 Rendering RenderPhotograph(const RenderOptions& options, const model::LightField& light_field) {
   std::string notice;
-  const auto backend = kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice,
-                                            ThrowIfInterrupted);
+  const auto backend =
+      kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
   if (!notice.empty()) spdlog::warn("{}", notice);
   spdlog::debug("device: {}", backend->description());
   // On the processor it is quicker without them.
@@ -414,9 +415,9 @@ CommandResult RenderPicture(const RenderOptions& options) {
   OutputFile output(options.output);
   const model::LightField light_field =
       ReadLightField(options.light_field, ReadingOf(options.reading));
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   Rendering rendering = RenderAny(options, light_field);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
 
   const int bits = options.bits.value_or(kDefaultBits);
   const double noise_levels = options.noise_levels.value_or(0);
@@ -461,7 +462,7 @@ CommandResult Convert(const RenderOptions& options) {
       options.convert == "thicklens-tiff" ? ViewFormat::kTiff : ViewFormat::kPng;
   const std::size_t clipped = is_hci ? WriteHciLightField(light_field, &folder)
                                      : WriteLightField(light_field, format, &folder);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   folder.Commit();
 
   const double fraction =

@@ -16,17 +16,19 @@
 
 #include "aperture_statement.h"
 #include "build_info.h"
+#include "command_frame.h"
 #include "commands.h"
 #include "depth_io.h"
 #include "estimate_records.h"
 #include "image_io.h"
 #include "inlined_report.h"
-#include "interrupt.h"
 #include "light_field_io.h"
 #include "light_field_options.h"
 #include "light_field_page.h"
+#include "machine.h"
 #include "naming_the_file.h"
 #include "option_values.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/estimator/view_geometry.h"
@@ -237,7 +239,7 @@ SweepStrip ReadSweepStrip(const std::string& path, const std::optional<model::Ca
   const std::optional<std::size_t> focus = FrameInFocus(sweep, camera);
   for (std::size_t i :
        ShotIndices(sweep.frames.size(), focus.value_or((sweep.frames.size() - 1) / 2))) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     const model::SweepFrame& frame = sweep.frames[i];
     strip.shots.push_back({MiddleOf(ReadPictureFile(frame.image), sweep.roi), frame.image,
                            frame.reading_mm, focus == i});
@@ -288,7 +290,7 @@ CommandResult Report(const ReportOptions& options) {
       ReadCropped(options.light_field_path, ReadingOf(options.reading));
   std::optional<model::LightField> truth;
   if (!options.truth_path.empty()) truth = ReadTruth(options, light_field);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
 
   LightFieldPageInput input;
   input.name = options.light_field_path;
@@ -310,10 +312,10 @@ CommandResult Report(const ReportOptions& options) {
   input.version = Version();
   input.date = NowIso8601();
   input.threads = options.common.threads;
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
 
   const LightFieldPage page = MakeLightFieldPage(input);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   output.Commit(page.html);
   PrintResult(options.common,
               fmt::format("{}: {}\n", options.output_path, fmt::join(page.sections, ", ")));

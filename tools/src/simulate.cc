@@ -13,16 +13,17 @@
 #include <string>
 
 #include "attribution_page.h"
+#include "command_frame.h"
 #include "commands.h"
 #include "effect_options.h"
 #include "image_io.h"
-#include "interrupt.h"
 #include "progress_line.h"
 #include "simulate_scene.h"
 #include "simulated_sweep.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/sweep_simulator.h"
 
@@ -50,7 +51,7 @@ int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& co
   ProgressLine progress("rendering", common.quiet);
   std::atomic<int> done{0}, bits{0};
   ParallelFor(count, common.threads, [&](int i) {
-    ThrowIfInterrupted();
+    ThrowIfCancelled();
     const model::StoredPicture stored = simulator.RenderFrame(i);
     bits = stored.bits;
     folder->Write(frames[static_cast<std::size_t>(i)].image, EncodePng(stored));
@@ -110,7 +111,7 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
                                          AttributionRunWith(options.common, &progress));
     WriteAttribution(attribution, options.config_path, &folder);
   }
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   folder.Commit();
 
   const std::chrono::duration<double> seconds = Clock::now() - start;

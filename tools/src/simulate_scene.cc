@@ -18,15 +18,17 @@
 #include "depth_io.h"
 #include "effect_options.h"
 #include "image_io.h"
-#include "interrupt.h"
 #include "light_field_io.h"
 #include "light_field_options.h"
+#include "machine.h"
 #include "option_values.h"
 #include "picture_description.h"
 #include "progress_line.h"
+#include "scene_pixels.h"
 #include "simulated_sweep.h"
-#include "stopwatch.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/stopwatch.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/scene_simulator.h"
 
@@ -66,7 +68,7 @@ model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
 // Progress on the terminal, and an end when the person asks for one.
 model::SceneRun RunWith(const CommonOptions& common, ProgressLine* progress) {
   return {common.threads, [progress](int done, int total) {
-            ThrowIfInterrupted();
+            ThrowIfCancelled();
             progress->Show(done, total);
           }};
 }
@@ -153,7 +155,7 @@ CommandResult SimulatePicture(const SceneOptions& options) {
     attribution = Attribute(options, scene, pixels);
     WriteAttribution(attribution, options.config_path, &folder);
   }
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   folder.Commit();
 
   CommandResult result;
@@ -194,7 +196,7 @@ CommandResult SimulateLightField(const SceneOptions& options) {
     clipped = WriteLightField(light_field, format, &folder);
   }
   const model::SceneTruth truth = simulator.Truth(simulator.RenderDepth());
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   folder.Commit();
 
   CommandResult result;
@@ -229,24 +231,6 @@ CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std
 }
 
 }  // namespace
-
-std::vector<model::LayerPixels> ReadScenePixels(const model::SceneSimulationOptions& scene) {
-  std::vector<model::LayerPixels> pixels(scene.layers.size());
-  for (std::size_t i = 0; i < scene.layers.size(); ++i) {
-    const model::SceneLayer& layer = scene.layers[i];
-    if (layer.texture.kind == model::TextureKind::kPicture) {
-      pixels[i].texture =
-          model::ToLinear(ToStoredPicture(ReadPictureFile(layer.texture.picture_path)),
-                          model::TransferCurve::Srgb());
-    }
-    if (layer.outline.shape == model::OutlineOptions::Shape::kMask) {
-      pixels[i].mask = model::ToLinear(ToStoredPicture(ReadPictureFile(layer.outline.mask_path)),
-                                       model::TransferCurve::Linear());
-    }
-    if (layer.depth) pixels[i].depth = ReadDepthMap(layer.depth->map_path);
-  }
-  return pixels;
-}
 
 void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
   const auto picture = std::make_shared<SceneOptions>();

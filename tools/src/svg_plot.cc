@@ -9,6 +9,8 @@
 #include <iterator>
 #include <limits>
 
+#include "thicklens/base/printable_text.h"
+
 namespace thicklens::tools {
 namespace {
 

@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "printable_text.h"
-
 namespace thicklens::tools {
 
 // Returns round positions within [lo, hi], with the smallest step of 1, 2 or 5 times a power of ten

@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "calibration_words.h"
+#include "missing_tolerances.h"
 #include "option_values.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"

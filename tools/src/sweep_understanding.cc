@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
-#include "printable_text.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/calib/calibrate.h"
 
 namespace thicklens::tools {

@@ -10,12 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "command_frame.h"
 #include "commands.h"
-#include "interrupt.h"
 #include "option_values.h"
 #include "target_drawing.h"
 #include "target_page.h"
 #include "target_texture.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
 
@@ -122,7 +123,7 @@ CommandResult MakeTarget(const TargetOptions& options, Format format, TargetRequ
   const std::string bytes = format == Format::kPdf   ? TargetPdf(page, leaves)
                             : format == Format::kSvg ? TargetSvg(page, leaves)
                                                      : TargetPng(page, leaves, *png_size);
-  ThrowIfInterrupted();
+  ThrowIfCancelled();
   output.Commit(bytes);
 
   CommandResult result;

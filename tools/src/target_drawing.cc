@@ -13,11 +13,10 @@
 #include <memory>
 
 #include "image_io.h"
-#include "interrupt.h"
 #include "png_check.h"
-#include "svg_plot.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/model/scene.h"
 
 namespace thicklens::tools {
@@ -72,7 +71,7 @@ void DrawTexture(const TargetPage& page, const std::vector<Leaf>& leaves, cairo_
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
   int drawn = 0;
   for (const Leaf& leaf : leaves) {
-    if (drawn++ % kLeavesPerLook == 0) ThrowIfInterrupted();
+    if (drawn++ % kLeavesPerLook == 0) ThrowIfCancelled();
     SetGrey(context, leaf.grey);
     cairo_set_line_width(context, 2 * leaf.radius_mm);
     cairo_move_to(context, leaf.x_mm, leaf.y_mm);
@@ -174,7 +173,7 @@ std::string TargetSvg(const TargetPage& page, const std::vector<Leaf>& leaves) {
   add("<g clip-path=\"url(#clip)\">\n");
   int drawn = 0;
   for (const Leaf& leaf : leaves) {
-    if (drawn++ % kLeavesPerLook == 0) ThrowIfInterrupted();
+    if (drawn++ % kLeavesPerLook == 0) ThrowIfCancelled();
     add("<circle cx=\"{0:.4f}\" cy=\"{1:.4f}\" r=\"{2:.4f}\" fill=\"#{3:02x}{3:02x}{3:02x}\"/>\n",
         leaf.x_mm, leaf.y_mm, leaf.radius_mm, leaf.grey);
   }

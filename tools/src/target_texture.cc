@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <random>
 
-#include "interrupt.h"
+#include "thicklens/base/cancel.h"
 
 namespace thicklens::tools {
 namespace {
@@ -116,7 +116,7 @@ std::vector<Leaf> DeadLeaves(const TargetPage& page) {
   Draws draws(page.seed);
   std::vector<Leaf> leaves;
   for (int count = 0; openings.OpenPart() > kOpenAtEnd; ++count) {
-    if (count % kTriesPerLook == 0) ThrowIfInterrupted();
+    if (count % kTriesPerLook == 0) ThrowIfCancelled();
     // r = (rmin^-2 - q (rmin^-2 - rmax^-2))^(-1/2), q uniform: the inverse of the distribution
     // function of the density ~ r^-3 between rmin and rmax, derived here [D46].
     Leaf leaf;

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 
 namespace thicklens::tools {
 namespace {

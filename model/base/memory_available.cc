@@ -1,4 +1,4 @@
-#include "memory_available.h"
+#include "thicklens/base/memory_available.h"
 
 #include <malloc.h>
 #include <sys/resource.h>
@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace thicklens::tools {
+namespace thicklens {
 namespace {
 
 // The number behind a name in one of Linux's files.
@@ -102,4 +102,4 @@ void ReturnMemoryAtOnce() {
 #endif
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens

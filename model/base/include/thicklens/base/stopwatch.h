@@ -1,10 +1,10 @@
 // Seconds on a steady clock, which is never adjusted.
-#ifndef THICKLENS_TOOLS_STOPWATCH_H_
-#define THICKLENS_TOOLS_STOPWATCH_H_
+#ifndef THICKLENS_BASE_STOPWATCH_H_
+#define THICKLENS_BASE_STOPWATCH_H_
 
 #include <chrono>
 
-namespace thicklens::tools {
+namespace thicklens {
 
 using Clock = std::chrono::steady_clock;
 
@@ -12,6 +12,6 @@ inline double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens
 
-#endif  // THICKLENS_TOOLS_STOPWATCH_H_
+#endif  // THICKLENS_BASE_STOPWATCH_H_

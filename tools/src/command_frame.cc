@@ -1,13 +1,11 @@
-#include "commands.h"
+#include "command_frame.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <optional>
@@ -16,13 +14,13 @@
 #include "interrupt.h"
 #include "message_line.h"
 #include "option_values.h"
-#include "printable_text.h"
 #include "run_files.h"
-#include "svg_plot.h"
+#include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/printable_text.h"
 #include "thicklens/base/temporaries.h"
 
 namespace thicklens::tools {
@@ -104,7 +102,7 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
   CommandResult result;
   try {
     result = command();
-    if (!result.is_written) ThrowIfInterrupted();
+    if (!result.is_written) ThrowIfCancelled();
   } catch (const Interrupted&) {
     const std::vector<std::string> in_place = OutputsInPlace();
     if (in_place.empty()) throw;
@@ -116,10 +114,6 @@ void RunCommand(const CommonOptions& options, const std::function<CommandResult(
   }
   summary.Write(result.summary);
   if (!result.refusal.empty()) throw Error(result.refusal);
-}
-
-std::string NowIso8601() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 void PrintResult(const CommonOptions& options, const std::string& text) {

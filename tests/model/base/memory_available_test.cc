@@ -1,4 +1,4 @@
-#include "memory_available.h"
+#include "thicklens/base/memory_available.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
-#include "printable_text.h"
+#include "thicklens/base/printable_text.h"
 
 #include <cstddef>
 #include <cstdint>
 
-namespace thicklens::tools {
+namespace thicklens {
 namespace {
 
 constexpr char kReplacement[] = "\xEF\xBF\xBD";  // U+FFFD
@@ -72,4 +72,4 @@ std::string EscapeXml(const std::string& text) {
   return out;
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens

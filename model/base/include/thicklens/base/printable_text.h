@@ -1,9 +1,9 @@
-#ifndef THICKLENS_TOOLS_PRINTABLE_TEXT_H_
-#define THICKLENS_TOOLS_PRINTABLE_TEXT_H_
+#ifndef THICKLENS_BASE_PRINTABLE_TEXT_H_
+#define THICKLENS_BASE_PRINTABLE_TEXT_H_
 
 #include <string>
 
-namespace thicklens::tools {
+namespace thicklens {
 
 // Makes text safe for XML content and attributes: markup characters are escaped, and everything
 // that XML 1.0 cannot hold (broken UTF-8, control characters) is replaced by U+FFFD.
@@ -13,6 +13,6 @@ std::string EscapeXml(const std::string& text);
 // any byte, terminals and JSON may not.
 std::string PrintableUtf8(const std::string& text);
 
-}  // namespace thicklens::tools
+}  // namespace thicklens
 
-#endif  // THICKLENS_TOOLS_PRINTABLE_TEXT_H_
+#endif  // THICKLENS_BASE_PRINTABLE_TEXT_H_

@@ -1,10 +1,10 @@
-#ifndef THICKLENS_TOOLS_MEMORY_AVAILABLE_H_
-#define THICKLENS_TOOLS_MEMORY_AVAILABLE_H_
+#ifndef THICKLENS_BASE_MEMORY_AVAILABLE_H_
+#define THICKLENS_BASE_MEMORY_AVAILABLE_H_
 
 #include <optional>
 #include <string>
 
-namespace thicklens::tools {
+namespace thicklens {
 
 // Memory that the program may hold in all without making the machine swap: what it holds, and four
 // fifths of what the system or its control group (a container) has available. Absent if the system
@@ -19,6 +19,6 @@ std::optional<double> MemoryLeftMib(const std::string& root = "");
 // holds only what it uses.
 void ReturnMemoryAtOnce();
 
-}  // namespace thicklens::tools
+}  // namespace thicklens
 
-#endif  // THICKLENS_TOOLS_MEMORY_AVAILABLE_H_
+#endif  // THICKLENS_BASE_MEMORY_AVAILABLE_H_
