@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <Eigen/Core>
 #include <limits>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "model/schema/effect_yaml.h"
+#include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
@@ -252,22 +252,18 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
 }
 
 std::string SceneTruthToYaml(const SceneTruth& truth) {
-  YAML::Emitter out;
-  const auto number = [&](const char* key, double value) {
-    out << YAML::Key << key << YAML::Value << YamlNumber(value);
-  };
-  out << YAML::BeginMap << YAML::Key << "schema" << YAML::Value << kTruthSchema;
-  number("image_distance_mm", truth.image_distance_mm);
-  number("focus_depth_mm", truth.focus_depth_mm);
-  number("blur_ratio", truth.blur_ratio);
-  number("blur_floor_px", truth.blur_floor_px);
-  number("nearest_depth_mm", truth.nearest_depth_mm);
-  number("farthest_depth_mm", truth.farthest_depth_mm);
-  number("largest_blur_sigma_px", truth.largest_blur_sigma_px);
-  EmitEffects(truth.effects, &out);
-  number("sampling_error_grey_levels", truth.sampling_error_grey_levels);
-  out << YAML::Key << "seed" << YAML::Value << truth.seed << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
+  YamlWriter out(kTruthSchema);
+  out.Number("image_distance_mm", truth.image_distance_mm);
+  out.Number("focus_depth_mm", truth.focus_depth_mm);
+  out.Number("blur_ratio", truth.blur_ratio);
+  out.Number("blur_floor_px", truth.blur_floor_px);
+  out.Number("nearest_depth_mm", truth.nearest_depth_mm);
+  out.Number("farthest_depth_mm", truth.farthest_depth_mm);
+  out.Number("largest_blur_sigma_px", truth.largest_blur_sigma_px);
+  WriteEffects(truth.effects, &out);
+  out.Number("sampling_error_grey_levels", truth.sampling_error_grey_levels);
+  out.Text("seed", std::to_string(truth.seed));
+  return out.Finish();
 }
 
 }  // namespace thicklens::model
