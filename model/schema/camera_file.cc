@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "model/schema/former_blur_ratio.h"
+#include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
-#include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/yaml_reader.h"
 
@@ -51,27 +51,14 @@ void ReadSensor(const YamlNode& node, Camera* camera) {
   const auto point = node.At("principal_point_px").ElementsExactly(2);
   sensor.principal_point_px = {ValueNode(point[0], camera).Number(),
                                ValueNode(point[1], camera).Number()};
-  const YamlNode transfer = node.At("transfer");
-  try {
-    sensor.transfer = TransferCurve::FromName(transfer.Text());
-  } catch (const Error& e) {
-    throw transfer.ErrorHere(e.what());
-  }
+  sensor.transfer = ReadTransfer(node.At("transfer"));
 }
 
-using NumberOf = double (YamlNode::*)() const;
-
-// `number` reads and checks the value: any, positive or not negative.
-std::optional<Estimate> ReadEstimate(const YamlNode& parent, const std::string& key,
-                                     NumberOf number) {
+std::optional<Estimate> FindEstimate(const YamlNode& parent, const std::string& key,
+                                     double (YamlNode::*number)() const) {
   const auto node = parent.Find(key);
   if (!node) return std::nullopt;
-  if (!node->IsMap()) return Estimate{((*node).*number)(), 0};
-  node->RequireKeys({"value", "sigma"});
-  Estimate estimate;
-  estimate.value = (node->At("value").*number)();
-  if (const auto sigma = node->Find("sigma")) estimate.sigma = sigma->NonNegativeNumber();
-  return estimate;
+  return ReadEstimate(*node, number);
 }
 
 Evidence ReadEvidence(const YamlNode& node) {
@@ -88,7 +75,7 @@ Evidence ReadEvidence(const YamlNode& node) {
   }
   if (const auto chi2 = node.Find("chi2_per_dof"))
     evidence.chi2_per_dof = chi2->NonNegativeNumber();
-  evidence.focus_depth_mm = ReadEstimate(node, "focus_depth_mm", &YamlNode::PositiveNumber);
+  evidence.focus_depth_mm = FindEstimate(node, "focus_depth_mm", &YamlNode::PositiveNumber);
   if (const auto family = node.Find("blur_family"))
     evidence.blur_family = family->OneOf({"gaussian", "disc"});
   if (const auto band = node.Find("blur_band")) evidence.blur_band = band->PositiveNumber();
@@ -128,10 +115,10 @@ CameraCalibration ReadCalibration(const YamlNode& node) {
   node.RequireKeys({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm",
                     "covariance", "evidence"});
   CameraCalibration calibration;
-  calibration.image_distance_mm = ReadEstimate(node, "image_distance_mm", &YamlNode::Number);
-  calibration.blur_ratio = ReadEstimate(node, "blur_ratio", &YamlNode::NonNegativeNumber);
-  calibration.blur_floor_px = ReadEstimate(node, "blur_floor_px", &YamlNode::NonNegativeNumber);
-  calibration.bench_offset_mm = ReadEstimate(node, "bench_offset_mm", &YamlNode::Number);
+  calibration.image_distance_mm = FindEstimate(node, "image_distance_mm", &YamlNode::Number);
+  calibration.blur_ratio = FindEstimate(node, "blur_ratio", &YamlNode::NonNegativeNumber);
+  calibration.blur_floor_px = FindEstimate(node, "blur_floor_px", &YamlNode::NonNegativeNumber);
+  calibration.bench_offset_mm = FindEstimate(node, "bench_offset_mm", &YamlNode::Number);
   if (const auto covariance = node.Find("covariance")) ReadCovariance(*covariance, &calibration);
   calibration.evidence = ReadEvidence(node.At("evidence"));
   return calibration;

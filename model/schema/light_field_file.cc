@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <filesystem>
 
+#include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
@@ -22,11 +23,6 @@ constexpr int kMaxImageSizePx = 100000;
 constexpr int kMaxViews = 1000;  // along u, and along v
 constexpr int kMaxIterations = 1000000000;
 constexpr double kWeightSumTolerance = 1e-6;
-
-Eigen::Vector2d ReadPoint(const YamlNode& node) {
-  const auto elements = node.ElementsExactly(2);
-  return {elements[0].Number(), elements[1].Number()};
-}
 
 void ReadSizes(const YamlNode& root, LightField* light_field) {
   const auto views = root.At("views").ElementsExactly(2);
@@ -89,7 +85,7 @@ void ReadGrid(const YamlNode& root, LightField* light_field) {
   grid.t_step_mm = steps.At("t_step_mm").PositiveNumber();
   grid.u_step_mm = steps.At("u_step_mm").Number();
   grid.v_step_mm = steps.At("v_step_mm").Number();
-  grid.st_origin_index = ReadPoint(root.At("st_origin_index"));
+  grid.st_origin_index = ReadPair(root.At("st_origin_index"));
   std::string why;
   if (!grid.IsValid(&why)) throw planes.ErrorHere(why);
   light_field->grid = grid;
@@ -281,19 +277,13 @@ LightFieldDescription ParseLightFieldDescription(const std::string& text,
     format->OneOf({kConfidenceFormat});
     description.has_confidence = true;
   }
-  const YamlNode transfer = root.At("transfer");
-  try {
-    light_field.transfer = TransferCurve::FromName(transfer.Text());
-  } catch (const Error& e) {
-    throw transfer.ErrorHere(e.what());
-  }
+  light_field.transfer = ReadTransfer(root.At("transfer"));
   const YamlNode disparity = root.At("disparity");
   if (disparity.Text() != kDisparityIs) {
     throw disparity.ErrorHere(
         fmt::format("'{}' is expected, found '{}'", kDisparityIs, disparity.Text()));
   }
-  if (const auto step = root.Find("landing_step_px"))
-    light_field.landing_step_px = ReadPoint(*step);
+  if (const auto step = root.Find("landing_step_px")) light_field.landing_step_px = ReadPair(*step);
   ReadWeights(root.At("weights"), &light_field);
   if (const auto missing = root.Find("missing_views")) ReadMissingViews(*missing, &light_field);
   ReadCameraAndGrid(root, &description);

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "model/schema/sweep_frames.h"
+#include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
 
@@ -26,15 +27,8 @@ bool IsUnknown(const YamlNode& node) { return node.IsScalar() && node.Text() == 
 
 void ReadOffset(const YamlNode& root, SweepFile* sweep) {
   const auto node = root.Find("offset_mm");
-  if (!node) return;
-  if (node->IsMap()) {
-    node->RequireKeys({"value", "sigma"});
-    Estimate offset{node->At("value").Number(), 0};
-    if (const auto sigma = node->Find("sigma")) offset.sigma = sigma->NonNegativeNumber();
-    sweep->offset_mm = offset;
-  } else if (!IsUnknown(*node)) {
-    sweep->offset_mm = Estimate{node->Number(), 0};
-  }
+  if (!node || IsUnknown(*node)) return;
+  sweep->offset_mm = ReadEstimate(*node, &YamlNode::Number);
 }
 
 void ReadFloor(const YamlNode& root, SweepFile* sweep) {
@@ -63,9 +57,7 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
                                         *sweep->floor.from_px, *sweep->floor.to_px));
     }
   } else {
-    Estimate floor{node->At("value").NonNegativeNumber(), 0};
-    if (const auto sigma = node->Find("sigma")) floor.sigma = sigma->NonNegativeNumber();
-    sweep->floor.given_px = floor;
+    sweep->floor.given_px = ReadEstimate(*node, &YamlNode::NonNegativeNumber);
   }
 }
 

@@ -1,5 +1,6 @@
 // Reader and writer of the file with the parameters of a simulated sweep.
 #include "model/schema/effect_yaml.h"
+#include "model/schema/yaml_fields.h"
 #include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/pupil_law.h"
@@ -9,12 +10,6 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kTruthSchema[] = "thicklens/sweep-truth/1";
-
-std::string ReadPupilLawName(const YamlNode& node) {
-  std::vector<std::string> names;
-  for (const PupilLaw law : AllPupilLaws()) names.push_back(PupilLawName(law));
-  return node.OneOf(names);
-}
 
 }  // namespace
 
@@ -31,7 +26,9 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   truth.blur_floor_px = root.At("blur_floor_px").NonNegativeNumber();
   truth.bench_offset_mm = root.At("bench_offset_mm").Number();
   if (const auto tilt = root.Find("tilt_deg")) truth.tilt_deg = tilt->Number();
-  if (const auto law = root.Find("pupil_law")) truth.pupil_law = ReadPupilLawName(*law);
+  if (const auto law = root.Find("pupil_law")) {
+    truth.pupil_law = PupilLawName(ReadNamed(*law, AllPupilLaws(), PupilLawName));
+  }
   for (const YamlNode& node : root.At("frames").Elements()) {
     node.RequireKeys({"image", "depth_mm", "reading_mm", "blur_sigma_px"});
     truth.frames.push_back({node.At("image").Text(), node.At("depth_mm").Number(),
