@@ -8,7 +8,8 @@ install(
   DESTINATION ${package_dir})
 configure_package_config_file("${PROJECT_SOURCE_DIR}/.cmake/thicklensConfig.cmake.in"
                               "${PROJECT_BINARY_DIR}/thicklensConfig.cmake"
-                              INSTALL_DESTINATION ${package_dir})
+                              INSTALL_DESTINATION ${package_dir}
+                              PATH_VARS THICKLENS_LIBRARY_DIR)
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/thicklensConfigVersion.cmake"
                                  COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/thicklensConfig.cmake"

@@ -51,10 +51,6 @@ function(thicklens_module name)
     ${target}
     PUBLIC $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
     PRIVATE "${PROJECT_SOURCE_DIR}")
-  # Those of a module without rooms are included by their name.
-  if(IS_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/src")
-    target_include_directories(${target} PRIVATE src)
-  endif()
   target_compile_features(${target} PUBLIC cxx_std_17)
   thicklens_compile_settings(${target})
   # What takes longest to read of what most files include. Each still includes what it uses: files are

@@ -28,21 +28,21 @@ const std::regex& WaysToOpenAFile() {
 // Sources that open files, and why.
 const std::set<std::string>& Known() {
   static const std::set<std::string> known = {
-      "model/base/input_file.cc",           // the reader
-      "model/base/output_file.cc",          // the writers
-      "model/base/output_folder.cc",        //
-      "model/base/output_part.cc",          //
-      "model/base/output_target.cc",        //
-      "tools/src/journal_file.cc",          // grows while a run is on its way
-      "tools/src/float_tiff.cc",            // a file in an output folder
-      "tools/src/picture_kind.cc",          // libtiff, from memory
-      "tools/src/standard_descriptors.cc",  // the null device
-      "kernels/opencl/guarded_child.cc",    // the null device
-      "estimator/base/run_cost.cc",         // files of /proc
-      "tools/src/bench_machine.cc",         //
-      "tools/src/block_checkpoint.cc",      //
-      "tools/src/memory_available.cc",      //
-      "tools/src/peak_memory.cc"};          //
+      "model/base/input_file.cc",              // the reader
+      "model/base/output_file.cc",             // the writers
+      "model/base/output_folder.cc",           //
+      "model/base/output_part.cc",             //
+      "model/base/output_target.cc",           //
+      "tools/io/journal_file.cc",              // grows while a run is on its way
+      "tools/io/float_tiff.cc",                // a file in an output folder
+      "tools/io/picture_kind.cc",              // libtiff, from memory
+      "tools/system/standard_descriptors.cc",  // the null device
+      "kernels/opencl/guarded_child.cc",       // the null device
+      "estimator/base/run_cost.cc",            // files of /proc
+      "tools/system/machine.cc",               //
+      "tools/io/block_checkpoint.cc",          //
+      "model/base/memory_available.cc",        //
+      "tools/system/peak_memory.cc"};          //
   return known;
 }
 

@@ -1,7 +1,7 @@
 // Benchmarks run in memory like the program's: in huge pages, and kept when it is freed.
 #include <benchmark/benchmark.h>
 
-#include "program_memory.h"
+#include "tools/system/program_memory.h"
 
 int main(int argc, char** argv) {
   thicklens::tools::KeepFreedMemory();

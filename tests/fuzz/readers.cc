@@ -4,20 +4,20 @@
 #include <opencv2/core/mat.hpp>
 #include <stdexcept>
 
-#include "block_checkpoint.h"
-#include "depth_io.h"
-#include "estimate_profile.h"
-#include "estimate_records.h"
-#include "exif.h"
-#include "image_io.h"
-#include "journal_file.h"
-#include "light_field_io.h"
 #include "thicklens/base/error.h"
+#include "thicklens/io/block_checkpoint.h"
+#include "thicklens/io/depth_io.h"
+#include "thicklens/io/exif.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/journal_file.h"
+#include "thicklens/io/light_field_io.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field_file.h"
 #include "thicklens/model/scene_simulator.h"
 #include "thicklens/model/sweep_file.h"
 #include "thicklens/model/sweep_simulator.h"
+#include "tools/options/estimate_profile.h"
+#include "tools/report/estimate_records.h"
 
 namespace thicklens::testing {
 namespace {
@@ -58,13 +58,13 @@ void ReadCheckpoint(const std::string& bytes, const TemporaryFolder& folder) {
   const std::string records = folder / "records.blocks";
   fs::remove(records);
   {
-    tools::JournalFile journal(records, "thicklens-blocks/1");
+    io::JournalFile journal(records, "thicklens-blocks/1");
     const std::size_t half = bytes.find('\n');
     journal.Append({bytes.substr(0, half)});
     journal.Append({half == std::string::npos ? "" : bytes.substr(half + 1)});
   }
   for (const std::string& path : {records, folder.Put("estimate.blocks", bytes)}) {
-    tools::BlockCheckpoint checkpoint(path, "a version");
+    io::BlockCheckpoint checkpoint(path, "a version");
     checkpoint.device();
     // What is left out of a file is no error to the reader; here it is.
     const bool is_whole = checkpoint.block_px() && checkpoint.Find(0) && checkpoint.Find(1);
@@ -98,23 +98,23 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
              [](const std::string& path) { model::ReadLightFieldDescription(path); }),
       OfFile("hci-cfg", "hci/parameters.cfg",
              [](const std::string& path) {
-               tools::ReadLightField(fs::path(path).parent_path().string(), {});
+               io::ReadLightField(fs::path(path).parent_path().string(), {});
              }),
       OfFile("hci-view", "hci-view/input_Cam000.png",
              [](const std::string& path) {
-               tools::ReadLightField(fs::path(path).parent_path().string(), {});
+               io::ReadLightField(fs::path(path).parent_path().string(), {});
              }),
       OfFile("view-tiff", "tiff/views/view_00_00.tiff",
              [](const std::string& path) {
-               tools::ReadLightField(fs::path(path).parent_path().parent_path().string(), {});
+               io::ReadLightField(fs::path(path).parent_path().parent_path().string(), {});
              }),
-      OfFile("depth-map", "depth.pfm", [](const std::string& path) { tools::ReadDepthMap(path); }),
+      OfFile("depth-map", "depth.pfm", [](const std::string& path) { io::ReadDepthMap(path); }),
       {"picture",
        [](const std::string& bytes, const TemporaryFolder&) {
-         tools::ToStoredPicture(tools::DecodePicture(bytes, "picture.png"));
+         io::ToStoredPicture(io::DecodePicture(bytes, "picture.png"));
        }},
       OfFile("photo-exif", "photo.jpg",
-             [](const std::string& path) { tools::ReadPhotoExif(path, 640, 480); }),
+             [](const std::string& path) { io::ReadPhotoExif(path, 640, 480); }),
       {"block-checkpoint", ReadCheckpoint},
       OfFile("profile-json", "profile.json",
              [](const std::string& path) { tools::ReadProfile(path); }),
@@ -128,7 +128,7 @@ const std::vector<FuzzedReader>& FuzzedReaders() {
 
 void PrepareFuzzFolder(const TemporaryFolder& folder) {
   const model::StoredPicture grey{4, 3, 1, 8, std::vector<std::uint16_t>(12, 100)};
-  const std::string png = tools::EncodePng(grey);
+  const std::string png = io::EncodePng(grey);
   for (int i = 0; i < kViews; ++i) folder.Put("frames/frame_00" + std::to_string(i) + ".png", png);
   for (int i = 0; i < kViews * kViews; ++i) {
     folder.Put("hci/input_Cam00" + std::to_string(i) + ".png", png);

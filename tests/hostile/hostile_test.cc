@@ -7,14 +7,14 @@
 #include <filesystem>
 #include <sstream>
 
-#include "depth_io.h"
-#include "image_io.h"
-#include "light_field_io.h"
-#include "program_run.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/light_field_io.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/light_field.h"
+#include "tools/system/program_run.h"
 
 namespace thicklens::hostile {
 namespace {
@@ -95,11 +95,11 @@ HostileTest::HostileTest() {
   for (const char* folder : {"work", "tmp", "run"}) fs::create_directory(root_ / folder);
   const model::Camera camera = SmallCamera();
   Put("camera.yaml", model::CameraToYaml(camera));
-  Put("picture.png", tools::EncodePng(SmallPicture()));
+  Put("picture.png", io::EncodePng(SmallPicture()));
   model::RawDepthMap depth{kWidthPx, kHeightPx, {}};
   for (int i = 0; i < kWidthPx * kHeightPx; ++i)
     depth.values.push_back(301.0F + 0.01F * static_cast<float>(i % kWidthPx));
-  Put("depth.pfm", tools::EncodePfm(depth));
+  Put("depth.pfm", io::EncodePfm(depth));
   Put("scene.yaml", kScene);
   Put("recipe.yaml",
       "schema: thicklens/simulate-sweep/1\n"
@@ -114,8 +114,8 @@ HostileTest::HostileTest() {
   model::LightField light_field = model::MakeLightField(kWidthPx, kHeightPx, 2, 2, 3);
   for (std::size_t i = 0; i < light_field.values.size(); ++i)
     light_field.values[i] = 0.2F + 0.01F * static_cast<float>(i * 37 % 50);
-  OutputFolder folder(Work("lf"), tools::kLightFieldMarker, tools::LightFieldEntries());
-  tools::WriteLightField(light_field, tools::ViewFormat::kPng, &folder);
+  OutputFolder folder(Work("lf"), io::kLightFieldMarker, io::LightFieldEntries());
+  io::WriteLightField(light_field, io::ViewFormat::kPng, &folder);
   folder.Commit();
 }
 

@@ -1,5 +1,5 @@
 // Whether a stored calibration holds: the statistics, with numbers that can be worked out by hand.
-// With simulated sweeps: tests/tools/camera_verify_test.cc.
+// With simulated sweeps: tests/tools/commands/camera_verify_test.cc.
 #include "thicklens/calib/verification.h"
 
 #include <gmock/gmock.h>

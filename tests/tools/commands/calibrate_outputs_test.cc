@@ -1,0 +1,129 @@
+// What `thicklens calibrate --report` leaves on disk.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "support/temporary_folder.h"
+#include "tools/support/child_process.h"
+#include "tools/support/xml_elements.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using thicklens::testing::ContentOf;
+using thicklens::testing::TemporaryFolder;
+using Arguments = std::vector<std::string>;
+
+// A simulated sweep that all tests share, and a folder for the outputs of one.
+class CalibrateOutputs : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = std::make_unique<TemporaryFolder>();
+    const std::string config = shared_->Put(
+        "config.yaml", std::string("schema: thicklens/simulate-sweep/1\ncamera: ") +
+                           THICKLENS_SOURCE_DIR +
+                           "/configs/cameras/case-ii.yaml\n"
+                           "truth: {focus_depth_mm: 300, blur_ratio: 0.45, blur_floor_px: 0.5}\n"
+                           "size_px: [128, 128]\ntarget: {kind: dead-leaves, contrast: 0.6}\n"
+                           "bench: {first_depth_mm: 290.4, step_mm: 2, frames: 11, offset_mm: 20, "
+                           "reading_sigma_mm: 0.05}\nnoise: {full_well_electrons: 10000}\n");
+    const ProgramResult result =
+        Run({"simulate", "sweep", config, "-o", *shared_ / "sweep"}, *shared_);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  static void TearDownTestSuite() { shared_.reset(); }
+
+  static ProgramResult Run(const Arguments& arguments, const TemporaryFolder& folder) {
+    return ChildProgram(arguments, folder.path(), 0).Wait();
+  }
+  ProgramResult Calibrate(Arguments options) const {
+    Arguments arguments = {"calibrate", *shared_ / "sweep/sweep.yaml", "--report",
+                           folder_ / "out/report"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return Run(arguments, scratch_);
+  }
+  std::vector<std::string> Names(const std::string& folder) const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_ / folder))
+      names.push_back(entry.path().filename().string());
+    return names;
+  }
+
+  static std::unique_ptr<TemporaryFolder> shared_;
+  TemporaryFolder folder_, scratch_;
+};
+
+std::unique_ptr<TemporaryFolder> CalibrateOutputs::shared_;
+
+TEST_F(CalibrateOutputs, FiguresLieBesideThePageAndAreReplaced) {
+  fs::create_directories(folder_ / "out/report");
+  folder_.Put("out/report/mine.txt", "mine");
+  folder_.Put("out/report/figures/captions.txt", "of an older run");
+  folder_.Put("out/report/figures/field.svg", "of an older run");
+  const ProgramResult result = Calibrate({"--no-field", "--json", folder_ / "result.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(Names("out/report"),
+              ::testing::UnorderedElementsAre("figures", "mine.txt", "report.html"));
+  EXPECT_EQ(ContentOf(folder_ / "out/report/mine.txt"), "mine");
+  const std::vector<std::string> figures = Names("out/report/figures");
+  EXPECT_THAT(figures, Contains("sharpness.svg"));
+  EXPECT_THAT(figures, Contains("blur.svg"));
+  EXPECT_THAT(figures, Not(Contains("field.svg"))) << "it is not of this run";
+  for (const std::string& name : figures) {
+    const std::string content = ContentOf(folder_ / ("out/report/figures/" + name));
+    if (name != "captions.txt") {
+      EXPECT_EQ(ParseXml(content).error, "") << name;
+    }
+  }
+  EXPECT_THAT(ContentOf(folder_ / "out/report/figures/captions.txt"), HasSubstr("blur.svg"));
+  const auto json = nlohmann::json::parse(ContentOf(folder_ / "result.json"));
+  EXPECT_FALSE(json.at("field").at("done").get<bool>());
+}
+
+// The field of so small a picture may have no map; what tells is whether one was tried.
+TEST_F(CalibrateOutputs, NoFieldLeavesTheMapOut) {
+  fs::create_directories(folder_ / "out");
+  std::string message[2];
+  for (const bool without : {false, true}) {
+    Arguments options = {"--json", folder_ / "result.json"};
+    if (without) options.emplace_back("--no-field");
+    const ProgramResult result = Calibrate(options);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    message[without ? 1 : 0] = nlohmann::json::parse(ContentOf(folder_ / "result.json"))
+                                   .at("field")
+                                   .at("message")
+                                   .get<std::string>();
+  }
+  EXPECT_NE(message[0], "not run");
+  EXPECT_EQ(message[1], "not run");
+}
+
+TEST_F(CalibrateOutputs, FilesOfOthersAmongTheFiguresStopTheRunAtOnce) {
+  folder_.Put("out/report/figures/captions.txt", "of an older run");
+  folder_.Put("out/report/figures/mine.svg", "mine");
+  const ProgramResult result = Calibrate({});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("mine.svg"));
+  EXPECT_EQ(ContentOf(folder_ / "out/report/figures/mine.svg"), "mine");
+  EXPECT_THAT(Names("out/report"), ::testing::ElementsAre("figures"));
+}
+
+TEST_F(CalibrateOutputs, ADryRunLeavesNoFolder) {
+  const ProgramResult result = Calibrate({"--dry-run"});
+  EXPECT_EQ(result.exit_code, 1) << "the folder of the report's folder is missing";
+  fs::create_directories(folder_ / "out");
+  EXPECT_EQ(Calibrate({"--dry-run"}).exit_code, 0);
+  EXPECT_TRUE(fs::is_empty(folder_ / "out"));
+}
+
+}  // namespace
+}  // namespace thicklens::tools

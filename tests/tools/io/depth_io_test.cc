@@ -1,0 +1,209 @@
+#include "thicklens/io/depth_io.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
+
+#include "support/error_message.h"
+#include "support/temporary_folder.h"
+#include "thicklens/base/error.h"
+#include "tools/io/png_check.h"
+#include "tools/support/encoded_picture.h"
+
+namespace thicklens::io {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using thicklens::testing::ErrorOf;
+using thicklens::testing::TemporaryFolder;
+
+// 1, 2, 3 in the lower row, 4, 5, 6 in the upper one; big endian.
+const std::string kBigEndianValues(
+    "\x3F\x80\x00\x00\x40\x00\x00\x00\x40\x40\x00\x00"
+    "\x40\x80\x00\x00\x40\xA0\x00\x00\x40\xC0\x00\x00",
+    24);
+
+std::string Swapped(std::string values) {
+  for (std::size_t i = 0; i + 4 <= values.size(); i += 4)
+    std::reverse(values.begin() + static_cast<std::ptrdiff_t>(i),
+                 values.begin() + static_cast<std::ptrdiff_t>(i) + 4);
+  return values;
+}
+
+class DepthFile : public ::testing::Test {
+ protected:
+  model::RawDepthMap Read(const std::string& bytes) {
+    return ReadDepthMap(folder_.Put("depth", bytes));
+  }
+  std::string Refusal(const std::string& bytes) {
+    const std::string path = folder_.Put("depth", bytes);
+    const std::string message = ErrorOf([&] { ReadDepthMap(path); });
+    EXPECT_THAT(message, StartsWith(path));
+    EXPECT_EQ(message.find('\n'), std::string::npos);
+    return message;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(DepthFile, PfmOfEitherByteOrderHasItsRowsBottomUp) {
+  for (const std::string& bytes :
+       {"Pf\n3 2\n1.0\n" + kBigEndianValues, "Pf\n3 2\n-1.0\n" + Swapped(kBigEndianValues),
+        "Pf 3\n2\t-0.0039\n" + Swapped(kBigEndianValues), "Pf\r\n3 2\r\n1\n" + kBigEndianValues}) {
+    const model::RawDepthMap map = Read(bytes);
+    EXPECT_EQ(map.width_px, 3);
+    EXPECT_EQ(map.height_px, 2);
+    EXPECT_THAT(map.values, ElementsAre(4, 5, 6, 1, 2, 3));
+    EXPECT_FALSE(map.integer);
+  }
+}
+
+// A value may look like white space: only one such byte stands between the scale and the values.
+TEST_F(DepthFile, PfmValuesMayBeginWithWhiteSpace) {
+  EXPECT_THAT(Read(std::string("Pf\n1 1\n-1\n\x0A\x20\x0D\x40", 14)).values,
+              ElementsAre(::testing::FloatNear(2.2051F, 1e-3F)));
+}
+
+TEST_F(DepthFile, PfmRoundTripKeepsEveryBit) {
+  model::RawDepthMap map{2, 3, {}, false};
+  map.values = {0.1F,
+                -0.0F,
+                std::numeric_limits<float>::infinity(),
+                std::numeric_limits<float>::denorm_min(),
+                std::nanf("3"),
+                -1e30F};
+  const model::RawDepthMap back = Read(EncodePfm(map));
+  EXPECT_EQ(back.width_px, 2);
+  EXPECT_EQ(back.height_px, 3);
+  ASSERT_EQ(back.values.size(), 6U);
+  EXPECT_EQ(std::memcmp(back.values.data(), map.values.data(), 6 * sizeof(float)), 0);
+}
+
+TEST_F(DepthFile, ABrokenPfmIsRefused) {
+  EXPECT_THAT(Refusal("Pf\n3 2\n1.0\n" + kBigEndianValues.substr(0, 23)),
+              AllOf(HasSubstr("23 bytes"), HasSubstr("3x2"), HasSubstr("24")));
+  EXPECT_THAT(Refusal("Pf\n3 2\n1.0\n" + kBigEndianValues + "x"), HasSubstr("25 bytes"));
+  EXPECT_THAT(Refusal("PF\n1 1\n1.0\n" + kBigEndianValues.substr(0, 12)),
+              HasSubstr("three channels"));
+  EXPECT_THAT(Refusal("Pf\n3 0\n1.0\n"), HasSubstr("found '0'"));
+  EXPECT_THAT(Refusal("Pf\n3.5 2\n1.0\n"), HasSubstr("found '3.5'"));
+  EXPECT_THAT(Refusal("Pf\n-3 2\n1.0\n"), HasSubstr("found '-3'"));
+  EXPECT_THAT(Refusal("Pf\n3 99999999999\n1.0\n"), HasSubstr("found '99999999999'"));
+  EXPECT_THAT(Refusal("Pf\n3 2\n0\n" + kBigEndianValues), HasSubstr("found '0'"));
+  EXPECT_THAT(Refusal("Pf\n3 2\nnan\n" + kBigEndianValues), HasSubstr("found 'nan'"));
+  EXPECT_THAT(Refusal("Pf\n3 2\nx\n" + kBigEndianValues), HasSubstr("found 'x'"));
+  EXPECT_THAT(Refusal("Pf\n3 2\n1.0"), HasSubstr("broken PFM"));
+  EXPECT_THAT(Refusal("Pf\n3"), HasSubstr("broken PFM"));
+  EXPECT_THAT(Refusal("Pf"), HasSubstr("broken PFM"));
+}
+
+TEST_F(DepthFile, IntegerPicturesAreReadAsTheyAre) {
+  const cv::Mat shallow = (cv::Mat_<unsigned char>(2, 2) << 0, 1, 200, 255);
+  const cv::Mat deep = (cv::Mat_<unsigned short>(1, 3) << 0, 5000, 65535);
+  const model::RawDepthMap from_shallow = Read(Encoded(shallow, ".png"));
+  EXPECT_THAT(from_shallow.values, ElementsAre(0, 1, 200, 255));
+  EXPECT_TRUE(from_shallow.integer);
+  for (const char* format : {".png", ".tiff"}) {
+    const model::RawDepthMap map = Read(Encoded(deep, format));
+    EXPECT_EQ(map.width_px, 3);
+    EXPECT_EQ(map.height_px, 1);
+    EXPECT_THAT(map.values, ElementsAre(0, 5000, 65535));
+    EXPECT_TRUE(map.integer);
+  }
+}
+
+TEST_F(DepthFile, FloatPicturesAreReadAsTheyAre) {
+  const cv::Mat depth = (cv::Mat_<float>(2, 2) << 0.1F, -3.0F, 1e-30F, 1e30F);
+  for (const char* format : {".tiff", ".exr"}) {
+    const std::string bytes =
+        Encoded(depth, format, {cv::IMWRITE_EXR_TYPE, cv::IMWRITE_EXR_TYPE_FLOAT});
+    const model::RawDepthMap map = Read(bytes);
+    EXPECT_THAT(map.values, ElementsAre(0.1F, -3.0F, 1e-30F, 1e30F)) << format;
+    EXPECT_FALSE(map.integer);
+  }
+}
+
+TEST_F(DepthFile, WhatIsNoDepthMapIsRefused) {
+  const cv::Mat colour(2, 2, CV_16UC3, cv::Scalar(1, 2, 3));
+  EXPECT_THAT(Refusal(Encoded(colour, ".png")),
+              AllOf(HasSubstr("16-bit values in 3 channel"), HasSubstr("one channel")));
+  EXPECT_THAT(Refusal(Encoded(colour, ".tiff")), HasSubstr("3 channel"));
+  EXPECT_THAT(Refusal(Encoded(cv::Mat(2, 2, CV_32FC3, cv::Scalar(1, 2, 3)), ".exr")),
+              HasSubstr("3 channel"));
+  EXPECT_THAT(Refusal(Encoded(cv::Mat(2, 2, CV_8U, cv::Scalar(9)), ".tiff")),
+              AllOf(HasSubstr("16-bit or 32-bit float"), HasSubstr("found 8-bit")));
+  EXPECT_THAT(Refusal(Encoded(cv::Mat(2, 2, CV_64F, cv::Scalar(9)), ".tiff")),
+              HasSubstr("found 64-bit float"));
+  EXPECT_THAT(Refusal(Encoded(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), ".jpg")),
+              HasSubstr("PFM, PNG, TIFF or EXR"));
+  EXPECT_THAT(Refusal("a text"), HasSubstr("no depth map"));
+  EXPECT_THAT(Refusal(""), HasSubstr("no depth map"));
+  EXPECT_THAT(ErrorOf([&] { ReadDepthMap(folder_ / "none.pfm"); }), HasSubstr("none.pfm"));
+  EXPECT_THAT(ErrorOf([&] { ReadDepthMap(folder_.path()); }), HasSubstr("is a folder"));
+}
+
+// One bit a pixel: decoding spreads 0 and 1 to 0 and 255.
+TEST_F(DepthFile, APngWhoseNumbersWouldBeChangedIsRefused) {
+  const cv::Mat bits = (cv::Mat_<unsigned char>(2, 2) << 0, 255, 255, 0);
+  EXPECT_THAT(Refusal(Encoded(bits, ".png", {cv::IMWRITE_PNG_BILEVEL, 1})),
+              HasSubstr("1 bits in the file"));
+}
+
+TEST_F(DepthFile, ABrokenPictureIsRefused) {
+  cv::Mat depth(40, 40, CV_16U);
+  cv::randu(depth, 0, 65535);
+  const std::string png = Encoded(depth, ".png");
+  EXPECT_THAT(Refusal(png.substr(0, png.size() / 2)), HasSubstr("broken PNG: it ends after"));
+  std::string flipped = png;
+  flipped[png.size() / 2] = static_cast<char>(flipped[png.size() / 2] ^ 1);
+  EXPECT_THAT(Refusal(flipped), HasSubstr("checksum"));
+  EXPECT_THAT(Refusal(png.substr(0, 8)), HasSubstr("broken PNG"));
+  const std::string tiff = Encoded(depth, ".tiff");
+  EXPECT_THAT(Refusal(tiff.substr(0, tiff.size() / 2)), HasSubstr("cannot be decoded"));
+  const std::string exr = Encoded(cv::Mat(40, 40, CV_32F, cv::Scalar(1)), ".exr");
+  EXPECT_THAT(Refusal(exr.substr(0, exr.size() / 2)), HasSubstr("cannot be decoded"));
+}
+
+TEST(PngCheck, PassesWholeFilesAndTellsTheirBits) {
+  const std::string deep = Encoded(cv::Mat(3, 3, CV_16U, cv::Scalar(7)), ".png");
+  const std::string shallow = Encoded(cv::Mat(3, 3, CV_8UC3, cv::Scalar(7)), ".png");
+  for (const std::string& bytes : {deep, shallow, deep + "behind the end", std::string("no png")})
+    EXPECT_EQ(ErrorOf([&] { RequireWholePng(bytes, "p"); }), "(no error)");
+  EXPECT_EQ(PngBits(deep), 16);
+  EXPECT_EQ(PngBits(shallow), 8);
+  EXPECT_EQ(PngBits("no png"), 0);
+  // At every place where it can end, and for every byte that can be wrong.
+  for (std::size_t size = 8; size < deep.size(); ++size)
+    EXPECT_NE(ErrorOf([&] { RequireWholePng(deep.substr(0, size), "p"); }), "(no error)") << size;
+  for (std::size_t at = 8; at < deep.size(); ++at) {
+    std::string wrong = deep;
+    wrong[at] = static_cast<char>(wrong[at] ^ 0x10);
+    EXPECT_NE(ErrorOf([&] { RequireWholePng(wrong, "p"); }), "(no error)") << at;
+  }
+}
+
+TEST(DepthData, ReadsTheBenchmarksDisparity) {
+  const std::string path =
+      std::string(THICKLENS_SHARED_DATA_DIR) + "/lf_antinous/gt_disp_lowres.pfm";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there";
+  const model::RawDepthMap map = ReadDepthMap(path);
+  EXPECT_EQ(map.width_px, 512);
+  EXPECT_EQ(map.height_px, 512);
+  const auto [least, most] = std::minmax_element(map.values.begin(), map.values.end());
+  EXPECT_NEAR(*least, -3.13, 0.01);
+  EXPECT_NEAR(*most, 2.69, 0.01);
+}
+
+}  // namespace
+}  // namespace thicklens::io

@@ -1,0 +1,200 @@
+// --effects and --without of estimate and render: what is on is what was asked for or matters.
+#include "tools/options/light_field_effects.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "thicklens/estimator/block_solver.h"
+#include "thicklens/estimator/render.h"
+#include "thicklens/kernels/kernels.h"
+#include "thicklens/model/thick_lens.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+using model::Effect;
+using model::EffectSet;
+using ::testing::HasSubstr;
+
+constexpr int kSensorWidthPx = 60, kSensorHeightPx = 40;
+const EstimateOptions kUsual;
+
+// Thick, with a wide field where the pixels are large.
+model::Camera ThickCamera(double pixel_pitch_mm, double aperture_radius_mm = 4) {
+  model::Camera camera;
+  camera.lens = {12.5, 14, 6, aperture_radius_mm};
+  camera.sensor = {
+      kSensorWidthPx, kSensorHeightPx, pixel_pitch_mm, {29.5, 19.5}, model::TransferCurve::Srgb()};
+  camera.calibration = model::CameraCalibration{};
+  camera.calibration->image_distance_mm =
+      model::Estimate{model::ImageDistanceMm(camera.lens, 800), 0};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
+  return camera;
+}
+
+EffectSet Decided(const EstimateOptions& options, const std::optional<model::Camera>& camera) {
+  return DecideEstimateEffects(options, camera, model::DepthStatistics{100, 0, 500, 800, 2000}).on;
+}
+EstimateOptions Without(const std::string& names) {
+  EstimateOptions options;
+  options.effects.without = names;
+  return options;
+}
+std::string UsageErrorOf(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(LightFieldEffectsTest, AnEstimateTakesWhatMatters) {
+  const EffectSet kept = {Effect::kDefocus, Effect::kOcclusion};
+  EXPECT_EQ(Decided(kUsual, ThickCamera(0.2)), kept.With({Effect::kFalloff, Effect::kThickness}));
+  EXPECT_EQ(Decided(kUsual, ThickCamera(0.001, 0.05)), kept);
+  // A small field: what a wide aperture does to the blur there is in the calibrated blur ratio.
+  EXPECT_EQ(Decided(kUsual, ThickCamera(0.001)), kept);
+  EXPECT_EQ(Decided(Without("thickness"), ThickCamera(0.2)), kept.With({Effect::kFalloff}));
+  EstimateOptions options;
+  options.effects.effects = "all";
+  EXPECT_EQ(Decided(options, ThickCamera(0.001, 0.05)),
+            kept.With({Effect::kFalloff, Effect::kThickness, Effect::kApertureShape}));
+  options.effects.effects = "defocus,occlusion";
+  EXPECT_EQ(Decided(options, ThickCamera(0.2)), kept);
+  options = kUsual;
+  options.effects.tolerance = "30gl";
+  EXPECT_EQ(Decided(options, ThickCamera(0.05, 1)), kept);
+  model::Camera disc = ThickCamera(0.001, 0.05);
+  disc.psf = model::Psf::kDisc;
+  EXPECT_EQ(Decided(kUsual, disc), kept.With({Effect::kApertureShape}));
+}
+
+TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
+  EXPECT_EQ(Decided(kUsual, std::nullopt),
+            (EffectSet{Effect::kDefocus, Effect::kApertureShape, Effect::kOcclusion}));
+  EXPECT_TRUE(DecideEstimateEffects(kUsual, std::nullopt, std::nullopt).findings.empty());
+  EstimateOptions functional;
+  functional.solver = "functional";
+  EXPECT_EQ(Decided(functional, std::nullopt),
+            (EffectSet{Effect::kDefocus, Effect::kApertureShape}));
+  EstimateOptions tolerance;
+  tolerance.effects.tolerance = "1gl";
+  EXPECT_THAT(UsageErrorOf([&] { Decided(tolerance, std::nullopt); }),
+              HasSubstr("--effect-tolerance"));
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("falloff"), std::nullopt); }),
+              HasSubstr("--without: effect falloff is not one of those there are here"));
+}
+
+// What auto leaves out is within the tolerance as it is told, too: there each is alone without,
+// while they are left out one after the other, which changes bounds by a little.
+TEST(LightFieldEffectsTest, WhatIsLeftOutIsWithinTheToleranceThatIsTold) {
+  int left_out = 0;
+  for (const double pitch_mm : {0.001, 0.003, 0.01, 0.03, 0.1}) {
+    for (const double radius_mm : {0.02, 0.2, 1.0, 4.0}) {
+      const model::EffectDecision decision = DecideEstimateEffects(
+          kUsual, ThickCamera(pitch_mm, radius_mm), model::DepthStatistics{9, 0, 500, 800, 2000});
+      for (const model::EffectFinding& finding : decision.findings) {
+        if (decision.on.Has(finding.effect)) continue;
+        EXPECT_LE(finding.impact.grey_levels, 0.6)
+            << model::EffectName(finding.effect) << " " << pitch_mm << " " << radius_mm;
+        if (finding.effect == Effect::kFalloff) ++left_out;
+      }
+    }
+  }
+  EXPECT_GT(left_out, 0);
+}
+
+TEST(LightFieldEffectsTest, AnEstimateRefusesToLeaveOutWhatItIsAbout) {
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("defocus"), ThickCamera(0.2)); }),
+              HasSubstr("compare --dibr"));
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("occlusion"), std::nullopt); }),
+              HasSubstr("occlusion cannot be left out"));
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("shot-noise"), ThickCamera(0.2)); }),
+              HasSubstr("--without: effect shot-noise is not one of"));
+  EXPECT_THAT(UsageErrorOf([] { Decided(Without("bokeh"), ThickCamera(0.2)); }),
+              HasSubstr("\"bokeh\""));
+  EstimateOptions options;
+  options.effects.effects = "falloff";
+  EXPECT_THAT(UsageErrorOf([&] { Decided(options, ThickCamera(0.2)); }), HasSubstr("defocus"));
+}
+
+// A uniform field, photographed by a camera and by its thin twin: the mean over the views of cos
+// cos^3, each over that of its own ray on the axis, added up.
+TEST(LightFieldEffectsTest, TheThinTwinHasAFallOffOfItsOwn) {
+  const model::Camera thick = ThickCamera(0.2), thin = model::ThinTwin(thick);
+  EXPECT_NEAR(thin.focus_depth_mm(), 800, 1e-9);
+  EXPECT_NEAR(thin.focal_scale_px(), thick.focal_scale_px(), 1e-9);
+  EXPECT_EQ(thin.lens.lens_thickness_mm, 0);
+  const model::LightFieldGrid grid = model::DefaultGrid(thick, 5, 5);
+  model::LightField field = model::MakeLightField(kSensorWidthPx, kSensorHeightPx, 5, 5, 1);
+  std::fill(field.values.begin(), field.values.end(), 0.5F);
+  field.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 5, 5);
+  field.grid = grid;
+  field.camera = thick;
+  const auto kernels = kernels::NewReference<float>();
+  std::vector<double> corner;
+  for (const model::Camera* camera : {&thick, &thin}) {
+    const model::LinearPicture picture =
+        estimator::Photograph(field, field.weights, camera, nullptr, kernels.get(), 1);
+    const double distance_mm = camera->image_distance_mm();
+    const double scale_mm = thick.focal_scale_px() * 0.2;
+    const auto light = [&](double x_mm, double y_mm) {
+      double sum = 0;
+      for (int l = 0; l < 5; ++l) {
+        for (int k = 0; k < 5; ++k) {
+          const double u_mm = (k - 2) * grid.u_step_mm, v_mm = (l - 2) * grid.v_step_mm;
+          // Of the point of the plane of focus that lands there, seen from (u, v).
+          const auto irradiance = [&](double at_x_mm, double at_y_mm) {
+            const double front =
+                std::hypot(at_x_mm * 800 / scale_mm - u_mm, at_y_mm * 800 / scale_mm - v_mm) / 800;
+            const double behind = std::hypot(at_x_mm + u_mm, at_y_mm + v_mm) / distance_mm;
+            return std::cos(std::atan(front)) * std::pow(std::cos(std::atan(behind)), 3);
+          };
+          sum += field.weights(l, k) * irradiance(x_mm, y_mm) / irradiance(0, 0);
+        }
+      }
+      return sum;
+    };
+    const double expected = 0.5 * light(-29.5 * 0.2, -19.5 * 0.2);
+    EXPECT_NEAR(static_cast<double>(picture.at(0, 0, 0)), expected, 1e-5);
+    corner.push_back(expected);
+  }
+  EXPECT_GT(std::abs(corner[0] - corner[1]), 0.01);
+}
+
+TEST(LightFieldEffectsTest, APhotographTakesWhatMatters) {
+  model::LightField field = model::MakeLightField(kSensorWidthPx, kSensorHeightPx, 3, 3, 1);
+  const EffectSet kept = {Effect::kDefocus, Effect::kApertureShape};
+  EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on, kept);
+  field.camera = ThickCamera(0.2);
+  EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on,
+            kept.With({Effect::kThickness, Effect::kFalloff}));
+  field.camera = ThickCamera(0.001, 0.05);
+  EXPECT_EQ(DecidePhotographEffects(EffectOptions(), field).on, kept);
+  EffectOptions vignetting;
+  vignetting.effects = "vignetting";
+  field.grid = model::DefaultGrid(*field.camera, 3, 3);
+  EXPECT_THAT(UsageErrorOf([&] { DecidePhotographEffects(vignetting, field); }),
+              HasSubstr("vignetting"));
+  field.camera = ThickCamera(0.01);
+  field.grid = model::GridOnPlanes(*field.camera, {20, 780}, 3, 3);
+  EXPECT_TRUE(DecidePhotographEffects(EffectOptions(), field).on.Has(Effect::kVignetting));
+  field.grid = model::GridOnPlanes(*field.camera, {1e-4, 800 - 1e-4}, 3, 3);
+  EXPECT_FALSE(DecidePhotographEffects(EffectOptions(), field).on.Has(Effect::kVignetting));
+  EffectOptions none;
+  none.effects = "none";
+  EXPECT_TRUE(DecidePhotographEffects(none, field).on.empty());
+  EffectOptions noise;
+  noise.without = "read-noise";
+  EXPECT_THAT(UsageErrorOf([&] { DecidePhotographEffects(noise, field); }),
+              HasSubstr("read-noise"));
+}
+
+}  // namespace
+}  // namespace thicklens::tools

@@ -1,0 +1,230 @@
+#include "tools/options/light_field_options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/error_message.h"
+#include "thicklens/base/error.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using thicklens::testing::ErrorOf;
+
+constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
+constexpr int kMapWidth = 3, kMapHeight = 2;
+
+// What a UsageError says; another Error, or none, fails the test.
+template <typename Call>
+std::string UsageErrorOf(const Call& call) {
+  try {
+    call();
+  } catch (const UsageError& error) {
+    return error.what();
+  } catch (const Error& error) {
+    ADD_FAILURE() << "no usage error: " << error.what();
+    return "";
+  }
+  return "(no error)";
+}
+
+model::Camera SmallCamera() {
+  model::Camera camera;
+  camera.name = "small";
+  camera.lens = {12.5, 12.8, 3, 4.46};
+  camera.sensor = {kMapWidth, kMapHeight, 0.006, {1, 0.5}, model::TransferCurve::Srgb()};
+  camera.calibration = model::CameraCalibration{};
+  camera.calibration->image_distance_mm = model::Estimate{15.94, 0};
+  camera.calibration->blur_ratio = model::Estimate{0.45, 0};
+  return camera;
+}
+
+model::RawDepthMap MapOf(std::vector<float> values) {
+  return {kMapWidth, kMapHeight, std::move(values), false};
+}
+
+// Tells nothing about surfaces.
+model::LinearPicture GreyPicture(int width_px = kMapWidth) {
+  return {width_px, kMapHeight, 1,
+          std::vector<float>(static_cast<std::size_t>(width_px * kMapHeight))};
+}
+
+DepthOptions KindAndUnit(const std::string& kind, const std::string& unit) {
+  DepthOptions options;
+  options.kind = kind;
+  options.unit = unit;
+  return options;
+}
+
+TEST(ViewsOption, IsTwoCounts) {
+  EXPECT_EQ(ViewCounts({""}), std::make_pair(0, 0));
+  EXPECT_EQ(ViewCounts({"7x3"}), std::make_pair(7, 3));
+  for (const char* text : {"7", "7x", "x7", "7x0", "0x7", "7x7x7", "7,7", "-1x3", "2.5x3", "axb"})
+    EXPECT_THAT(UsageErrorOf([&] { ViewCounts({text}); }), StartsWith("--views: ")) << text;
+}
+
+TEST(CropOption, IsARectangle) {
+  EXPECT_FALSE(CropRect({""}));
+  const auto rect = CropRect({"1,2,30,40"});
+  ASSERT_TRUE(rect);
+  EXPECT_EQ(rect->x, 1);
+  EXPECT_EQ(rect->y, 2);
+  EXPECT_EQ(rect->width, 30);
+  EXPECT_EQ(rect->height, 40);
+  for (const char* text : {"1,2,3", "1,2,3,0", "1,2,0,3", "1,2,3,4,5", "-1,2,3,4", "1,2,3,4.5"})
+    EXPECT_THAT(UsageErrorOf([&] { CropRect({text}); }), StartsWith("--crop: ")) << text;
+}
+
+TEST(ReadingOptions, AreHandedOn) {
+  ReadingOptions options;
+  options.grid = 9;
+  options.sparse = true;
+  options.views.text = "3x5";
+  options.crop.text = "0,1,2,3";
+  const io::LightFieldReading reading = ReadingOf(options);
+  EXPECT_EQ(reading.grid, 9);
+  EXPECT_TRUE(reading.sparse);
+  EXPECT_EQ(reading.u_count, 3);
+  EXPECT_EQ(reading.v_count, 5);
+  ASSERT_TRUE(reading.crop);
+  EXPECT_EQ(reading.crop->height, 3);
+}
+
+TEST(DepthOptions, KindAndUnitAreNotGuessed) {
+  const auto message = [](const DepthOptions& options) {
+    return UsageErrorOf([&] { ConventionOf(options); });
+  };
+  EXPECT_THAT(message({}), AllOf(HasSubstr("--depth-kind"), HasSubstr("z, range or disparity")));
+  EXPECT_THAT(message(KindAndUnit("z", "")), AllOf(HasSubstr("--depth-unit"), HasSubstr("mm")));
+  EXPECT_THAT(message(KindAndUnit("range", "")), HasSubstr("--depth-unit"));
+  EXPECT_THAT(message(KindAndUnit("disparity", "mm")), HasSubstr("--depth-unit mm"));
+  DepthOptions options = KindAndUnit("z", "mm");
+  options.disparity_scale = 2;
+  EXPECT_THAT(message(options), HasSubstr("--disparity-scale"));
+  options = KindAndUnit("disparity", "");
+  options.disparity_scale = 0;
+  EXPECT_THAT(message(options), HasSubstr("--disparity-scale"));
+  EXPECT_EQ(ConventionOf(KindAndUnit("range", "tum5000")).unit_mm, 0.2);
+  EXPECT_EQ(ConventionOf(KindAndUnit("range", "m")).kind, model::DepthKind::kRange);
+}
+
+TEST(ApertureShapeOption, HasADefault) {
+  EXPECT_EQ(ApertureShapeOr("", model::ApertureShape::kDisc), model::ApertureShape::kDisc);
+  EXPECT_EQ(ApertureShapeOr("uniform", model::ApertureShape::kDisc),
+            model::ApertureShape::kUniform);
+}
+
+TEST(PrepareDepth, WithoutACameraADisparityIsScaledAndFilled) {
+  DepthOptions options = KindAndUnit("disparity", "");
+  options.disparity_scale = 2;
+  options.disparity_offset_px = -1;
+  // Around the hole 1 and 0 on the left, 3, -2 and .25 elsewhere: each a surface of its own.
+  const PreparedDepth prepared = PrepareDepth(MapOf({1, kHole, 3, 0, -2, 0.25F}), "d.pfm", options,
+                                              GreyPicture(), nullptr, nullptr);
+  EXPECT_THAT(prepared.disparity.disparity, ElementsAre(1, -5, 5, -1, -5, -0.5F));
+  EXPECT_EQ(prepared.disparity.step, Eigen::Vector2d(1, 1));
+  EXPECT_EQ(prepared.holes, 1U);
+  EXPECT_FALSE(prepared.depth);
+}
+
+TEST(PrepareDepth, WithoutACameraMillimetresMeanNothing) {
+  EXPECT_THAT(UsageErrorOf([] {
+                PrepareDepth(MapOf(std::vector<float>(6, 500)), "d.pfm", KindAndUnit("z", "mm"),
+                             GreyPicture(), nullptr, nullptr);
+              }),
+              AllOf(HasSubstr("--camera"), HasSubstr("disparity")));
+}
+
+TEST(PrepareDepth, TheMapIsNamedWhereItIsWrong) {
+  const model::Camera camera = SmallCamera();
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  const model::RawDepthMap holes = MapOf(std::vector<float>(6, kHole));
+  for (const model::Camera* used : {static_cast<const model::Camera*>(nullptr), &camera}) {
+    const auto message = [&](const model::RawDepthMap& map, int width_px) {
+      return ErrorOf([&] {
+        PrepareDepth(map, "d.pfm", KindAndUnit("disparity", ""), GreyPicture(width_px), used,
+                     &grid);
+      });
+    };
+    EXPECT_THAT(message(holes, kMapWidth), AllOf(StartsWith("d.pfm: "), HasSubstr("hole")));
+    EXPECT_THAT(message(MapOf(std::vector<float>(6, 0)), 7),
+                AllOf(StartsWith("d.pfm: "), HasSubstr("3x2"), HasSubstr("7x2")));
+  }
+}
+
+// A UV plane in the scene: what is nearer has no disparity.
+TEST(PrepareDepth, DepthsNearerThanTheUvPlaneAreRefused) {
+  const model::Camera camera = SmallCamera();
+  const model::LightFieldGrid grid = model::GridOnPlanes(camera, {100, 1000}, 3, 3);
+  EXPECT_THAT(ErrorOf([&] {
+                PrepareDepth(MapOf({500, 500, 500, 500, 500, 90}), "d.pfm", KindAndUnit("z", "mm"),
+                             GreyPicture(), &camera, &grid);
+              }),
+              StartsWith("d.pfm: "));
+}
+
+TEST(PrepareDepth, WithACameraADepthBecomesItsDisparity) {
+  const model::Camera camera = SmallCamera();
+  const model::LightFieldGrid grid = model::DefaultGrid(camera, 3, 3);
+  const std::vector<float> depth_mm = {400, 800, 1200, 400, 0, 5000};
+  const PreparedDepth prepared =
+      PrepareDepth(MapOf(depth_mm), "d.pfm", KindAndUnit("z", "mm"), GreyPicture(), &camera, &grid);
+  EXPECT_EQ(prepared.holes, 1U);
+  ASSERT_TRUE(prepared.depth);
+  EXPECT_EQ(prepared.depth->min_mm, 400);
+  EXPECT_EQ(prepared.depth->max_mm, 5000);
+  for (std::size_t i = 0; i < depth_mm.size(); ++i) {
+    if (depth_mm[i] == 0) continue;
+    const double expected_px = model::DisparityPx(camera, grid.u_step_mm, depth_mm[i]);
+    EXPECT_NEAR(prepared.disparity.disparity[i] * prepared.disparity.step.x(), expected_px,
+                1e-5 * std::abs(expected_px) + 1e-5);
+  }
+}
+
+// Through the depth and back: a disparity per step of the grid's own views stays what it is, also
+// where u has one view.
+TEST(PrepareDepth, WithACameraADisparityIsPerViewStepOfItsGrid) {
+  const model::Camera camera = SmallCamera();
+  const std::vector<float> disparity_px = {-0.5F, 0, 0.5F, 0.25F, 0.125F, -0.25F};
+  for (const auto& [u_count, v_count] : {std::pair{3, 3}, std::pair{1, 5}}) {
+    const model::LightFieldGrid grid = model::DefaultGrid(camera, u_count, v_count);
+    const PreparedDepth prepared = PrepareDepth(
+        MapOf(disparity_px), "d.pfm", KindAndUnit("disparity", ""), GreyPicture(), &camera, &grid);
+    const Eigen::Vector2d step = prepared.disparity.step;
+    for (std::size_t i = 0; i < disparity_px.size(); ++i) {
+      const double found_px = prepared.disparity.disparity[i] * (u_count > 1 ? step.x() : step.y());
+      EXPECT_NEAR(found_px, disparity_px[i], 1e-5);
+    }
+  }
+}
+
+// UV off the aperture: the views' step on the aperture is not du.
+TEST(PrepareDepth, TheStepOfADisparityIsTakenOnTheAperture) {
+  const model::Camera camera = SmallCamera();
+  const double st_depth_mm = camera.focus_depth_mm();
+  const model::LightFieldGrid grid = model::GridOnPlanes(camera, {-800, st_depth_mm + 800}, 3, 3);
+  const double aperture_step_mm = grid.u_step_mm * st_depth_mm / (st_depth_mm + 800);  // [S10]
+  const double depth_mm = 700;
+  const auto disparity_px =
+      static_cast<float>(model::DisparityPx(camera, aperture_step_mm, depth_mm));
+  const PreparedDepth prepared =
+      PrepareDepth(MapOf(std::vector<float>(6, disparity_px)), "d.pfm",
+                   KindAndUnit("disparity", ""), GreyPicture(), &camera, &grid);
+  EXPECT_NEAR(prepared.disparity.disparity[0] * prepared.disparity.step.x(),
+              -model::SlopeOnGrid(grid, depth_mm), 1e-4);
+}
+
+}  // namespace
+}  // namespace thicklens::tools

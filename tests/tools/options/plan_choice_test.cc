@@ -1,0 +1,446 @@
+// What estimate chooses for a wish, and the profile that it chooses by.
+#include "tools/options/plan_choice.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "support/temporary_folder.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "tools/bench/bench_machine.h"
+#include "tools/bench/profile_measurement.h"
+#include "tools/options/estimate_profile.h"
+#include "tools/support/child_process.h"
+#include "tools/system/build_info.h"
+#include "tools/system/machine.h"
+
+namespace thicklens::tools {
+namespace {
+
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+using thicklens::testing::TemporaryFolder;
+
+constexpr PictureLoad kLoad{1, 1, 25, 1, 0};
+
+PlanProfile ProfileOf(const std::string& prior, double seconds, double psnr_db) {
+  PlanProfile plan;
+  plan.plan.prior = prior;
+  TimeLaw::Terms terms = TimeLaw::Terms::Zero();
+  terms[TimeLaw::kPixels] = seconds;
+  plan.law = TimeLaw(terms);
+  plan.psnr_db = psnr_db;
+  plan.median_error = 0.1;
+  return plan;
+}
+
+// Warping 30 dB, the best 40 dB.
+EstimateProfile SomeProfile() {
+  EstimateProfile profile;
+  profile.from = "a test's profile";
+  profile.processor = "a machine";
+  profile.date = "2026-01-01T00:00:00Z";
+  profile.build = "a build";
+  profile.threads = 4;
+  profile.runs = 3;
+  profile.probe_seconds = 0.1;
+  profile.warping_psnr_db = 30;
+  profile.largest = {1, 3, 81, 3, 0};
+  profile.plans = {ProfileOf("ridge", 1, 34.9), ProfileOf("gradient", 2, 35.5),
+                   ProfileOf("tv", 4, 39.2), ProfileOf("patches", 8, 40)};
+  return profile;
+}
+
+std::string ChosenFor(const PlanWish& wish, double speed_ratio = 1) {
+  return ChoosePlan(SomeProfile(), wish, kLoad, speed_ratio).plan.prior;
+}
+PlanWish Quality(const std::string& name) { return {name, {}, {}}; }
+PlanWish Within(double seconds) { return {"", seconds, {}}; }
+PlanWish Loss(double db) { return {"", {}, db}; }
+
+TEST(ChoosePlan, TakesTheFastestThatGainsEnough) {
+  EXPECT_EQ(ChosenFor(Quality("draft")), "gradient");  // ridge gains 4.9 dB of 10
+  EXPECT_EQ(ChosenFor(Quality("standard")), "tv");
+  EXPECT_EQ(ChosenFor(Quality("best")), "patches");
+}
+
+TEST(ChoosePlan, TakesTheBestThatIsDoneByThen) {
+  EXPECT_EQ(ChosenFor(Within(1)), "ridge");
+  EXPECT_EQ(ChosenFor(Within(7.9)), "tv");
+  EXPECT_EQ(ChosenFor(Within(100)), "patches");
+  EXPECT_EQ(ChosenFor(Within(100), 20), "tv");  // on a machine that takes twenty times as long
+}
+
+TEST(ChoosePlan, TakesTheFastestThatLosesNoMore) {
+  EXPECT_EQ(ChosenFor(Loss(0)), "patches");
+  EXPECT_EQ(ChosenFor(Loss(0.8)), "tv");
+  EXPECT_EQ(ChosenFor(Loss(50)), "ridge");
+  EXPECT_EQ(ChosenFor({"", 4.0, 1.0}), "tv");
+}
+
+// What reading and the probe took is over by then.
+TEST(ChoosePlan, CountsWhatIsSpent) {
+  EXPECT_EQ(ChoosePlan(SomeProfile(), Within(4.2), kLoad, 1, 0.1).plan.prior, "tv");
+  EXPECT_EQ(ChoosePlan(SomeProfile(), Within(4.2), kLoad, 1, 0.3).plan.prior, "gradient");
+  EXPECT_NEAR(ChoosePlan(SomeProfile(), Loss(0), kLoad, 2, 0.3).expected_seconds, 16.3, 1e-9);
+}
+
+TEST(ChoosePlan, RefusesWithTheNearest) {
+  const auto refusal = [](const PlanWish& wish) {
+    try {
+      ChosenFor(wish);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no refusal");
+  };
+  EXPECT_THAT(refusal(Within(0.5)),
+              AllOf(StartsWith("--within 0.5s cannot be met"), HasSubstr("scene ridge (1 s")));
+  EXPECT_THAT(refusal({"", 3.0, 1.0}),
+              AllOf(HasSubstr("--within 3s --psnr-loss 1dB"),
+                    HasSubstr("scene gradient (2 s, 4.50"), HasSubstr("scene tv (4 s, 0.80")));
+}
+
+TEST(ChoosePlan, SaysInOneLineWhatItCostsAndGivesUp) {
+  const PlanChoice choice = ChoosePlan(SomeProfile(), Quality("standard"), kLoad, 2);
+  EXPECT_DOUBLE_EQ(choice.expected_seconds, 8);
+  EXPECT_NEAR(choice.loss_db, 0.8, 1e-9);
+  EXPECT_EQ(choice.message,
+            "--quality standard: scene tv, about 8 s (+- 10 %); gives up 0.80 dB of scene patches "
+            "(16 s); by a test's profile, times 2 by a probe: roughly");
+  const PlanChoice best = ChoosePlan(SomeProfile(), Quality("best"), kLoad, 1);
+  EXPECT_EQ(best.message,
+            "--quality best: scene patches, about 8 s (+- 10 %); the best it knows; by a test's "
+            "profile");
+  PictureLoad large = kLoad;
+  large.megapixels = 12;
+  large.blur_sigma_px = 7;
+  EXPECT_THAT(
+      ChoosePlan(SomeProfile(), Quality("best"), large, 1).message,
+      AllOf(HasSubstr("far beyond its megapixels of 1 with 12"),
+            HasSubstr("far beyond its blur sigma in px of 3 with 7"), Not(HasSubstr("views"))));
+  EXPECT_THAT(ChoiceText(choice, 10), HasSubstr("8 s expected, 10 s taken (+25 %)"));
+}
+
+std::string Written(const TemporaryFolder& folder, const json& profile) {
+  const std::string path = folder / "profile.json";
+  std::ofstream(path) << profile.dump();
+  return path;
+}
+
+// The environment for as long as this lives.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) {
+    const char* before = std::getenv(name);
+    if (before != nullptr) before_ = before;
+    Set(value);
+  }
+  ~Environment() { Set(before_ ? before_->c_str() : nullptr); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  void Set(const char* value) {
+    if (value == nullptr) {
+      unsetenv(name_.c_str());
+    } else {
+      setenv(name_.c_str(), value, 1);
+    }
+  }
+  std::string name_;
+  std::optional<std::string> before_;
+};
+
+TEST(Profile, IsLookedForWhereAPersonsSettingsAre) {
+  const TemporaryFolder folder;
+  {
+    const Environment config("XDG_CONFIG_HOME", (folder / "config").c_str());
+    EXPECT_EQ(UserProfilePath(), folder / "config/thicklens/profile.json");
+    EXPECT_FALSE(ProfileFor("").is_own);  // there is none
+    std::filesystem::create_directories(folder / "config/thicklens");
+    std::ofstream(UserProfilePath()) << ProfileJson(SomeProfile()).dump();
+    EXPECT_EQ(ProfileFor("").from, UserProfilePath());
+    EXPECT_THROW(ProfileFor(folder / "none.json"), Error);
+    std::ofstream(UserProfilePath()) << "nonsense";
+    try {
+      ProfileFor("");
+      ADD_FAILURE() << "no refusal";
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("measure it anew"), HasSubstr("delete it")));
+    }
+  }
+  const Environment config("XDG_CONFIG_HOME", nullptr);
+  const Environment home("HOME", "/home/somebody");
+  EXPECT_EQ(UserProfilePath(), "/home/somebody/.config/thicklens/profile.json");
+  const Environment no_home("HOME", nullptr);
+  EXPECT_EQ(UserProfilePath(), "");
+  EXPECT_FALSE(ProfileFor("").is_own);
+}
+
+// Files are timed here, all else there.
+TEST(ChoosePlan, TakesTheTimeOfFilesAsItIsHere) {
+  EstimateProfile profile = SomeProfile();
+  for (PlanProfile& plan : profile.plans) {
+    TimeLaw::Terms terms = plan.law.coefficients();
+    terms[TimeLaw::kFileSeconds] = 0.5;
+    plan.law = TimeLaw(terms);
+  }
+  PictureLoad load = kLoad;
+  load.file_seconds = 6;
+  EXPECT_DOUBLE_EQ(ChoosePlan(profile, Quality("best"), load, 1).expected_seconds, 8 + 3);
+  EXPECT_DOUBLE_EQ(ChoosePlan(profile, Quality("best"), load, 4).expected_seconds, 32 + 3);
+}
+
+TEST(Profile, IsOfThisMachineIfAllOfItIs) {
+  EstimateProfile profile = SomeProfile();
+  profile.processor = ProcessorName();
+  profile.build = BuildInfo();
+  profile.threads = 2;
+  profile.is_own = true;
+  EXPECT_EQ(profile.IsFromHere(2), ProcessorName() != kUnknownProcessor);
+  EXPECT_FALSE(profile.IsFromHere(1));
+  profile.build += " and more";
+  EXPECT_FALSE(profile.IsFromHere(2));
+  EXPECT_FALSE(DefaultProfile().IsFromHere(DefaultProfile().threads));
+}
+
+// From files to files, on pictures so small that all takes seconds.
+TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
+  using Use = ProfileCase::Use;
+  ProfileRun run;
+  run.cases = {{64, 2, false, true, 1, Use::kTimeAndViews},
+               {80, 3, true, true, 1, Use::kTimeAndViews},
+               {96, 2, true, false, 1, Use::kTime},
+               {112, 2, false, false, 1, Use::kCheck}};
+  run.threads = 1;
+  run.repeat = 2;
+  run.program = THICKLENS_PROGRAM;
+  int told = 0;
+  run.progress = [&](int done, int total) {
+    EXPECT_LT(done, total);
+    ++told;
+  };
+  EstimatePlan ridge, tv;
+  ridge.prior = "ridge";
+  tv.prior = "tv";
+  const MeasuredProfile measured = MeasureProfile({ridge, tv}, run);
+  EXPECT_EQ(told, 4 + 16);
+  EXPECT_EQ(measured.judged, 2);
+  EXPECT_EQ(measured.profile.runs, 2);
+  for (const TimedLoad& timed : measured.loads[0]) {
+    EXPECT_GT(timed.parts.read, 0);
+    EXPECT_GT(timed.parts.setup, 0);
+    EXPECT_GT(timed.parts.solve, 0);
+    EXPECT_GT(timed.parts.files, 0);
+    EXPECT_GE(timed.seconds - timed.parts.read - timed.parts.setup - timed.parts.solve -
+                  timed.parts.files,
+              0);
+  }
+  ASSERT_EQ(measured.loads.size(), 2U);
+  EXPECT_EQ(measured.loads[0].size(), 3U);
+  EXPECT_EQ(measured.checks[1].size(), 1U);
+  const EstimateProfile& profile = measured.profile;
+  EXPECT_NEAR(profile.largest.megapixels, 0.009216, 1e-9);  // the check is not in it
+  EXPECT_EQ(profile.largest.views, 9);
+  EXPECT_GT(profile.best_psnr_db(), profile.warping_psnr_db);
+  const TemporaryFolder folder;
+  const EstimateProfile read = ReadProfile(Written(folder, ProfileJson(profile)));
+  EXPECT_NEAR(read.plans[1].law.Seconds(kLoad), profile.plans[1].law.Seconds(kLoad), 1e-9);
+  EXPECT_THAT(ProfileTable(measured), AllOf(HasSubstr("scene ridge"), HasSubstr("0.01 megapixels, "
+                                                                                "1 channel(s)")));
+  run.progress = [](int, int) { throw Error("stop"); };
+  EXPECT_THROW(MeasureProfile({ridge}, run), Error);
+  run.progress = {};
+  run.program = "/bin/false";
+  try {
+    MeasureProfile({ridge}, run);
+    ADD_FAILURE() << "no refusal";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), AllOf(StartsWith("/bin/false estimate picture.png"),
+                                    HasSubstr("--prior ridge: it ended with 1")));
+  }
+}
+
+TEST(MeasureProfile, TellsWhereItCannotWrite) {
+  const Environment nowhere("TMPDIR", "/no/such/folder");
+  try {
+    MeasureProfile({EstimatePlan()}, ProfileRun());
+    ADD_FAILURE() << "no refusal";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("TMPDIR: no folder for temporary files can be made in "
+                                        "'/no/such/folder'"));
+  }
+}
+
+TEST(Profile, IsReadAsItWasWritten) {
+  const TemporaryFolder folder;
+  const EstimateProfile profile = SomeProfile();
+  const EstimateProfile read = ReadProfile(Written(folder, ProfileJson(profile)));
+  EXPECT_EQ(ProfileJson(read), ProfileJson(profile));
+  EXPECT_EQ(read.from, folder / "profile.json");
+}
+
+TEST(Profile, OneShipsAndHasSomethingForEverybody) {
+  const EstimateProfile profile = DefaultProfile();
+  EXPECT_GE(profile.plans.size(), 4U);
+  EXPECT_GT(profile.best_psnr_db(), profile.warping_psnr_db + 1);
+  for (const PlanProfile& plan : profile.plans) {
+    EXPECT_GT(plan.law.Seconds(kLoad), 0) << PlanName(plan.plan);
+  }
+  const auto seconds_of = [&](const std::string& quality) {
+    return ChoosePlan(profile, Quality(quality), kLoad, 1).expected_seconds;
+  };
+  EXPECT_LE(seconds_of("draft"), seconds_of("standard"));
+  EXPECT_LE(seconds_of("standard"), seconds_of("best"));
+}
+
+TEST(Profile, IsRefusedByNameOfFileAndField) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const json& profile) {
+    try {
+      ReadProfile(Written(folder, profile));
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no refusal");
+  };
+  const json good = ProfileJson(SomeProfile());
+  EXPECT_EQ(refusal(good), "no refusal");
+  const auto with = [&](const std::string& pointer, const json& value) {
+    json changed = good;
+    changed[json::json_pointer(pointer)] = value;
+    return refusal(changed);
+  };
+  EXPECT_THAT(refusal("text"), HasSubstr("profile.json: is no JSON object"));
+  EXPECT_THAT(with("/schema", "other"), HasSubstr("schema: 'thicklens/estimate-profile/5'"));
+  EXPECT_THAT(with("/threads", 0), HasSubstr("threads: a whole number from 1 to"));
+  EXPECT_THAT(with("/threads", 10'000'000'000), HasSubstr("threads: a whole number from 1 to"));
+  EXPECT_THAT(with("/runs", 2.5), HasSubstr("runs: a whole number from 1 to"));
+  EXPECT_THAT(with("/plans", json::array()), HasSubstr("at least one plan"));
+  EXPECT_THAT(with("/plans/1/seconds", {1, 2}), HasSubstr("plans[1]: seconds: "));
+  EXPECT_THAT(with("/plans/1/seconds/0", -1), HasSubstr("plans[1]: seconds: "));
+  EXPECT_THAT(with("/plans/0/plan/solver", "magic"), HasSubstr("plans[0]: solver: scene, blocks"));
+  EXPECT_THAT(with("/plans/0/plan/prior", "magic"), HasSubstr("plans[0]: "));
+  EXPECT_THAT(with("/plans/0/plan/device", "gpu"), HasSubstr("device: cpu or opencl"));
+  EXPECT_THAT(with("/largest/views", "many"), HasSubstr("largest: views: a whole number"));
+  EXPECT_THAT(with("/plans/0/plan/tolerance", 7), HasSubstr("plans[0]: "));
+  EXPECT_THAT(with("/plans/0/plan/block_px", 7), HasSubstr("--block-px is of --solver blocks"));
+  json lacking = good;
+  lacking["plans"][2].erase("psnr_db");
+  EXPECT_THAT(refusal(lacking), HasSubstr("plans[2]: 'psnr_db' is missing"));
+  EXPECT_THROW(ReadProfile(folder / "nothing.json"), Error);
+}
+
+// The program: a picture of the demo's size.
+class EstimateWish : public ::testing::Test {
+ protected:
+  // A person's own profile is none of the test's.
+  EstimateWish() : config_("XDG_CONFIG_HOME", (folder_ / "config").c_str()) {
+    ChildProgram simulate({"simulate", "picture", THICKLENS_SOURCE_DIR "/configs/scenes/demo.yaml",
+                           "-o", folder_ / "scene", "--quiet"},
+                          folder_.path(), 0);
+    EXPECT_EQ(simulate.Wait().exit_code, 0);
+  }
+  ProgramResult Estimate(std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"estimate",
+                                          folder_ / "scene/picture.png",
+                                          folder_ / "scene/depth.pfm",
+                                          "--depth-kind",
+                                          "z",
+                                          "--depth-unit",
+                                          "mm",
+                                          "--camera",
+                                          folder_ / "scene/camera.yaml",
+                                          "--views",
+                                          "3x3",
+                                          "-o",
+                                          folder_ / "lf",
+                                          "--json",
+                                          folder_ / "estimate.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ChildProgram program(arguments, folder_.path(), 0);
+    return program.Wait();
+  }
+  json Summary() const {
+    std::ifstream file(folder_ / "estimate.json");
+    return json::parse(file);
+  }
+  TemporaryFolder folder_;
+  Environment config_;
+};
+
+TEST_F(EstimateWish, IsTakenFromTheProfileAndHeldAgainstWhatItTook) {
+  const std::string profile = Written(folder_, ProfileJson(SomeProfile()));
+  const ProgramResult result = Estimate({"--quality", "draft", "--profile", profile});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("--quality draft: scene gradient, about"));
+  EXPECT_THAT(result.out, HasSubstr("plan         --solver scene --prior gradient: "));
+  const json summary = Summary();
+  EXPECT_EQ(summary["prior"], "gradient");
+  EXPECT_EQ(summary["plan"]["asked"], "--quality draft");
+  EXPECT_EQ(summary["plan"]["seconds"], summary["seconds"]["total"]);
+  EXPECT_GT(summary["plan"]["expected_seconds"].get<double>(), 0);
+}
+
+// The law of this profile says that nothing but reading takes any time.
+TEST_F(EstimateWish, CountsReading) {
+  EstimateProfile profile = SomeProfile();
+  profile.plans = {ProfileOf("ridge", 1e-12, 40)};
+  // Of this machine, so that no probe is needed.
+  profile.processor = ProcessorName();
+  profile.build = BuildInfo();
+  profile.threads = 1;
+  const ProgramResult result = Estimate(
+      {"--quality", "best", "--threads", "1", "--profile", Written(folder_, ProfileJson(profile))});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const double read = Summary()["seconds"]["read"].get<double>();
+  EXPECT_GT(read, 1e-5);
+  EXPECT_GE(Summary()["plan"]["expected_seconds"].get<double>(), 0.5 * read);
+}
+
+TEST_F(EstimateWish, ThatCannotBeMetLeavesNothingBehind) {
+  const ProgramResult result = Estimate({"--within", "1e-6s"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("--within 1e-06s cannot be met"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "lf"));
+  EXPECT_EQ(Summary()["status"], "refused");
+}
+
+TEST_F(EstimateWish, ExcludesWhatItChooses) {
+  const std::vector<std::vector<std::string>> wrong = {
+      {"--quality", "draft", "--solver", "grid"},
+      {"--within", "2s", "--prior", "tv"},
+      {"--psnr-loss", "1dB", "--tolerance", "0.1"},
+      {"--quality", "draft", "--within", "2s"},
+      {"--within", "2m"},
+      {"--within", "-1"},
+      {"--psnr-loss", "much"},
+      {"--quality", "good"},
+      {"--profile", "file"},
+      {"--quality", "best", "--check-blur"},
+      {"--quality", "best", "--max-iterations", "1"},
+      {"--within", "2", "--gamma", "1"}};
+  for (const std::vector<std::string>& arguments : wrong) {
+    EXPECT_EQ(Estimate(arguments).exit_code, 2) << ::testing::PrintToString(arguments);
+  }
+}
+
+TEST_F(EstimateWish, WithoutOneIsNoPlan) {
+  ASSERT_EQ(Estimate({}).exit_code, 0);
+  EXPECT_TRUE(Summary()["plan"].is_null());
+}
+
+}  // namespace
+}  // namespace thicklens::tools

@@ -1,0 +1,142 @@
+#include "tools/options/sweep_input.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "support/error_message.h"
+#include "support/temporary_folder.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+using ::thicklens::testing::ErrorOf;
+using ::thicklens::testing::TemporaryFolder;
+
+std::string CameraText(const std::string& pitch_mm, const std::string& calibration) {
+  return "schema: thicklens/camera/2\nname: bench\n"
+         "lens: {front_focal_length_mm: 50, rear_focal_length_mm: 50, lens_thickness_mm: 0, "
+         "aperture_radius_mm: 9}\n"
+         "sensor: {width_px: 9, height_px: 9, pixel_pitch_mm: " +
+         pitch_mm + ", principal_point_px: [4, 4], transfer: linear}\n" + calibration;
+}
+
+constexpr char kMeasured[] =
+    "calibration: {blur_floor_px: {value: 0.52, sigma: 0.01}, evidence: {method: joint}}\n";
+
+class SweepInputTest : public ::testing::Test {
+ protected:
+  SweepInputTest() {
+    folder_.Put("a.png");
+    folder_.Put("camera.yaml", CameraText("0.005", ""));
+    folder_.Put("edge.yaml", CameraText("0.005", kMeasured));
+    folder_.Put("other.yaml", CameraText("0.006", kMeasured));
+    arguments_.input = Sweep("");
+  }
+  std::string Sweep(const std::string& rest) {
+    return folder_.Put("sweep.yaml",
+                       "schema: thicklens/sweep/1\ncamera: camera.yaml\n"
+                       "frames: [{image: a.png, reading_mm: 1}]\n" +
+                           rest);
+  }
+
+  TemporaryFolder folder_;
+  SweepArguments arguments_;
+};
+
+TEST_F(SweepInputTest, FloorFromACalibratedCamera) {
+  Sweep("blur_floor_px: 0.9\n");
+  arguments_.floor_from = folder_ / "edge.yaml";
+  const SweepInput input = ReadSweepInput(arguments_);
+  EXPECT_EQ(input.sweep.floor.given_px.value().value, 0.52);
+  EXPECT_EQ(input.sweep.floor.given_px.value().sigma, 0.01);
+  EXPECT_THAT(arguments_.Files(), Contains(folder_ / "edge.yaml"));
+}
+
+TEST_F(SweepInputTest, FloorFromAnUnfitCameraIsRefused) {
+  arguments_.floor_from = folder_ / "other.yaml";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              AllOf(StartsWith("--floor-from: "), HasSubstr("sensor.pixel_pitch_mm 0.006"),
+                    HasSubstr("'bench' of this sweep 0.005")));
+  arguments_.floor_from = folder_ / "camera.yaml";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              AllOf(StartsWith("--floor-from: "), HasSubstr("no calibration")));
+  arguments_.floor_from = folder_ / "none.yaml";
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              AllOf(StartsWith("--floor-from: "), HasSubstr("none.yaml")));
+}
+
+TEST_F(SweepInputTest, CompressedFramesAreTold) {
+  EXPECT_THAT(ReadSweepInput(arguments_).notices, Not(Contains(HasSubstr("JPEG"))));
+  folder_.Put("b.JPG");
+  folder_.Put("c.jpeg");
+  folder_.Put("sweep.yaml",
+              "schema: thicklens/sweep/1\ncamera: camera.yaml\nframes: [{image: a.png, reading_mm: "
+              "1}, {image: b.JPG, reading_mm: 2}, {image: c.jpeg, reading_mm: 3}]\n");
+  EXPECT_THAT(ReadSweepInput(arguments_).notices,
+              Contains(StartsWith("2 of 3 frames are JPEG files")));
+}
+
+// The file may leave it out where the command line states it.
+TEST_F(SweepInputTest, AReadingSigmaThatIsStatedIsNotMissed) {
+  const auto missed = Contains(HasSubstr("reading_sigma_mm is not stated"));
+  arguments_.reading_sigma_mm.reset();
+  EXPECT_THAT(ReadSweepInput(arguments_).notices, missed);
+  arguments_.reading_sigma_mm = 0.05;
+  EXPECT_THAT(ReadSweepInput(arguments_).notices, Not(missed));
+}
+
+TEST_F(SweepInputTest, TheCameraInUseIsTheOneCompared) {
+  Sweep("blur_floor_px: {from_calibration: other.yaml}\n");
+  EXPECT_THAT(ErrorOf([&] { ReadSweepInput(arguments_); }),
+              HasSubstr("sweep.yaml:4:35: blur_floor_px.from_calibration: "));
+  // Another camera on the command line, of the floor's pitch.
+  arguments_.camera_path = folder_ / "other.yaml";
+  EXPECT_EQ(ReadSweepInput(arguments_).sweep.floor.given_px.value().value, 0.52);
+  // A floor on the command line takes the place of the other camera's.
+  arguments_.camera_path.clear();
+  arguments_.floor_px = "0.3:0.1";
+  EXPECT_EQ(ReadSweepInput(arguments_).sweep.floor.given_px.value().value, 0.3);
+  arguments_.floor_px = "unknown";
+  EXPECT_FALSE(ReadSweepInput(arguments_).sweep.floor.given_px);
+}
+
+TEST_F(SweepInputTest, OneFloorIsEnough) {
+  arguments_.floor_from = folder_ / "edge.yaml";
+  arguments_.floor_px = "0.3";
+  EXPECT_THROW(ReadSweepInput(arguments_), UsageError);
+}
+
+TEST_F(SweepInputTest, ThePeriodOfTheTargetComesThrough) {
+  Sweep("target_period_mm: 5\n");
+  EXPECT_EQ(ReadSweepInput(arguments_).sweep.target_period_mm.value(), 5);
+}
+
+// Numbers of the camera that a result hangs on and that nobody vouches for are told once.
+TEST_F(SweepInputTest, TellsMissingTolerancesUnlessTheTruthIsKnown) {
+  Sweep("");
+  const auto told = [&] {
+    const SweepInput input = ReadSweepInput(arguments_);
+    return std::count_if(input.notices.begin(), input.notices.end(), [](const std::string& line) {
+      return line.find("no tolerance is stated") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(told(), 1);
+  arguments_.truth_path =
+      folder_.Put("known.yaml",
+                  "schema: thicklens/sweep-truth/1\nimage_distance_mm: 57\nfocus_depth_mm: 400\n"
+                  "blur_ratio: 0.4\nblur_floor_px: 0.5\nbench_offset_mm: 10\n"
+                  "frames: [{image: a.png, depth_mm: 11, reading_mm: 1, blur_sigma_px: 2}]\n");
+  EXPECT_EQ(told(), 0);
+}
+
+}  // namespace
+}  // namespace thicklens::tools

@@ -1,0 +1,97 @@
+// What a refused calibration still tells: in the text, on the page and in the JSON.
+#include "tools/report/determined.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tools/report/calibration_json.h"
+#include "tools/report/calibration_report.h"
+#include "tools/report/calibration_sections.h"
+#include "tools/report/calibration_summary.h"
+#include "tools/support/made_up_calibration.h"
+
+namespace thicklens::tools {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+MadeUpCalibration RefusedWithFindings() {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  RefuseAll("offset_mm is unknown and was not found", &made.calibration);
+  calib::Calibration& c = made.calibration;
+  c.sharpest = {true, "fitted", {110.0312, 0.11}, 5, 12};
+  c.focus_reading_mm = model::Estimate{109.99841, 0.0004};
+  c.scale.done = false;
+  c.scale.change_over_sweep = model::Estimate{0.101, 0.001};
+  calib::Diagnosis diagnosis;
+  diagnosis.symptom = "the image scale against the readings";
+  diagnosis.chi2_of_none = 500;
+  diagnosis.causes = {{"the lens moves", 20}, {"the target moves", 60}};
+  diagnosis.named = 1;
+  c.diagnoses = {diagnosis};
+  c.structure.measured = true;
+  c.structure.bands = model::Estimate{0.1, 0.01};
+  return made;
+}
+
+TEST(Determined, ARefusalTellsItInTheText) {
+  const MadeUpCalibration made = RefusedWithFindings();
+  EXPECT_THAT(
+      CalibrationText(made.sweep, made.calibration, nullptr),
+      AllOf(HasSubstr("sharpest: reading 110.03 +- 0.11 mm, by 5 frames; frame_012.png is the "
+                      "sharpest\n"),
+            HasSubstr("focus: reading 109.99841 +- 0.00040 mm, by the blur"),
+            HasSubstr("image scale: 1/scale changes by +10.10 +- 0.10 % over the sweep: the target "
+                      "looks smaller at larger readings\n"),
+            HasSubstr("compared: the image scale against the readings: the lens moves (chi2 20, "
+                      "named); the target moves (chi2 60); nothing at all (chi2 500)\n")));
+}
+
+TEST(Determined, ARefusalTellsItOnThePage) {
+  const MadeUpCalibration made = RefusedWithFindings();
+  EXPECT_THAT(VerdictSection(made.sweep, made.calibration),
+              AllOf(HasSubstr("The sweep is sharpest at the reading 110.03"),
+                    HasSubstr("Focus lies at the reading 109.99841"),
+                    HasSubstr("looks smaller at larger readings"), HasSubstr("frames can be used"),
+                    HasSubstr("Compared: the image scale")));
+}
+
+TEST(Determined, ARefusalTellsItToPrograms) {
+  const MadeUpCalibration made = RefusedWithFindings();
+  const nlohmann::json out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
+  const nlohmann::json& sharpest = out.at("sharpest_reading");
+  EXPECT_EQ(sharpest.at("reading_mm").at("value"), 110.0312);
+  EXPECT_EQ(sharpest.at("reading_mm").at("sigma"), 0.11);
+  EXPECT_EQ(sharpest.at("sharpest_image"), "/sweeps/bench/frame_012.png");
+  EXPECT_EQ(sharpest.at("focus_by_blur_mm").at("value"), 109.99841);
+  EXPECT_EQ(out.at("scale_law").at("change_over_sweep").at("value"), 0.101);
+  const nlohmann::json& diagnosis = out.at("diagnoses").at(0);
+  EXPECT_EQ(diagnosis.at("chi2_of_none"), 500);
+  EXPECT_EQ(diagnosis.at("causes").at(0).at("cause"), "the lens moves");
+  EXPECT_TRUE(diagnosis["causes"][0].at("named").get<bool>());
+  EXPECT_FALSE(diagnosis["causes"][1].at("named").get<bool>());
+  EXPECT_EQ(out.at("frame_structure").at("bands_run_along"), "rows");
+  EXPECT_TRUE(out["frame_structure"].at("ln_corner_over_centre").is_null());
+}
+
+// A run that ended before a frame was opened has none of it.
+TEST(Determined, NothingIsSaidOfWhatWasNotMeasured) {
+  MadeUpCalibration made = MakeUpCalibration(31, 300, 8);
+  RefuseAll("too few frames", &made.calibration);
+  EXPECT_THAT(
+      CalibrationText(made.sweep, made.calibration, nullptr),
+      AllOf(Not(HasSubstr("sharpest: ")), Not(HasSubstr("focus: ")), Not(HasSubstr("compared: "))));
+  const nlohmann::json out = CalibrationJson(made.sweep, made.calibration, nullptr, false);
+  EXPECT_FALSE(out.at("sharpest_reading").at("done").get<bool>());
+  EXPECT_TRUE(out["sharpest_reading"].at("reading_mm").is_null());
+  EXPECT_TRUE(out["sharpest_reading"].at("focus_by_blur_mm").is_null());
+  EXPECT_TRUE(out.at("frame_structure").is_null());
+  EXPECT_TRUE(out.at("diagnoses").empty());
+}
+
+}  // namespace
+}  // namespace thicklens::tools

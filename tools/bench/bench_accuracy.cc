@@ -1,0 +1,441 @@
+#include "tools/bench/bench_accuracy.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
+#include "thicklens/estimator/blas.h"
+#include "thicklens/io/scene_pixels.h"
+#include "thicklens/kernels/device.h"
+#include "tools/bench/bench_loop.h"
+#include "tools/bench/bench_machine.h"
+#include "tools/bench/bench_parts.h"
+#include "tools/bench/bench_report.h"
+#include "tools/bench/bench_scene.h"
+#include "tools/bench/bench_solvers.h"
+#include "tools/bench/price_page.h"
+#include "tools/bench/price_plans.h"
+#include "tools/bench/price_rows.h"
+#include "tools/bench/profile_measurement.h"
+#include "tools/options/bench_options.h"
+#include "tools/options/estimate_profile.h"
+#include "tools/options/light_field_options.h"
+#include "tools/options/option_values.h"
+#include "tools/system/build_info.h"
+#include "tools/system/machine.h"
+#include "tools/system/peak_memory.h"
+#include "tools/system/progress_line.h"
+
+namespace thicklens::tools {
+namespace {
+
+struct BenchAccuracyOptions {
+  CommonOptions common;
+  std::vector<std::string> scenes;  // empty: UsualScenes()
+  std::vector<int> views;           // empty: kUsualViews, and 3 and 7 of each solver by itself
+  std::optional<int> size_px;
+  std::string device = "auto";
+  int repeat = 5;
+  bool full = false;
+  std::optional<std::uint64_t> seed;
+  std::string report_folder;
+  bool save_profile = false;
+  std::string profile_path;  // empty: the person's own
+};
+
+const std::vector<std::string>& UsualScenes() {
+  static const std::vector<std::string> scenes = {"slanted", "cards"};
+  return scenes;
+}
+bool IsOfTheBench(const std::string& scene) {
+  return std::count(UsualScenes().begin(), UsualScenes().end(), scene) > 0;
+}
+constexpr int kUsualViews = 5;
+constexpr int kUsualSizePx = 256;
+constexpr std::uint64_t kUsualSeed = 1;
+
+// Where plans are computed.
+struct Backends {
+  std::shared_ptr<kernels::Backend> processor, device;  // device: null where there is none
+  int threads = 1;
+};
+
+// One of the bench's own, or a description with the pictures that it names.
+struct Scene {
+  std::string name;
+  std::optional<model::SceneSimulationOptions> description;
+  std::vector<model::LayerPixels> pixels;
+};
+
+// All that can be wrong with them is told before anything is measured.
+std::vector<Scene> ScenesOf(const BenchAccuracyOptions& options) {
+  std::vector<Scene> scenes;
+  for (const std::string& name : options.scenes.empty() ? UsualScenes() : options.scenes) {
+    for (const Scene& other : scenes) {
+      if (other.name == name) throw UsageError(fmt::format("--scene: '{}' is named twice", name));
+    }
+    Scene scene;
+    scene.name = name;
+    if (!IsOfTheBench(name)) {
+      scene.description = model::ReadSceneSimulation(name);
+      if (options.seed) scene.description->seed = *options.seed;
+      scene.pixels = io::ReadScenePixels(*scene.description);
+    }
+    scenes.push_back(std::move(scene));
+  }
+  const auto is_file = [](const Scene& scene) { return scene.description.has_value(); };
+  if (options.size_px && std::all_of(scenes.begin(), scenes.end(), is_file)) {
+    throw UsageError("--size-px is of the scenes slanted and cards; a file says its own size");
+  }
+  if (std::set<int>(options.views.begin(), options.views.end()).size() != options.views.size()) {
+    throw UsageError("--views: a number is given twice");
+  }
+  return scenes;
+}
+
+// Of scenes of the bench's own the photograph is grey, so that all solvers go through one channel;
+// a file's are taken as they are.
+BenchScene Simulate(const BenchAccuracyOptions& options, const Scene& scene, int views,
+                    int threads) {
+  ProgressLine progress("simulating", options.common.quiet);
+  const auto tell = [&](int done, int total) {
+    ThrowIfCancelled();
+    progress.Show(done, total);
+  };
+  const std::uint64_t seed = options.seed.value_or(kUsualSeed);
+  const int size_px = options.size_px.value_or(kUsualSizePx);
+  if (!scene.description) {
+    const bool is_slanted = scene.name == UsualScenes().front();
+    return is_slanted ? MakeBenchScene(size_px, size_px, views, views, seed, threads, tell)
+                      : MakeOccludedScene(size_px, size_px, views, views, seed, threads, tell);
+  }
+  model::SceneSimulationOptions description = *scene.description;
+  description.u_count = description.v_count = views;
+  return SimulateBenchScene(description, scene.pixels, {threads, tell});
+}
+
+void TakeRun(const PlanRun& run, PriceRow* row) {
+  row->setup_seconds.push_back(run.setup_seconds);
+  row->solve_seconds.push_back(run.solve_seconds);
+  row->views_seconds.push_back(run.views_seconds);
+  row->seconds.push_back(run.seconds());
+}
+
+void Score(const SampledPicture& picture, const std::vector<model::LightField>& estimates,
+           int threads, PriceRow* row) {
+  row->scored = ScoredAreaOf(picture);
+  row->scores = ScoresOfViews(picture, estimates, threads);
+  row->reprojection_db = ScoresOfPictures(picture, estimates, threads).psnr_db;
+}
+
+void RunBlocks(const SampledPicture& picture, int threads, kernels::Backend* backend,
+               PriceRow* row) {
+  const bool is_first = row->seconds.empty();
+  if (is_first) WarmUp(picture, row->plan, backend);
+  const PartsRun run = RunParts(picture, row->plan, threads, backend);
+  row->setup_seconds.push_back(run.setup_seconds);
+  row->solve_seconds.push_back(run.solve_seconds);
+  row->views_seconds.push_back(0);  // they are what is solved for
+  row->seconds.push_back(run.seconds());
+  if (!is_first) return;
+  row->sample = picture.sample;
+  row->iterations = run.iterations;
+  row->converged = run.converged;
+  row->relative_residual = run.relative_residual;
+  row->rcond = run.rcond;
+  Score(picture, run.estimates, threads, row);
+}
+
+void RunWhole(const SampledPicture& picture, int threads, kernels::Backend* backend,
+              PriceRow* row) {
+  const bool is_first = row->seconds.empty();
+  const auto run_once = [&] {
+    return row->is_warping ? RunWarping(picture.whole.input, threads)
+                           : RunPlan(row->plan, picture.whole.input, threads, backend);
+  };
+  // A device compiles but once; on the processor a part is enough to be as warm as blocks are.
+  if (is_first && row->plan.on_opencl) {
+    run_once();
+  } else if (is_first) {
+    WarmUpWhole(picture, [&](const estimator::EstimateInput& input) {
+      row->is_warping ? RunWarping(input, threads) : RunPlan(row->plan, input, threads, backend);
+    });
+  }
+  const std::optional<double> held_mib = is_first ? ForgetPeakMemory() : std::nullopt;
+  const PlanRun run = run_once();
+  TakeRun(run, row);
+  if (!is_first) return;
+  if (held_mib) row->peak_memory_mib = PeakMemoryMib() - *held_mib;
+  row->iterations = run.iterations;
+  row->converged = run.converged;
+  row->relative_residual = run.relative_residual;
+  Score(picture, PartsOf(picture, run.light_field), threads, row);
+}
+
+// One row that fails says why, and does not end those beside it.
+void RunRow(const SampledPicture& picture, const Backends& backends, PriceRow* row) {
+  kernels::Backend* backend = (row->plan.on_opencl ? backends.device : backends.processor).get();
+  try {
+    if (!row->is_warping && row->plan.solver == "blocks") {
+      RunBlocks(picture, backends.threads, backend, row);
+    } else {
+      RunWhole(picture, backends.threads, backend, row);
+    }
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    row->failure = error.what();
+  }
+}
+
+void Measure(const BenchAccuracyOptions& options, const SampledPicture& picture,
+             const Backends& backends, std::vector<PriceRow>* rows) {
+  // Of what takes so long, fewer runs tell as much as more.
+  constexpr double kEnoughSeconds = 20;
+  ProgressLine progress("measuring", options.common.quiet);
+  std::vector<double> spent(rows->size());
+  MeasureInRounds(options.repeat, rows->size(), &progress, [&](int, std::size_t i) {
+    PriceRow& row = (*rows)[i];
+    if (!row.failure.empty() || !(spent[i] < kEnoughSeconds)) return;
+    const Clock::time_point start = Clock::now();
+    RunRow(picture, backends, &row);
+    spent[i] += SecondsSince(start);
+  });
+}
+
+std::vector<PriceRow> MeasureScene(const BenchAccuracyOptions& options, const Scene& scene,
+                                   int views, const PlanGrid& grid, const Backends& backends) {
+  SampledPicture picture;
+  picture.whole = Simulate(options, scene, views, backends.threads);
+  CutParts(options.full, PartCount::kFour, &picture);
+  std::vector<PriceRow> rows;
+  PriceRow row;
+  row.scene = scene.name;
+  row.views = views;
+  for (const EstimatePlan& plan : PlansOf(grid)) {
+    row.plan = plan;
+    rows.push_back(row);
+  }
+  row.plan = {};
+  row.is_warping = true;
+  rows.push_back(row);
+  Measure(options, picture, backends, &rows);
+  return rows;
+}
+
+std::vector<PriceRow> MeasureAll(const BenchAccuracyOptions& options,
+                                 const std::vector<Scene>& scenes, const Backends& backends) {
+  PlanGrid all;
+  all.full = options.full;
+  all.opencl = backends.device != nullptr;
+  PlanGrid base = all;
+  base.base_only = !options.full;
+  const bool are_given = !options.views.empty();
+  std::vector<PriceRow> rows;
+  for (const Scene& scene : scenes) {
+    for (const int views : are_given ? options.views : std::vector<int>{kUsualViews, 3, 7}) {
+      const bool is_main = are_given || views == kUsualViews;
+      for (PriceRow& row : MeasureScene(options, scene, views, is_main ? all : base, backends)) {
+        rows.push_back(std::move(row));
+      }
+    }
+  }
+  MarkFront(&rows);
+  return rows;
+}
+
+std::string AboutText(const BenchAccuracyOptions& options, const Backends& backends,
+                      double triad_bytes_per_second) {
+  return fmt::format(
+      "{}, {} thread(s), {:.3g} GB/s (triad), BLAS: {}, OpenCL: {}; medians of {} runs, or of as "
+      "many as fill 20 s; thicklens {}, {}",
+      ProcessorName(), backends.threads, 1e-9 * triad_bytes_per_second,
+      estimator::BlasDescription(), backends.device ? backends.device->description() : "none",
+      options.repeat, Version(), NowIso8601());
+}
+
+std::string ProfilePathOf(const BenchAccuracyOptions& options) {
+  return options.profile_path.empty() ? UserProfilePath() : options.profile_path;
+}
+
+// Claims a file in a folder that may have to be made.
+OutputFile ClaimProfile(const BenchAccuracyOptions& options) {
+  const std::string path = ProfilePathOf(options);
+  if (path.empty()) {
+    throw UsageError(
+        "--save-profile: neither XDG_CONFIG_HOME nor HOME is set; say which file is to be written");
+  }
+  if (options.profile_path.empty()) {
+    std::error_code failure;
+    std::filesystem::create_directories(std::filesystem::path(path).parent_path(), failure);
+  }
+  return OutputFile(path);
+}
+
+CommandResult SaveProfile(const BenchAccuracyOptions& options) {
+  OutputFile file = ClaimProfile(options);
+  ProfileRun run;
+  run.threads = ResolveThreads(options.common.threads);
+  run.repeat = options.repeat;
+  run.seed = options.seed.value_or(kUsualSeed);
+  MeasuredProfile measured;
+  {
+    ProgressLine progress("measuring", options.common.quiet);
+    run.progress = [&](int done, int total) {
+      ThrowIfCancelled();
+      progress.Show(done, total);
+    };
+    measured = MeasureProfile(PlansOfProfile(), run);
+  }
+  const nlohmann::json profile = ProfileJson(measured.profile);
+  file.Commit(profile.dump(2) + "\n");
+  PrintResult(options.common,
+              fmt::format("{}\nthe profile is in {}: estimate --quality, --within and --psnr-loss "
+                          "choose by it{}\n",
+                          ProfileTable(measured), file.path(),
+                          options.profile_path.empty() ? "" : " where --profile names it"));
+  nlohmann::json loads = nlohmann::json::array();
+  for (std::size_t i = 0; i < measured.loads.size(); ++i) {
+    const PlanProfile& plan = measured.profile.plans[i];
+    for (const auto* of_plan : {&measured.loads[i], &measured.checks[i]}) {
+      for (const TimedLoad& timed : *of_plan) {
+        loads.push_back({{"plan", PlanName(plan.plan)},
+                         {"in_the_law", of_plan == &measured.loads[i]},
+                         {"megapixels", timed.load.megapixels},
+                         {"channels", timed.load.channels},
+                         {"views", timed.load.views},
+                         {"blur_sigma_px", timed.load.blur_sigma_px},
+                         {"file_seconds", timed.load.file_seconds},
+                         {"seconds", timed.seconds},
+                         {"parts",
+                          {{"read", timed.parts.read},
+                           {"setup", timed.parts.setup},
+                           {"solve", timed.parts.solve},
+                           {"files", timed.parts.files}}},
+                         {"expected_seconds", timed.parts.read + plan.law.Seconds(timed.load)}});
+      }
+    }
+  }
+  return {BenchSummary({{"output", file.path()}, {"profile", profile}, {"loads", loads}}), "",
+          true};
+}
+
+CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
+  if (options.save_profile) return SaveProfile(options);
+  const std::vector<Scene> scenes = ScenesOf(options);
+  BenchReport report(options.report_folder);
+  Backends backends;
+  backends.threads = ResolveThreads(options.common.threads);
+  backends.processor =
+      kernels::OpenBackend(kernels::ParseDeviceRequest("cpu"), nullptr, ThrowIfCancelled);
+  std::string notice;
+  backends.device =
+      kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
+  if (!backends.device->is_opencl()) {
+    backends.device = nullptr;
+    if (!notice.empty()) spdlog::warn("rows of OpenCL are left out: {}", notice);
+  }
+  const double triad = TriadBytesPerSecond(backends.threads);
+  const std::vector<PriceRow> rows = MeasureAll(options, scenes, backends);
+  const std::string about = AboutText(options, backends, triad);
+  std::vector<Plot> figures;
+  for (const std::vector<PriceRow>& group : PriceGroups(rows)) {
+    figures.push_back(PriceFigure(group, fmt::format("prices-{}", figures.size() + 1)));
+  }
+  report.Commit(PricePage(rows, about), PriceCsv(rows), figures);
+  std::string text = about + "\n" + PriceTable(rows) +
+                     "\n> on the front: no other is both faster and better. Seconds of the solver: "
+                     "without reading and writing; where they differ by less than their spread, "
+                     "marks mean a tie.\nMiB: at most, beside what the program held "
+                     "before. photo: PSNR of the photograph formed again.\n";
+  if (std::any_of(rows.begin(), rows.end(), [](const PriceRow& row) { return row.sample; })) {
+    text +=
+        "extrapol.: from four parts of 64 x 64 px, of which iterations, residual and rcond are the "
+        "worst;\non the front these seconds count as they are. --full runs all.\n";
+  }
+  PrintResult(options.common, text);
+  nlohmann::json json_rows = nlohmann::json::array();
+  for (const PriceRow& row : rows) json_rows.push_back(PriceRowJson(row));
+  nlohmann::json summary = BenchSummary({{"repeat", options.repeat},
+                                         {"seed", options.seed.value_or(kUsualSeed)},
+                                         {"full", options.full},
+                                         {"rows", json_rows}});
+  summary["machine"]["triad_bytes_per_second"] = triad;
+  summary["machine"]["threads"] = backends.threads;
+  summary["machine"]["opencl"] =
+      backends.device ? nlohmann::json(backends.device->description()) : nlohmann::json();
+  return {std::move(summary), "", !options.report_folder.empty()};
+}
+
+}  // namespace
+
+void AddBenchAccuracyCommand(CLI::App* bench, CommandAction* action) {
+  CLI::App* command = bench->add_subcommand(
+      "accuracy", "What each way to a light field costs and gives, against true views");
+  const auto options = std::make_shared<BenchAccuracyOptions>();
+  command
+      ->add_option("--scene", options->scenes,
+                   "slanted, cards (both), or a scene's file as of simulate picture")
+      ->type_name("SCENE");
+  command
+      ->add_option("--views", options->views,
+                   "Across and down, all plans each (5, and with 3 and 7 each solver by itself)")
+      ->check(CLI::Range(2, 31))
+      ->type_name("N");
+  command
+      ->add_option("--size-px", options->size_px,
+                   fmt::format("Side of the pictures of slanted and cards ({})", kUsualSizePx))
+      ->check(CLI::Range(64, 4096))
+      ->type_name("PX");
+  AddRepeatOption(command, &options->repeat);
+  command->add_flag("--full", options->full,
+                    "Each choice with each other, and all blocks, not a sample: hours");
+  command->add_option("--seed", options->seed, "Of texture and noise (1, or the scene file's)")
+      ->type_name("N");
+  AddBenchReportOption(command, &options->report_folder);
+  AddDeviceOption(command, &options->device);
+  CLI::Option* profile =
+      command
+          ->add_option("--save-profile", options->profile_path,
+                       "Measure, in place of the list, what estimate --quality, --within and "
+                       "--psnr-loss choose from on this machine, and write it there; without a "
+                       "name where they look for it by themselves")
+          ->expected(0, 1)
+          ->type_name("FILE");
+  for (const char* of_list :
+       {"--scene", "--views", "--size-px", "--full", "--report", "--device"}) {
+    profile->excludes(of_list);
+  }
+  AddCommonOptions(command, &options->common);
+  command->callback([options, action, profile] {
+    *action = [options, profile] {
+      options->save_profile = profile->count() > 0;
+      std::vector<std::string> files;
+      for (const std::string& scene : options->scenes) {
+        if (!IsOfTheBench(scene)) files.push_back(scene);
+      }
+      RequireDistinctFiles({options->common.json_path, options->report_folder,
+                            options->save_profile ? ProfilePathOf(*options) : std::string()},
+                           files);
+      RunCommand(options->common, [&] { return BenchAccuracy(*options); });
+    };
+  });
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,58 @@
+#include "tools/bench/bench_solvers.h"
+
+#include "thicklens/estimator/scene_solver.h"
+#include "tools/bench/bench_parts.h"
+
+namespace thicklens::tools {
+namespace {
+
+LightFieldSolver SolverOf(const EstimatePlan& plan, int threads, kernels::Backend* backend) {
+  return {plan.solver, plan.block_solver, plan.solver == "scene" ? plan.prior : "ridge",
+          [plan, threads, backend](const estimator::EstimateInput& input) {
+            return RunPlan(plan, input, threads, backend).light_field;
+          }};
+}
+
+}  // namespace
+
+EstimatePlan SourcePlan(estimator::BlockSolver solver) {
+  EstimatePlan plan;
+  plan.solver = "blocks";
+  plan.block_solver = estimator::BlockSolverName(solver);
+  plan.block_px = kSourceBlockPx;
+  return plan;
+}
+
+std::vector<EstimatePlan> WholePicturePlans() {
+  std::vector<EstimatePlan> plans;
+  for (const auto prior : {estimator::Prior::kRidge, estimator::Prior::kGradient,
+                           estimator::Prior::kTotalVariation, estimator::Prior::kPatches}) {
+    EstimatePlan plan;
+    plan.prior = estimator::PriorName(prior);
+    plans.push_back(plan);
+  }
+  for (const char* solver : {"functional", "grid"}) {
+    EstimatePlan plan;
+    plan.solver = solver;
+    plans.push_back(plan);
+  }
+  return plans;
+}
+
+LightFieldSolver SolverByBlocks(estimator::BlockSolver solver, int threads,
+                                kernels::Backend* backend) {
+  return SolverOf(SourcePlan(solver), threads, backend);
+}
+
+std::vector<LightFieldSolver> WholePictureSolvers(int threads) {
+  std::vector<LightFieldSolver> solvers;
+  for (const EstimatePlan& plan : WholePicturePlans()) {
+    solvers.push_back(SolverOf(plan, threads, nullptr));
+  }
+  solvers.push_back({"dibr", "", "", [threads](const estimator::EstimateInput& input) {
+                       return RunWarping(input, threads).light_field;
+                     }});
+  return solvers;
+}
+
+}  // namespace thicklens::tools

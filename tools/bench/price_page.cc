@@ -1,0 +1,189 @@
+#include "tools/bench/price_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "thicklens/base/printable_text.h"
+#include "tools/bench/bench_machine.h"
+#include "tools/bench/bench_report.h"
+#include "tools/report/light_field_figures.h"
+#include "tools/report/page_figures.h"
+#include "tools/report/page_style.h"
+
+namespace thicklens::tools {
+namespace {
+
+struct SolverLook {
+  const char* solver;
+  Ink ink;
+  Mark mark;
+};
+constexpr SolverLook kLooks[] = {{"scene", Ink::kFit, Mark::kDot},
+                                 {"functional", Ink::kPeak, Mark::kDiamond},
+                                 {"grid", Ink::kTruth, Mark::kRing},
+                                 {"blocks", Ink::kSource, Mark::kCross}};
+
+std::vector<const PriceRow*> FrontOf(const std::vector<PriceRow>& rows) {
+  std::vector<const PriceRow*> front;
+  for (const PriceRow& row : rows) {
+    if (row.on_front) front.push_back(&row);
+  }
+  std::sort(front.begin(), front.end(), [](const PriceRow* a, const PriceRow* b) {
+    return Median(a->seconds) < Median(b->seconds);
+  });
+  return front;
+}
+
+// Names of the front's points where there is room for them.
+std::vector<PlotNote> FrontNotes(const std::vector<const PriceRow*>& front) {
+  constexpr double kRoom = 1.15;  // of errors: a line of text
+  std::vector<PlotNote> notes;
+  for (const PriceRow* row : front) {
+    const double error = ErrorGreyLevels(row->scores.psnr_mean_db);
+    if (row->is_warping || (!notes.empty() && kRoom * error > notes.back().y)) continue;
+    notes.push_back({row->Name(), Median(row->seconds), error});
+  }
+  return notes;
+}
+
+std::string Cells(const PriceRow& row) {
+  if (!row.failure.empty()) {
+    return fmt::format("<td colspan=\"12\">{}</td>", EscapeXml(row.failure));
+  }
+  const auto [least, most] = std::minmax_element(row.seconds.begin(), row.seconds.end());
+  const auto seconds = [&](bool is_extrapolated) {
+    return row.sample.has_value() == is_extrapolated ? fmt::format("{:.3g}", Median(row.seconds))
+                                                     : std::string("–");
+  };
+  const auto or_dash = [](const auto& value, const char* form) {
+    return value ? fmt::format(fmt::runtime(form), *value) : std::string("–");
+  };
+  std::string cells;
+  for (const std::string& cell :
+       {seconds(false), seconds(true), fmt::format("{:.3g}–{:.3g}", *least, *most),
+        or_dash(row.peak_memory_mib, "{:.0f}"), or_dash(row.iterations, "{}"),
+        or_dash(row.relative_residual, "{:.0e}"), or_dash(row.rcond, "{:.0e}"),
+        fmt::format("{:.2f}", row.scores.psnr_mean_db),
+        fmt::format("{:.2f}", row.scores.psnr_centre_db),
+        fmt::format("{:.2f}", row.scores.psnr_corner_db),
+        fmt::format("{:.4f}", row.scores.ssim_mean), fmt::format("{:.1f}", row.reprojection_db)}) {
+    cells += TableCell(EscapeXml(TrueMinus(cell)));
+  }
+  return cells;
+}
+
+std::string TableOf(const std::vector<PriceRow>& rows) {
+  std::string html =
+      "<div class=\"wide\"><table>\n<thead><tr><th></th><th class=\"number\">seconds, measured</th>"
+      "<th class=\"number\">seconds, extrapolated</th>"
+      "<th class=\"number\">from–to</th><th class=\"number\">MiB</th>"
+      "<th class=\"number\">iterations</th><th class=\"number\">residual</th>"
+      "<th class=\"number\">rcond</th><th class=\"number\">PSNR, dB</th>"
+      "<th class=\"number\">centre</th><th class=\"number\">corner</th>"
+      "<th class=\"number\">SSIM</th><th class=\"number\">picture again, dB</th></tr></thead>\n"
+      "<tbody>\n";
+  for (const PriceRow& row : rows) {
+    html += fmt::format("<tr{}><th scope=\"row\">{}</th>{}</tr>\n",
+                        row.on_front ? " class=\"chosen\"" : "", EscapeXml(row.Name()), Cells(row));
+  }
+  return html + "</tbody></table></div>\n";
+}
+
+std::string ScoredParagraph(const std::vector<PriceRow>& rows) {
+  for (const PriceRow& row : rows) {
+    if (!row.failure.empty()) continue;
+    return fmt::format("<p class=\"soft\">Scores are of {}.</p>\n", ScoredAreaText(row.scored));
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<std::vector<PriceRow>> PriceGroups(const std::vector<PriceRow>& rows) {
+  std::vector<std::vector<PriceRow>> groups;
+  for (const PriceRow& row : rows) {
+    const auto of_row = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
+      return group.front().scene == row.scene && group.front().views == row.views;
+    });
+    if (of_row == groups.end()) {
+      groups.push_back({row});
+    } else {
+      of_row->push_back(row);
+    }
+  }
+  return groups;
+}
+
+Plot PriceFigure(const std::vector<PriceRow>& rows, const std::string& id) {
+  Plot plot;
+  plot.id = id;
+  plot.title = fmt::format("Error of the true views against seconds: {0}, {1} by {1} views",
+                           PrintableUtf8(rows.front().scene), rows.front().views);
+  plot.heading =
+      fmt::format("{0}, {1} × {1} views", PrintableUtf8(rows.front().scene), rows.front().views);
+  plot.x_axis = {"seconds", std::nullopt, true};
+  plot.y_axis = {"error of the true views, grey levels", std::nullopt, true};
+  plot.height_px = 420;
+  for (const SolverLook& look : kLooks) {
+    PlotSeries series;
+    series.label = look.solver;
+    series.ink = look.ink;
+    series.mark = look.mark;
+    for (const PriceRow& row : rows) {
+      if (row.is_warping || row.plan.solver != look.solver || !row.failure.empty()) continue;
+      if (row.sample) series.label = std::string(look.solver) + " (extrapolated seconds)";
+      series.x.push_back(Median(row.seconds));
+      series.y.push_back(ErrorGreyLevels(row.scores.psnr_mean_db));
+      series.names.push_back(fmt::format("{}: {:.3g} s{}, {:.2f} dB", row.Name(),
+                                         Median(row.seconds), row.sample ? " extrapolated" : "",
+                                         row.scores.psnr_mean_db));
+    }
+    plot.series.push_back(std::move(series));
+  }
+  const std::vector<const PriceRow*> front = FrontOf(rows);
+  std::vector<double> seconds, errors;
+  for (const PriceRow* row : front) {
+    seconds.push_back(Median(row->seconds));
+    errors.push_back(ErrorGreyLevels(row->scores.psnr_mean_db));
+  }
+  plot.series.push_back(FrontLine(seconds, errors));
+  plot.notes = FrontNotes(front);
+  for (const PriceRow& row : rows) {
+    if (!row.is_warping || !row.failure.empty()) continue;
+    plot.lines.push_back({fmt::format("warping alone (DIBR), {:.2g} s", Median(row.seconds)),
+                          Ink::kMuted, Stroke::kDashed, false,
+                          ErrorGreyLevels(row.scores.psnr_mean_db)});
+  }
+  return plot;
+}
+
+std::string PricePage(const std::vector<PriceRow>& rows, const std::string& about) {
+  constexpr char kTitle[] = "What accuracy costs in time";
+  std::string html = PageHead(kTitle, SvgPlotStyle() + LightFieldFigureStyle());
+  html += fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", kTitle, EscapeXml(about));
+  int number = 0;
+  for (const std::vector<PriceRow>& group : PriceGroups(rows)) {
+    const std::string heading = fmt::format(
+        "{0}, {1} × {1} views", PrintableUtf8(group.front().scene), group.front().views);
+    html += fmt::format("<section>\n<h2>{}</h2>\n", EscapeXml(heading));
+    html += Figure(SvgPlot(PriceFigure(group, fmt::format("prices-{}", ++number))),
+                   "What each way to the views costs and gives",
+                   "Rms difference from the true views, in grey levels of 255; down and to the "
+                   "left is better. Pointed at, a mark tells its name.");
+    html += ScoredParagraph(group) + TableOf(group) + "</section>\n";
+  }
+  html +=
+      "<p class=\"soft\">Bold: on the front, on which extrapolated seconds count as they are. "
+      "Extrapolated: from four parts of the picture; iterations, residual and rcond are then the "
+      "worst of these. MiB: at most, beside what the program held before. PSNR, SSIM and the "
+      "picture again are of the same area in all rows of a table, which its heading names. Picture "
+      "again: the PSNR of the "
+      "photograph formed "
+      "from the views, which a wrong light field can have, too.</p>\n";
+  return html + "</main>\n</body>\n</html>\n";
+}
+
+}  // namespace thicklens::tools

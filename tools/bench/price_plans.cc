@@ -1,0 +1,122 @@
+#include "tools/bench/price_plans.h"
+
+#include <algorithm>
+#include <string>
+
+#include "thicklens/estimator/block_solver.h"
+#include "tools/bench/bench_parts.h"
+#include "tools/bench/bench_solvers.h"
+
+namespace thicklens::tools {
+namespace {
+
+using estimator::BlockSolver;
+
+class PlanList {
+ public:
+  void Add(const EstimatePlan& plan) {
+    const std::string name = PlanName(plan);
+    const bool is_there = std::any_of(plans_.begin(), plans_.end(), [&](const EstimatePlan& other) {
+      return PlanName(other) == name;
+    });
+    if (!is_there) plans_.push_back(plan);
+  }
+  void AddWithTolerance(EstimatePlan plan, double tolerance) {
+    plan.tolerance = tolerance;
+    Add(plan);
+  }
+  std::vector<EstimatePlan> Take() { return std::move(plans_); }
+
+ private:
+  std::vector<EstimatePlan> plans_;
+};
+
+// From what can hardly be called solved to what no float can tell from the answer.
+const std::vector<double>& Tolerances() {
+  static const std::vector<double> tolerances = {0.1, 0.01, 0.001, 1e-4, 1e-6};
+  return tolerances;
+}
+
+bool IsScene(const EstimatePlan& plan) { return plan.solver == "scene"; }
+
+std::vector<EstimatePlan> BlockPlans() {
+  std::vector<EstimatePlan> plans;
+  for (const BlockSolver solver : estimator::BuiltInBlockSolvers()) {
+    plans.push_back(SourcePlan(solver));
+  }
+  return plans;
+}
+
+// One choice after the other, all else as it is by itself.
+void AddVariations(bool opencl, PlanList* list) {
+  for (EstimatePlan plan : WholePicturePlans()) {
+    const bool is_usual = plan.prior == "tv" || plan.prior == "patches";
+    if (IsScene(plan) && !is_usual) continue;
+    for (const double tolerance : {0.1, 0.01, 1e-6}) list->AddWithTolerance(plan, tolerance);
+    EstimatePlan changed = plan;
+    changed.double_precision = true;
+    list->Add(changed);
+    if (!IsScene(plan) || !opencl) continue;
+    plan.on_opencl = true;
+    list->Add(plan);
+  }
+  for (const EstimatePlan& plan : BlockPlans()) list->Add(plan);
+  const EstimatePlan usual = SourcePlan(estimator::DefaultBlockSolver());
+  for (const int block_px : {kSourceBlockPx / 2, 2 * kSourceBlockPx}) {
+    EstimatePlan plan = usual;
+    plan.block_px = block_px;
+    list->Add(plan);
+  }
+  list->AddWithTolerance(SourcePlan(BlockSolver::kCg), 0.01);
+  if (opencl) {
+    EstimatePlan plan = usual;
+    plan.on_opencl = true;
+    list->Add(plan);
+  }
+}
+
+// Each choice with each other.
+void AddProduct(bool opencl, PlanList* list) {
+  for (const EstimatePlan& base : WholePicturePlans()) {
+    for (const bool on_opencl : {false, true}) {
+      if (on_opencl && (!IsScene(base) || !opencl)) continue;
+      for (const bool double_precision : {false, true}) {
+        EstimatePlan plan = base;
+        plan.on_opencl = on_opencl;
+        plan.double_precision = double_precision;
+        list->Add(plan);
+        for (const double tolerance : Tolerances()) list->AddWithTolerance(plan, tolerance);
+      }
+    }
+  }
+  for (EstimatePlan plan : BlockPlans()) {
+    const bool is_iterative =
+        estimator::IsIterative(estimator::BlockSolverFromName(plan.block_solver));
+    for (const int block_px : {kSourceBlockPx / 2, kSourceBlockPx, 2 * kSourceBlockPx}) {
+      plan.block_px = block_px;
+      for (const bool on_opencl : {false, true}) {
+        if (on_opencl && (!opencl || plan.block_solver == "viennacl")) continue;
+        plan.on_opencl = on_opencl;
+        list->Add(plan);
+        if (!is_iterative) continue;
+        for (const double tolerance : Tolerances()) list->AddWithTolerance(plan, tolerance);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<EstimatePlan> PlansOf(const PlanGrid& grid) {
+  PlanList list;
+  for (const EstimatePlan& plan : WholePicturePlans()) list.Add(plan);
+  if (grid.base_only) return list.Take();
+  if (grid.full) {
+    AddProduct(grid.opencl, &list);
+  } else {
+    AddVariations(grid.opencl, &list);
+  }
+  return list.Take();
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,273 @@
+// thicklens camera init: a camera file from a data sheet or from a photograph's EXIF.
+#include "tools/commands/camera_init.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/model/camera_file.h"
+#include "tools/commands/camera_verify.h"
+#include "tools/commands/commands.h"
+#include "tools/options/command_frame.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr double kMaxLengthMm = 10000;
+constexpr double kMaxFNumber = 1000;
+constexpr double kMaxPitchUm = 1000;
+constexpr double kUmPerMm = 1000;
+
+struct CameraInitOptions {
+  CommonOptions common;
+  CameraDescription camera;
+  std::string size;
+  std::string principal_point;
+  std::string photo_path;
+  std::string output;
+};
+
+// A number and whether it was given by the person.
+struct Known {
+  double value = 0;
+  bool assumed = false;
+};
+
+std::optional<Known> GivenOr(const std::optional<double>& given,
+                             const std::optional<double>& from_photo) {
+  if (given) return Known{*given, false};
+  if (from_photo) return Known{*from_photo, true};
+  return std::nullopt;
+}
+
+// Collects what is missing, so that it can all be told at once.
+Known Require(const std::optional<Known>& known, const std::string& what,
+              std::vector<std::string>* missing) {
+  if (!known) missing->push_back(what);
+  return known.value_or(Known{});
+}
+
+double Take(const Known& known, const char* field, model::Camera* camera) {
+  if (known.assumed) camera->statements[field] = {0, true};
+  return known.value;
+}
+
+void DescribeLens(const CameraDescription& given, const Known& focal, const Known& f_number,
+                  model::Camera* camera) {
+  model::ThickLens& lens = camera->lens;
+  lens.front_focal_length_mm = Take(focal, "lens.front_focal_length_mm", camera);
+  lens.rear_focal_length_mm =
+      Take(*GivenOr(given.rear_focal_length_mm, focal.value), "lens.rear_focal_length_mm", camera);
+  lens.lens_thickness_mm =
+      Take(*GivenOr(given.lens_thickness_mm, 0.0), "lens.lens_thickness_mm", camera);
+  // The f-number N is the focal length over the diameter of the entrance pupil, which is taken for
+  // the aperture on the front principal plane: r = f1/(2 N), mm [D9].
+  const Known radius{focal.value / (2 * f_number.value), focal.assumed || f_number.assumed};
+  lens.aperture_radius_mm = Take(radius, "lens.aperture_radius_mm", camera);
+}
+
+void DescribeSensor(const CameraDescription& given, const Known& pitch_mm,
+                    const Eigen::Vector2i& size_px, model::Camera* camera) {
+  model::Sensor& sensor = camera->sensor;
+  sensor.width_px = size_px.x();
+  sensor.height_px = size_px.y();
+  sensor.pixel_pitch_mm = Take(pitch_mm, "sensor.pixel_pitch_mm", camera);
+  sensor.transfer = model::TransferCurve::FromName(given.transfer);
+  if (given.principal_point_px) {
+    sensor.principal_point_px = *given.principal_point_px;
+    return;
+  }
+  const Eigen::Vector2d middle = (size_px - Eigen::Vector2i(1, 1)).cast<double>() / 2;
+  sensor.principal_point_px = {Take({middle.x(), true}, "sensor.principal_point_px[0]", camera),
+                               Take({middle.y(), true}, "sensor.principal_point_px[1]", camera)};
+}
+
+CLI::Validator TransferName() {
+  return CLI::Validator(
+      [](std::string& name) {
+        try {
+          model::TransferCurve::FromName(name);
+          return std::string();
+        } catch (const Error& error) {
+          return std::string(error.what());
+        }
+      },
+      "");
+}
+
+void ParseTexts(CameraInitOptions* options) {
+  if (!options->size.empty()) {
+    const auto px = SplitPixels("--size", options->size, 'x', "WIDTHxHEIGHT");
+    if (px.size() != 2 || px[0] < 1 || px[1] < 1) {
+      throw UsageError(fmt::format("--size: WIDTHxHEIGHT, each above 0, is expected, found '{}'",
+                                   options->size));
+    }
+    options->camera.size_px = Eigen::Vector2i(px[0], px[1]);
+  }
+  if (options->principal_point.empty()) return;
+  const auto point = SplitNumbers("--principal-point", options->principal_point, ',', "x,y in px");
+  if (point.size() != 2) {
+    throw UsageError(fmt::format("--principal-point: x,y in px is expected, found '{}'",
+                                 options->principal_point));
+  }
+  options->camera.principal_point_px = Eigen::Vector2d(point[0], point[1]);
+}
+
+CommandResult InitCamera(const CameraInitOptions& options) {
+  std::optional<OutputFile> output;
+  if (!options.output.empty()) output.emplace(options.output);
+  std::optional<io::PhotoExif> photo;
+  std::optional<Eigen::Vector2i> photo_size_px;
+  if (!options.photo_path.empty()) {
+    const cv::Mat picture = io::ReadPictureFile(options.photo_path);
+    photo_size_px = Eigen::Vector2i(picture.cols, picture.rows);
+    const Eigen::Vector2i size_px = options.camera.size_px.value_or(*photo_size_px);
+    photo = io::ReadPhotoExif(options.photo_path, size_px.x(), size_px.y());
+  }
+  const model::Camera camera = DescribedCamera(options.camera, photo, photo_size_px);
+  const std::string yaml = model::CameraToYaml(camera);
+  if (output) output->Commit(yaml);
+  if (!output) PrintResult(options.common, yaml);
+  TellAssumedFields(camera);
+  CommandResult result;
+  result.is_written = output.has_value();
+  result.summary = {{"status", "ok"},
+                    {"reason", ""},
+                    {"name", camera.name},
+                    {"front_focal_length_mm", camera.lens.front_focal_length_mm},
+                    {"rear_focal_length_mm", camera.lens.rear_focal_length_mm},
+                    {"lens_thickness_mm", camera.lens.lens_thickness_mm},
+                    {"aperture_radius_mm", camera.lens.aperture_radius_mm},
+                    {"width_px", camera.sensor.width_px},
+                    {"height_px", camera.sensor.height_px},
+                    {"pixel_pitch_mm", camera.sensor.pixel_pitch_mm},
+                    {"principal_point_px",
+                     {camera.sensor.principal_point_px.x(), camera.sensor.principal_point_px.y()}},
+                    {"transfer", camera.sensor.transfer.Name()},
+                    {"psf", model::PsfName(camera.psf)},
+                    {"assumed", model::AssumedFields(camera)}};
+  return result;
+}
+
+void AddLensOptions(CLI::App* command, CameraDescription* camera) {
+  command->add_option("--focal-mm", camera->front_focal_length_mm, "Front focal length f1")
+      ->check(Between(0, kMaxLengthMm, "millimetres"))
+      ->type_name("MM");
+  command
+      ->add_option("--rear-focal-mm", camera->rear_focal_length_mm,
+                   "Rear focal length f2; default: the front one, assumed")
+      ->check(Between(0, kMaxLengthMm, "millimetres"))
+      ->type_name("MM");
+  command
+      ->add_option("--thickness-mm", camera->lens_thickness_mm,
+                   "Front to rear principal plane, negative if they cross; default: 0, assumed")
+      ->check(Between(-kMaxLengthMm, kMaxLengthMm, "millimetres"))
+      ->type_name("MM");
+  command
+      ->add_option("--f-number", camera->f_number,
+                   "Focal length over the diameter of the entrance pupil, which is taken for the "
+                   "aperture: its radius is f1/(2 N)")
+      ->check(Between(0, kMaxFNumber, "focal length over pupil diameter"))
+      ->type_name("N");
+}
+
+void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
+  CameraDescription& camera = options->camera;
+  command->add_option("--pitch-um", camera.pixel_pitch_um, "Distance of neighbouring pixels")
+      ->check(Between(0, kMaxPitchUm, "micrometres"))
+      ->type_name("UM");
+  command->add_option("--size", options->size, "Of the pictures; default: the photograph's")
+      ->type_name("WIDTHxHEIGHT");
+  command
+      ->add_option("--principal-point", options->principal_point,
+                   "Where the axis meets the sensor, px; the centre of the top-left pixel is 0,0; "
+                   "default: the middle, assumed")
+      ->type_name("X,Y");
+  command
+      ->add_option("--transfer", camera.transfer,
+                   "How light becomes stored values: linear, srgb or gamma-2.2")
+      ->check(TransferName())
+      ->capture_default_str()
+      ->type_name("NAME");
+  command->add_option("--psf", camera.psf, "Shape of the defocus blur: gaussian or disc")
+      ->check(CLI::IsMember({"gaussian", "disc"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command->add_option("--name", camera.name, "Default: the photograph's camera model, or camera")
+      ->type_name("TEXT");
+}
+
+}  // namespace
+
+model::Camera DescribedCamera(const CameraDescription& description,
+                              const std::optional<io::PhotoExif>& photo,
+                              const std::optional<Eigen::Vector2i>& photo_size_px) {
+  std::optional<double> pitch_mm;
+  if (description.pixel_pitch_um) pitch_mm = *description.pixel_pitch_um / kUmPerMm;
+  const std::string why_no_pitch =
+      photo && !photo->why_no_pitch.empty() ? " (" + photo->why_no_pitch + ")" : "";
+  const io::PhotoExif exif = photo.value_or(io::PhotoExif{});
+
+  std::vector<std::string> missing;
+  const Known focal = Require(GivenOr(description.front_focal_length_mm, exif.focal_length_mm),
+                              "the focal length: --focal-mm MM", &missing);
+  const Known f_number =
+      Require(GivenOr(description.f_number, exif.f_number), "the f-number: --f-number N", &missing);
+  const Known pitch = Require(GivenOr(pitch_mm, exif.pixel_pitch_mm),
+                              "the pixel pitch: --pitch-um UM" + why_no_pitch, &missing);
+  const auto size_px = description.size_px ? description.size_px : photo_size_px;
+  if (!size_px) missing.emplace_back("the picture size: --size WIDTHxHEIGHT");
+  if (!missing.empty()) throw Error(fmt::format("missing: {}", fmt::join(missing, "; ")));
+
+  model::Camera camera;
+  camera.name = !description.name.empty() ? description.name
+                : exif.model.empty()      ? "camera"
+                                          : PrintableUtf8(exif.model);
+  DescribeLens(description, focal, f_number, &camera);
+  DescribeSensor(description, pitch, *size_px, &camera);
+  camera.psf = description.psf == "disc" ? model::Psf::kDisc : model::Psf::kGaussian;
+  std::string why;
+  if (!camera.IsValid(&why)) throw Error(why);
+  return camera;
+}
+
+void AddCameraCommand(CLI::App* program, CommandAction* action) {
+  CLI::App* camera = program->add_subcommand("camera", "Camera files");
+  camera->require_subcommand(1);
+  AddCameraVerifyCommand(camera, action);
+  CLI::App* command = camera->add_subcommand(
+      "init", "A camera file from a data sheet's numbers or from a photograph's EXIF");
+  const auto options = std::make_shared<CameraInitOptions>();
+  command
+      ->add_option("--from-exif", options->photo_path,
+                   "Take from this photograph what is not given; it is marked as assumed")
+      ->type_name("PHOTO");
+  AddLensOptions(command, &options->camera);
+  AddSensorOptions(command, options.get());
+  command->add_option("-o,--output", options->output, "Default: standard output")
+      ->type_name("CAMERA.yaml");
+  AddCommonOptions(command, &options->common);
+  command->callback([options, action] {
+    *action = [options] {
+      ParseTexts(options.get());
+      if (options->output == "-") options->output.clear();
+      if (options->output.empty() && options->common.json_path == "-") {
+        throw UsageError(
+            "--json -: standard output is where the camera file goes; --output must name a file "
+            "for one of the two");
+      }
+      RequireDistinctFiles({options->output, options->common.json_path}, {options->photo_path});
+      RunCommand(options->common, [&] { return InitCamera(*options); });
+    };
+  });
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,35 @@
+#ifndef THICKLENS_TOOLS_COMMANDS_CAMERA_INIT_H_
+#define THICKLENS_TOOLS_COMMANDS_CAMERA_INIT_H_
+
+#include <optional>
+#include <string>
+
+#include "thicklens/io/exif.h"
+#include "thicklens/model/camera.h"
+
+namespace thicklens::tools {
+
+// A camera as the user describes it; absent: not given.
+struct CameraDescription {
+  std::optional<double> front_focal_length_mm;
+  std::optional<double> rear_focal_length_mm;
+  std::optional<double> lens_thickness_mm;
+  std::optional<double> f_number;
+  std::optional<double> pixel_pitch_um;
+  std::optional<Eigen::Vector2i> size_px;
+  std::optional<Eigen::Vector2d> principal_point_px;
+  std::string transfer = "srgb";
+  std::string psf = "gaussian";
+  std::string name;
+};
+
+// Makes the camera file's content. Given values are used as they are; values from `photo` (of the
+// size `photo_size_px`) or by default are marked as assumed. Throws Error that lists what is
+// missing and how to give it.
+model::Camera DescribedCamera(const CameraDescription& description,
+                              const std::optional<io::PhotoExif>& photo,
+                              const std::optional<Eigen::Vector2i>& photo_size_px);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_COMMANDS_CAMERA_INIT_H_

@@ -1,0 +1,280 @@
+// thicklens explain: what a calibrated camera does at given depths.
+#include <fmt/format.h>
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/io/depth_io.h"
+#include "thicklens/model/camera_file.h"
+#include "tools/commands/commands.h"
+#include "tools/commands/explain_scene.h"
+#include "tools/options/command_frame.h"
+#include "tools/options/effect_options.h"
+#include "tools/options/light_field_options.h"
+#include "tools/options/option_values.h"
+#include "tools/report/effect_costs.h"
+#include "tools/report/explain_figure.h"
+#include "tools/report/explain_table.h"
+#include "tools/system/progress_line.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr int kMaxSteps = 10000;
+
+struct ExplainOptions {
+  CommonOptions common;
+  std::string camera_path;
+  std::string depth_range, depth_path;  // one of them
+  DepthOptions depth;
+  int steps = 9;
+  EffectOptions effects;
+  int bits = 8;
+  double full_well_electrons = 0, read_noise_electrons = 0;
+  bool as_sweep = false;
+  model::BenchConditions bench;       // with as_sweep
+  std::optional<double> uv_depth_mm;  // of the plane UV of a light field
+  bool costs = false;
+  std::string figure_path;
+};
+
+DepthRange ParseDepthRange(const std::string& text) {
+  const std::string form = "NEAR:FAR in mm, with 0 < NEAR < FAR and FAR a number or inf,";
+  const std::string inf_ending = ":inf";
+  const bool to_infinity =
+      text.size() > inf_ending.size() &&
+      text.compare(text.size() - inf_ending.size(), std::string::npos, inf_ending) == 0;
+  const auto numbers =
+      SplitNumbers("--depth-range",
+                   to_infinity ? text.substr(0, text.size() - inf_ending.size()) : text, ':', form);
+  DepthRange range{numbers[0], std::numeric_limits<double>::infinity()};
+  if (!to_infinity && numbers.size() > 1) range.far_mm = numbers[1];
+  if (numbers.size() != (to_infinity ? 1 : 2) || !(range.near_mm > 0) ||
+      !(range.far_mm > range.near_mm)) {
+    throw UsageError(fmt::format("--depth-range: {} is expected, found '{}'", form, text));
+  }
+  return range;
+}
+
+// What is photographed, as far as it is known.
+struct ExplainedScene {
+  DepthRange range;
+  std::vector<model::EffectPlace> places;
+};
+
+ExplainedScene SceneOf(const ExplainOptions& options, const model::Camera& camera) {
+  if (options.depth_path.empty()) {
+    const DepthRange range = ParseDepthRange(options.depth_range);
+    return {range, model::PlacesBetween(camera, range.near_mm, range.far_mm, !options.as_sweep)};
+  }
+  const model::RawDepthMap map = io::ReadDepthMap(options.depth_path);
+  const model::Sensor& sensor = camera.sensor;
+  if (map.width_px != sensor.width_px || map.height_px != sensor.height_px) {
+    throw Error(fmt::format(
+        "{}: it is {}x{} px, the camera's sensor {}x{} px: the sizes must be "
+        "equal",
+        options.depth_path, map.width_px, map.height_px, sensor.width_px, sensor.height_px));
+  }
+  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  empty.values.assign(map.values.size(), 0.0F);
+  const model::Scene scene = model::MakeScene(camera, std::move(empty), map,
+                                              ConventionOf(options.depth), options.depth_path);
+  return {{scene.depth.min_mm, scene.depth.max_mm}, PlacesOfDepth(camera, scene)};
+}
+
+model::EffectDecision Decide(const ExplainOptions& options, const model::Camera& camera,
+                             const std::vector<model::EffectPlace>& places) {
+  model::EffectConditions conditions;
+  conditions.camera = camera;
+  conditions.bits = options.bits;
+  conditions.full_well_electrons = options.full_well_electrons;
+  conditions.read_noise_electrons = options.read_noise_electrons;
+  if (options.as_sweep) conditions.bench = options.bench;
+  if (options.uv_depth_mm) {
+    conditions.planes = {*options.uv_depth_mm, camera.focus_depth_mm() - *options.uv_depth_mm};
+  }
+  model::EffectChoice choice;
+  // As a simulated picture has it.
+  choice.kept = {model::Effect::kQuantisation, model::Effect::kTransferCurve};
+  ApplyEffectOptions(options.effects, &choice);
+  return model::DecideEffects(choice, conditions, places, model::EffectSet::All());
+}
+
+EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
+                    const DepthRange& range, const model::EffectDecision& decision) {
+  model::SceneSimulationOptions sensor;
+  sensor.full_well_electrons = options.full_well_electrons;
+  sensor.read_noise_electrons = options.read_noise_electrons;
+  sensor.bits = options.bits <= 8 ? 8 : 16;  // what simulations store; the time is the same
+  ProgressLine progress("measuring costs", options.common.quiet);
+  try {
+    return MeasureEffectCosts(camera, range, sensor, decision, [&progress](int done, int total) {
+      ThrowIfCancelled();
+      progress.Show(done, total);
+    });
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    throw Error(
+        fmt::format("--costs: a picture of depths from {:g} to {:g} mm cannot be simulated: "
+                    "{}",
+                    range.near_mm, range.far_mm, error.what()));
+  }
+}
+
+void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {
+  (*summary)["picture_seconds"] = costs.seconds;
+  (*summary)["seconds_are"] = "extrapolated from a part of the picture";
+  for (nlohmann::json& effect : (*summary)["effects"]) {
+    for (const auto& [of, seconds] : costs.of_effect) {
+      if (effect["name"] == model::EffectName(of)) effect["cost_seconds"] = seconds;
+    }
+  }
+}
+
+std::string CostsText(const EffectCosts& costs) {
+  return fmt::format(
+      "cost: how much longer a simulated picture of this size takes with the effect than without "
+      "it,\nextrapolated from a part of it, in seconds of one core of this machine, all others "
+      "being as they are here; with these "
+      "it "
+      "takes {:.3g}, and\n~0 is nothing, or less than can be measured\n",
+      costs.seconds);
+}
+
+CommandResult Explain(const ExplainOptions& options) {
+  std::optional<OutputFile> figure;
+  if (!options.figure_path.empty()) figure.emplace(options.figure_path);
+  const model::Camera camera = model::ReadCamera(options.camera_path);
+  TellAssumedFields(camera);
+  const ExplainedScene scene = SceneOf(options, camera);
+  const Explanation explanation = ExplainCamera(camera, scene.range, options.steps);
+  const model::EffectDecision decision = Decide(options, camera, scene.places);
+  CommandResult result{ExplanationJson(explanation), ""};
+  result.summary["effects"] = EffectsJson(decision);
+  std::optional<EffectCosts> costs;
+  if (options.costs) {
+    costs = CostsOf(options, camera, scene.range, decision);
+    AddCosts(*costs, &result.summary);
+  }
+  ThrowIfCancelled();
+  if (figure) figure->Commit(BlurCurveSvg(camera, scene.range));
+  result.is_written = figure.has_value();
+  PrintResult(
+      options.common,
+      ExplanationText(explanation) +
+          "\nwhat each effect can matter here, at most, to edges between black and white\n" +
+          EffectsTable(decision, costs ? &costs->of_effect : nullptr) +
+          (costs ? CostsText(*costs) : ""));
+  return result;
+}
+
+// Throws UsageError.
+void CheckUsage(const ExplainOptions& options) {
+  if (options.depth_range.empty() == options.depth_path.empty()) {
+    throw UsageError("one of --depth-range and --depth is needed: depths, or a map of them");
+  }
+  if (options.read_noise_electrons > 0 && !(options.full_well_electrons > 0)) {
+    throw UsageError("--read-noise: noise in electrons needs --full-well, electrons at full scale");
+  }
+  const model::BenchConditions& bench = options.bench;
+  if (!options.as_sweep && (bench.flicker > 0 || bench.drift_sigma_px > 0 ||
+                            bench.reading_sigma_mm > 0 || bench.tilt_deg != 0)) {
+    throw UsageError("--flicker, --drift, --tilt and --reading-error belong to --as-sweep");
+  }
+  if (options.costs && options.as_sweep) {
+    throw UsageError("--costs: effects of a sweep cost next to nothing; it is for pictures");
+  }
+  if (!options.depth_path.empty()) {
+    if (ConventionOf(options.depth).kind == model::DepthKind::kDisparity) {
+      throw UsageError(
+          "--depth-kind disparity: disparities refer to views, which a camera alone "
+          "does not have; z or range is expected");
+    }
+    return;
+  }
+  if (!options.depth.kind.empty() || !options.depth.unit.empty()) {
+    throw UsageError("--depth-kind and --depth-unit belong to --depth");
+  }
+}
+
+}  // namespace
+
+void AddExplainCommand(CLI::App* program, CommandAction* action) {
+  CLI::App* command = program->add_subcommand(
+      "explain", "What a calibrated camera does: blur, depth of field, which effects matter");
+  const auto options = std::make_shared<ExplainOptions>();
+  command->add_option("camera", options->camera_path, "A calibrated camera")
+      ->required()
+      ->type_name("CAMERA.yaml");
+  command
+      ->add_option("--depth-range", options->depth_range,
+                   "Depths from the aperture, in mm; FAR may be inf")
+      ->type_name("NEAR:FAR");
+  command->add_option("--depth", options->depth_path, "A depth map of the scene instead")
+      ->type_name("MAP");
+  AddDepthOptions(command, &options->depth);
+  command->add_option("--steps", options->steps, "Depths in the table, equally spaced in 1/depth")
+      ->check(CLI::Range(2, kMaxSteps))
+      ->capture_default_str()
+      ->type_name("N");
+  AddEffectOptions(command, &options->effects);
+  command->add_option("--bits", options->bits, "Of the stored picture")
+      ->check(CLI::Range(1, 32))
+      ->capture_default_str()
+      ->type_name("N");
+  command
+      ->add_option("--full-well", options->full_well_electrons,
+                   "Electrons at full scale, for shot noise; 0: unknown")
+      ->check(NonNegative())
+      ->type_name("ELECTRONS");
+  command
+      ->add_option("--read-noise", options->read_noise_electrons,
+                   "Of the sensor, sd; needs --full-well")
+      ->check(NonNegative())
+      ->type_name("ELECTRONS");
+  command->add_flag("--as-sweep", options->as_sweep,
+                    "The depths are those of a target on a bench, lit from the camera");
+  command->add_option("--flicker", options->bench.flicker, "Of the lamp, relative sd")
+      ->check(NonNegative())
+      ->type_name("SHARE");
+  command->add_option("--drift", options->bench.drift_sigma_px, "Of the target, sd at focus")
+      ->check(NonNegative())
+      ->type_name("PX");
+  command->add_option("--tilt", options->bench.tilt_deg, "Of the target")
+      ->check(Between(-89, 89, "degrees"))
+      ->type_name("DEG");
+  command->add_option("--reading-error", options->bench.reading_sigma_mm, "Of the bench, sd")
+      ->check(NonNegative())
+      ->type_name("MM");
+  command
+      ->add_option("--uv-depth", options->uv_depth_mm,
+                   "Depth of a light field's plane UV, whose ST lies in the plane of focus")
+      ->check(Finite())
+      ->type_name("MM");
+  command->add_flag("--costs", options->costs,
+                    "Measure, too, what each effect costs in a simulated picture of this camera at "
+                    "these depths; takes some seconds");
+  command
+      ->add_option("--figure", options->figure_path,
+                   "Draw the curve of blur against depth, with the band of its standard error")
+      ->type_name("FILE.svg");
+  AddCommonOptions(command, &options->common);
+  command->callback([options, action] {
+    *action = [options] {
+      CheckUsage(*options);
+      if (options->depth_path.empty()) ParseDepthRange(options->depth_range);
+      RequireDistinctFiles({options->common.json_path, options->figure_path},
+                           {options->camera_path, options->depth_path});
+      RunCommand(options->common, [&] { return Explain(*options); });
+    };
+  });
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,83 @@
+#include "tools/commands/explain_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include "thicklens/base/cancel.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr int kBlockPx = 8;
+
+class DepthBlocks {
+ public:
+  DepthBlocks(const model::Camera& camera, const model::Scene& scene)
+      : scene_(scene),
+        focus_(1 / camera.focus_depth_mm()),
+        axis_px_(camera.sensor.principal_point_px) {}
+
+  // Nothing where all of the block are holes.
+  std::optional<model::EffectPlace> PlaceOf(int x0, int y0) const {
+    model::EffectPlace place;
+    bool found = false;
+    double steepest = 0;
+    for (int y = y0; y < std::min(y0 + kBlockPx, scene_.picture.height_px); ++y) {
+      for (int x = x0; x < std::min(x0 + kBlockPx, scene_.picture.width_px); ++x) {
+        const double here = InverseDepth(x, y);
+        if (std::isnan(here)) continue;
+        if (!found || std::abs(here - focus_) > std::abs(1 / place.depth_mm - focus_)) {
+          place.depth_mm = 1 / here;
+        }
+        const Eigen::Vector2d at_px(x, y);
+        if (!found || (at_px - axis_px_).norm() > (place.position_px - axis_px_).norm()) {
+          place.position_px = at_px;
+        }
+        found = true;
+        steepest = std::max({steepest, Step(here, x + 1, y), Step(here, x, y + 1)});
+      }
+    }
+    if (!found) return std::nullopt;
+    // The other side lies as far beyond the plane of focus as it can.
+    const double here = 1 / place.depth_mm;
+    const double there = here > focus_ ? here - steepest : here + steepest;
+    if (steepest > 0) place.other_depth_mm = there > 0 ? 1 / there : 1 / (here + steepest);
+    return place;
+  }
+
+ private:
+  double InverseDepth(int x, int y) const {
+    return 1 / static_cast<double>(
+                   scene_.depth_mm[static_cast<std::size_t>(y) *
+                                       static_cast<std::size_t>(scene_.picture.width_px) +
+                                   static_cast<std::size_t>(x)]);
+  }
+  double Step(double here, int x, int y) const {
+    if (x >= scene_.picture.width_px || y >= scene_.picture.height_px) return 0;
+    const double step = std::abs(InverseDepth(x, y) - here);
+    return std::isnan(step) ? 0 : step;
+  }
+
+  const model::Scene& scene_;
+  const double focus_;
+  const Eigen::Vector2d axis_px_;
+};
+
+}  // namespace
+
+std::vector<model::EffectPlace> PlacesOfDepth(const model::Camera& camera,
+                                              const model::Scene& scene) {
+  const DepthBlocks blocks(camera, scene);
+  std::vector<model::EffectPlace> places;
+  for (int y = 0; y < scene.picture.height_px; y += kBlockPx) {
+    ThrowIfCancelled();
+    for (int x = 0; x < scene.picture.width_px; x += kBlockPx) {
+      if (const auto place = blocks.PlaceOf(x, y)) places.push_back(*place);
+    }
+  }
+  return places;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,567 @@
+// thicklens render: pictures from a light field, and the light field in another layout.
+#include "thicklens/estimator/render.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/stopwatch.h"
+#include "thicklens/io/aperture_statement.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/light_field_io.h"
+#include "thicklens/io/picture_description.h"
+#include "thicklens/kernels/device.h"
+#include "thicklens/model/scene.h"
+#include "tools/commands/commands.h"
+#include "tools/options/command_frame.h"
+#include "tools/options/light_field_effects.h"
+#include "tools/options/light_field_options.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+using model::Effect;
+
+constexpr int kMosaicGapPx = 2;
+constexpr int kEpipolarRepeatPx = 8;  // one line a view would be too thin to look at
+constexpr double kStoredLevels = 255;
+constexpr double kMaxLengthMm = 1e9;
+constexpr int kDefaultBits = 8;
+
+struct RenderOptions {
+  CommonOptions common;
+  std::string light_field, output;
+  ReadingOptions reading;
+  // What to render: one of these.
+  bool as_captured = false;
+  std::string view;
+  std::optional<double> focus_mm, focus_disparity_px;
+  bool mosaic = false;
+  bool is_epi = false;
+  std::string epi;
+  std::string convert;
+  // How.
+  std::string aperture_shape;
+  std::optional<double> aperture_radius;
+  EffectOptions effects;
+  std::optional<double> noise_levels;
+  std::optional<int> bits;
+  std::optional<std::int64_t> seed;
+  std::string device = "auto";
+};
+
+bool IsFocused(const RenderOptions& options) {
+  return options.focus_mm || options.focus_disparity_px;
+}
+
+// --- The command line.
+
+constexpr char kWhatToRender[] =
+    "--as-captured, --view, --focus, --focus-disparity, --mosaic, --epi, --convert";
+
+std::vector<std::string> AskedFor(const RenderOptions& options) {
+  std::vector<std::string> asked;
+  if (options.as_captured) asked.emplace_back("--as-captured");
+  if (!options.view.empty()) asked.emplace_back("--view");
+  if (options.focus_mm) asked.emplace_back("--focus");
+  if (options.focus_disparity_px) asked.emplace_back("--focus-disparity");
+  if (options.mosaic) asked.emplace_back("--mosaic");
+  if (options.is_epi) asked.emplace_back("--epi");
+  if (!options.convert.empty()) asked.emplace_back("--convert");
+  return asked;
+}
+
+void RefuseUnless(bool fits, bool given, const char* option, const char* goes_with) {
+  if (given && !fits) throw UsageError(fmt::format("{}: goes with {} only", option, goes_with));
+}
+
+void CheckUsage(RenderOptions* options) {
+  std::vector<std::string> asked = AskedFor(*options);
+  if (asked.empty() && options->aperture_radius) {  // another aperture, otherwise as captured
+    options->as_captured = true;
+    asked = AskedFor(*options);
+  }
+  if (asked.size() != 1) {
+    throw UsageError(
+        fmt::format("exactly one of {} is expected, found {}", kWhatToRender,
+                    asked.empty() ? "none" : fmt::format("{}", fmt::join(asked, ", "))));
+  }
+  const bool averages = options->as_captured || IsFocused(*options);
+  const char* const kAverages = "--as-captured, --focus and --focus-disparity";
+  RefuseUnless(averages, !options->aperture_shape.empty(), "--aperture-shape", kAverages);
+  RefuseUnless(averages, options->aperture_radius.has_value(), "--aperture", kAverages);
+  if (!options->aperture_shape.empty() && options->aperture_radius)
+    throw UsageError("--aperture and --aperture-shape: one of them, or none, is expected");
+  RefuseUnless(options->as_captured, options->effects.effects.has_value(), "--effects",
+               "--as-captured");
+  RefuseUnless(options->as_captured, options->effects.without.has_value(), "--without",
+               "--as-captured");
+  RefuseUnless(options->as_captured, options->effects.tolerance.has_value(), "--tolerance",
+               "--as-captured");
+  const bool is_picture = options->convert.empty();
+  const char* const kPictures = "pictures, not with --convert,";
+  RefuseUnless(is_picture, options->noise_levels.has_value(), "--noise", kPictures);
+  RefuseUnless(is_picture, options->bits.has_value(), "--bits", kPictures);
+  RefuseUnless(is_picture, options->seed.has_value(), "--seed", kPictures);
+}
+
+struct ViewPlace {
+  bool centre = false;
+  int k = 0, l = 0;
+};
+
+constexpr int kMostViewIndex = 9999;
+
+ViewPlace ParseView(const std::string& text) {
+  if (text == "centre") return {true, 0, 0};
+  const std::string form = "u,v (view indices from 0) or centre";
+  const std::vector<int> place = SplitWhole("--view", text, ',', form, 0, kMostViewIndex);
+  if (place.size() != 2)
+    throw UsageError(fmt::format("--view: {} is expected, found '{}'", form, text));
+  return {false, place[0], place[1]};
+}
+
+// A line of every view, and the row or column of views; the middle ones where they are not given.
+struct EpiLine {
+  bool is_row = true;
+  std::optional<int> line, view;
+};
+
+EpiLine ParseEpi(const std::string& text) {
+  EpiLine epi;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const auto equals = part.find('=');
+    const std::string name = part.substr(0, equals);
+    const bool first = !epi.line;
+    const bool known = first ? name == "row" || name == "column" : name == (epi.is_row ? "v" : "u");
+    if (equals == std::string::npos || !known || epi.view) {
+      throw UsageError(fmt::format(
+          "--epi: row=T, row=T,v=L, column=S or column=S,u=K is expected, found '{}'", text));
+    }
+    const std::vector<int> value = SplitPixels("--epi", part.substr(equals + 1), ',', name);
+    if (first) epi.is_row = name == "row";
+    (first ? epi.line : epi.view) = value.front();
+  }
+  return epi;
+}
+
+// --- What is rendered.
+
+struct Rendering {
+  model::LinearPicture picture;
+  std::string what;  // for people
+  nlohmann::json details;
+  std::string effects{};  // for people, a line of its own; empty: nothing to tell
+};
+
+Eigen::ArrayXXd WeightsOf(const RenderOptions& options, const model::LightField& light_field,
+                          nlohmann::json* details) {
+  if (options.aperture_radius) {
+    const char* const key = light_field.camera ? "aperture_radius_mm" : "aperture_radius_steps";
+    (*details)[key] = *options.aperture_radius;
+    return estimator::WeightsForRadius(light_field, *options.aperture_radius);
+  }
+  if (options.aperture_shape.empty()) {
+    const bool is_stated = io::StatesAperture(options.light_field);
+    (*details)["aperture_shape"] = is_stated ? "own" : "uniform";
+    (*details)["aperture_from"] = is_stated ? "light-field" : "assumed";
+    return light_field.weights;
+  }
+  (*details)["aperture_from"] = "option";
+  (*details)["aperture_shape"] = options.aperture_shape;
+  return model::ApertureWeights(model::ApertureShapeFromName(options.aperture_shape),
+                                light_field.u_count, light_field.v_count);
+}
+
+std::string ApertureText(const RenderOptions& options, const model::LightField& light_field) {
+  if (options.aperture_radius) {
+    return fmt::format("an aperture of {:g} {}", *options.aperture_radius,
+                       light_field.camera ? "mm" : "view steps");
+  }
+  if (!options.aperture_shape.empty()) return fmt::format("a {} aperture", options.aperture_shape);
+  return io::StatesAperture(options.light_field) ? "the light field's own aperture"
+                                                 : "a uniform aperture (assumed)";
+}
+
+// Those of the effects that are on.
+Eigen::ArrayXXd PhotographWeights(const RenderOptions& options,
+                                  const model::LightField& light_field, const model::EffectSet& on,
+                                  nlohmann::json* details) {
+  const bool is_said = options.aperture_radius || !options.aperture_shape.empty();
+  for (const Effect effect : {Effect::kDefocus, Effect::kApertureShape}) {
+    if (!is_said || on.Has(effect)) continue;
+    throw UsageError(
+        fmt::format("--aperture and --aperture-shape: they need the effect {}, which is left out",
+                    model::EffectName(effect)));
+  }
+  if (!on.Has(Effect::kDefocus)) {
+    (*details)["aperture_shape"] = "pinhole";
+    return estimator::WeightsForRadius(light_field, 0);
+  }
+  if (!on.Has(Effect::kApertureShape)) {
+    (*details)["aperture_shape"] = "gaussian";
+    return model::ApertureWeights(model::ApertureShape::kGaussian, light_field.u_count,
+                                  light_field.v_count);
+  }
+  return WeightsOf(options, light_field, details);
+}
+
+// The aperture of PhotographWeights where a ray crosses it between the views.
+estimator::Vignetting VignettingOf(const RenderOptions& options,
+                                   const model::LightField& light_field,
+                                   const model::EffectDecision& effects) {
+  using model::ApertureShape;
+  if (!effects.on.Has(Effect::kApertureShape)) return {ApertureShape::kGaussian, {}};
+  if (!options.aperture_shape.empty()) {
+    return {model::ApertureShapeFromName(options.aperture_shape), {}};
+  }
+  const std::optional<ApertureShape> own = estimator::ShapeOfWeights(light_field);
+  if (own) return {*own, options.aperture_radius};
+  throw Error(fmt::format(
+      "{}: its UV plane lies off the aperture, and its weights are those of no shape, so that "
+      "nothing is known of the aperture between the views: {}--without vignetting",
+      options.light_field, options.aperture_radius ? "" : "--aperture-shape NAME or "));
+}
+
+// What the views do not hold, no weights bring back.
+void WarnOfWander(const model::LightField& light_field) {
+  constexpr double kMuch = 0.4;
+  const double wander = estimator::LargestWander(light_field);
+  if (!(wander > kMuch)) return;
+  spdlog::warn(
+      "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture beside its "
+      "middle, by {:.2g} of the half-width that the views cover: part of their light is missing, "
+      "and what is out of focus there is displaced and not blurred enough",
+      light_field.grid->planes.uv_depth_mm, wander);
+}
+
+Rendering RenderPhotograph(const RenderOptions& options, const model::LightField& light_field) {
+  std::string notice;
+  const auto backend =
+      kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
+  if (!notice.empty()) spdlog::warn("{}", notice);
+  spdlog::debug("device: {}", backend->description());
+  // On the processor it is quicker without them.
+  const auto kernels = backend->is_opencl() ? backend->NewFloat() : nullptr;
+  Rendering rendering;
+  rendering.details = {{"rendered", "as-captured"}, {"device", backend->name()}};
+  const model::EffectDecision effects = DecidePhotographEffects(options.effects, light_field);
+  rendering.details["effects"] = effects.on.Names();
+  rendering.details["effect_impacts"] = EffectsJson(effects);
+  std::optional<model::Camera> falloff;
+  if (effects.on.Has(Effect::kFalloff)) {
+    falloff = effects.on.Has(Effect::kThickness) ? *light_field.camera
+                                                 : model::ThinTwin(*light_field.camera);
+  }
+  std::optional<estimator::Vignetting> vignetting;
+  // An aperture of no size is one view.
+  if (effects.on.Has(Effect::kVignetting) && options.aperture_radius.value_or(1) > 0) {
+    vignetting = VignettingOf(options, light_field, effects);
+    WarnOfWander(light_field);
+  }
+  rendering.picture = estimator::Photograph(
+      light_field, PhotographWeights(options, light_field, effects.on, &rendering.details),
+      falloff ? &*falloff : nullptr, vignetting ? &*vignetting : nullptr, kernels.get(),
+      options.common.threads);
+  const bool is_pinhole = !effects.on.Has(Effect::kDefocus);
+  const bool is_gaussian = !effects.on.Has(Effect::kApertureShape);
+  rendering.what =
+      fmt::format("photograph through {}", is_pinhole    ? "a pinhole"
+                                           : is_gaussian ? "a gaussian aperture"
+                                                         : ApertureText(options, light_field));
+  if (!effects.findings.empty()) rendering.effects = EffectsText(effects);
+  return rendering;
+}
+
+// The disparity along v is that along u times the ratio of the view steps.
+Eigen::Vector2d FocusDisparityPx(const RenderOptions& options,
+                                 const model::LightField& light_field) {
+  if (options.focus_mm) {
+    if (!light_field.camera) {
+      throw Error(fmt::format(
+          "--focus {} mm: {} has no camera, so that millimetres mean nothing: --focus-disparity PX",
+          *options.focus_mm, options.light_field));
+    }
+    return estimator::DisparityAtDepthPx(light_field, *options.focus_mm);
+  }
+  Eigen::Vector2d disparity_px(*options.focus_disparity_px, *options.focus_disparity_px);
+  if (light_field.grid && light_field.grid->u_step_mm != 0)
+    disparity_px.y() *= light_field.grid->v_step_mm / light_field.grid->u_step_mm;
+  return disparity_px;
+}
+
+Rendering RenderFocused(const RenderOptions& options, const model::LightField& light_field) {
+  const Eigen::Vector2d disparity_px = FocusDisparityPx(options, light_field);
+  Rendering rendering;
+  rendering.details = {{"rendered", "focus"},
+                       {"disparity_px", {disparity_px.x(), disparity_px.y()}}};
+  if (options.focus_mm) rendering.details["focus_depth_mm"] = *options.focus_mm;
+  const Eigen::ArrayXXd weights = WeightsOf(options, light_field, &rendering.details);
+  rendering.picture = estimator::Refocus(light_field, disparity_px.x(), disparity_px.y(), weights,
+                                         options.common.threads);
+  rendering.what = options.focus_mm
+                       ? fmt::format("focus at {:g} mm (disparity {:.4g} px per view step)",
+                                     *options.focus_mm, disparity_px.x())
+                       : fmt::format("focus at disparity {:g} px per view step", disparity_px.x());
+  rendering.what += " through " + ApertureText(options, light_field);
+  return rendering;
+}
+
+Rendering RenderView(const RenderOptions& options, const model::LightField& light_field) {
+  ViewPlace place = ParseView(options.view);
+  if (place.centre) {
+    if (light_field.u_count % 2 == 0 || light_field.v_count % 2 == 0) {
+      throw Error(
+          fmt::format("--view centre: {} has {}x{} views, with none in the middle: --view "
+                      "u,v",
+                      options.light_field, light_field.u_count, light_field.v_count));
+    }
+    place.k = light_field.u_count / 2;
+    place.l = light_field.v_count / 2;
+  }
+  const auto [centre, k, l] = place;
+  if (k >= light_field.u_count || l >= light_field.v_count) {
+    throw Error(
+        fmt::format("--view {},{}: {} has {}x{} views: u must be from 0 to {}, v from 0 to "
+                    "{}",
+                    k, l, options.light_field, light_field.u_count, light_field.v_count,
+                    light_field.u_count - 1, light_field.v_count - 1));
+  }
+  if (!light_field.IsPresent(k, l))
+    throw Error(fmt::format("--view {},{}: {} has no such view", k, l, options.light_field));
+  return {model::ViewPicture(light_field, k, l),
+          fmt::format("view ({}, {})", k, l),
+          {{"rendered", "view"}, {"u", k}, {"v", l}}};
+}
+
+int Chosen(const std::string& name, const std::optional<int>& asked, int count,
+           const std::string& light_field) {
+  if (!asked) return count / 2;
+  if (*asked < count) return *asked;
+  throw Error(fmt::format("--epi: {} is {}: in {} it must be from 0 to {}", name, *asked,
+                          light_field, count - 1));
+}
+
+Rendering RenderEpi(const RenderOptions& options, const model::LightField& light_field) {
+  const EpiLine epi = ParseEpi(options.epi);
+  const std::string& name = options.light_field;
+  if (epi.is_row) {
+    const int t = Chosen("row", epi.line, light_field.t_count, name);
+    const int l = Chosen("v", epi.view, light_field.v_count, name);
+    return {estimator::EpipolarRow(light_field, t, l, kEpipolarRepeatPx),
+            fmt::format("row {} of the views in row {}, one above the other", t, l),
+            {{"rendered", "epi"}, {"row", t}, {"v", l}}};
+  }
+  const int s = Chosen("column", epi.line, light_field.s_count, name);
+  const int k = Chosen("u", epi.view, light_field.u_count, name);
+  return {estimator::EpipolarColumn(light_field, s, k, kEpipolarRepeatPx),
+          fmt::format("column {} of the views in column {}, side by side", s, k),
+          {{"rendered", "epi"}, {"column", s}, {"u", k}}};
+}
+
+Rendering RenderAny(const RenderOptions& options, const model::LightField& light_field) {
+  if (options.as_captured) return RenderPhotograph(options, light_field);
+  if (IsFocused(options)) return RenderFocused(options, light_field);
+  if (options.is_epi) return RenderEpi(options, light_field);
+  if (!options.mosaic) return RenderView(options, light_field);
+  return {estimator::Mosaic(light_field, kMosaicGapPx),
+          "all views side by side",
+          {{"rendered", "mosaic"}}};
+}
+
+void AddToSummary(const RenderOptions& options, const model::LightField& light_field,
+                  double clipped_fraction, double seconds, nlohmann::json* summary) {
+  summary->update({{"status", "ok"},
+                   {"reason", ""},
+                   {"light_field", options.light_field},
+                   {"output", options.output},
+                   {"views", {light_field.u_count, light_field.v_count}},
+                   {"size", {light_field.s_count, light_field.t_count}},
+                   {"channels", light_field.channels},
+                   {"clipped_fraction", clipped_fraction},
+                   {"seconds", seconds}});
+}
+
+std::string ClippedText(double fraction) {
+  return fraction > 0 ? fmt::format("clipped: {:.3g} % of the values\n", 100 * fraction)
+                      : "clipped: nothing\n";
+}
+
+// For the file: "photograph through ...; effects: defocus, falloff".
+std::string Description(const Rendering& rendering) {
+  const auto effects = rendering.details.find("effects");
+  if (effects == rendering.details.end()) return rendering.what;
+  const auto names = effects->get<std::vector<std::string>>();
+  return fmt::format("{}; effects: {}", rendering.what,
+                     names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")));
+}
+
+CommandResult RenderPicture(const RenderOptions& options) {
+  const auto start = Clock::now();
+  OutputFile output(options.output);
+  const model::LightField light_field =
+      io::ReadLightField(options.light_field, ReadingOf(options.reading));
+  ThrowIfCancelled();
+  Rendering rendering = RenderAny(options, light_field);
+  ThrowIfCancelled();
+
+  const int bits = options.bits.value_or(kDefaultBits);
+  const double noise_levels = options.noise_levels.value_or(0);
+  const auto seed = static_cast<std::uint64_t>(options.seed.value_or(0));
+  const model::LinearPicture& picture = rendering.picture;
+  const std::size_t clipped = io::CountClipped(picture, light_field.transfer, bits);
+  output.Commit(io::WithDescription(
+      io::EncodePng(model::ToStoredWithNoise(picture, light_field.transfer, bits,
+                                             noise_levels / kStoredLevels, seed)),
+      Description(rendering)));
+
+  const double fraction = static_cast<double>(clipped) / static_cast<double>(picture.values.size());
+  CommandResult result;
+  result.is_written = true;
+  result.summary = std::move(rendering.details);
+  result.summary.update({{"width_px", picture.width_px},
+                         {"height_px", picture.height_px},
+                         {"bits", bits},
+                         {"noise_levels", noise_levels},
+                         {"seed", seed}});
+  AddToSummary(options, light_field, fraction, SecondsSince(start), &result.summary);
+  const std::string noise =
+      noise_levels > 0 ? fmt::format(", noise {:g}/255 (seed {})", noise_levels, seed) : "";
+  PrintResult(options.common,
+              fmt::format("{}\n{} x {} views -> {} x {} px, {} channel(s), {} bit{}: {}\n{}",
+                          rendering.what, light_field.u_count, light_field.v_count,
+                          picture.width_px, picture.height_px, picture.channels, bits, noise,
+                          options.output, ClippedText(fraction)) +
+                  rendering.effects);
+  return result;
+}
+
+CommandResult Convert(const RenderOptions& options) {
+  const auto start = Clock::now();
+  const bool is_hci = options.convert == "hci";
+  OutputFolder folder =
+      is_hci ? io::ClaimHciFolder(options.output)
+             : OutputFolder(options.output, io::kLightFieldMarker, io::LightFieldEntries());
+  const model::LightField light_field =
+      io::ReadLightField(options.light_field, ReadingOf(options.reading));
+  const io::ViewFormat format =
+      options.convert == "thicklens-tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng;
+  const std::size_t clipped = is_hci ? io::WriteHciLightField(light_field, &folder)
+                                     : io::WriteLightField(light_field, format, &folder);
+  ThrowIfCancelled();
+  folder.Commit();
+
+  const double fraction =
+      static_cast<double>(clipped) / static_cast<double>(light_field.values.size());
+  CommandResult result;
+  result.is_written = true;
+  result.summary = {{"rendered", "convert"}, {"layout", options.convert}};
+  AddToSummary(options, light_field, fraction, SecondsSince(start), &result.summary);
+  PrintResult(
+      options.common,
+      fmt::format("{} x {} views of {} x {} px, {} channel(s), as {}: {}\n{}", light_field.u_count,
+                  light_field.v_count, light_field.s_count, light_field.t_count,
+                  light_field.channels, options.convert, options.output, ClippedText(fraction)));
+  return result;
+}
+
+// --- Its options.
+
+void AddWhatToRender(CLI::App* command, RenderOptions* options) {
+  command->add_flag("--as-captured", options->as_captured,
+                    "The photograph that the whole aperture would take");
+  command->add_option("--view", options->view, "One view, indices from 0, or centre")
+      ->type_name("U,V");
+  command
+      ->add_option("--focus", options->focus_mm,
+                   "The photograph refocused at this depth; needs a camera")
+      ->check(Between(0, kMaxLengthMm, "millimetres"))
+      ->type_name("MM");
+  command
+      ->add_option("--focus-disparity", options->focus_disparity_px,
+                   "The same by disparity, px per view step, near positive")
+      ->check(Finite())
+      ->type_name("PX");
+  command->add_flag("--mosaic", options->mosaic, "All views side by side");
+  command
+      ->add_option("--epi", options->epi,
+                   "Epipolar picture: row=T[,v=L] or column=S[,u=K]; without a text the middle row")
+      ->expected(0, 1)
+      ->type_name("LINE");
+  command
+      ->add_option("--convert", options->convert,
+                   "The light field itself as a folder: thicklens (16-bit PNG), thicklens-tiff "
+                   "(float) or hci (8-bit PNG in the layout of the HCI benchmark)")
+      ->check(CLI::IsMember({"thicklens", "hci", "thicklens-tiff"}))
+      ->type_name("LAYOUT");
+}
+
+void AddHowToRender(CLI::App* command, RenderOptions* options) {
+  AddApertureShapeOption(command, &options->aperture_shape);
+  command
+      ->add_option("--aperture", options->aperture_radius,
+                   "Radius of another aperture: mm with a camera, else view steps; alone it means "
+                   "--as-captured with it")
+      ->check(NonNegative())
+      ->type_name("R");
+  AddEffectOptions(command, &options->effects);
+  command
+      ->add_option("--noise", options->noise_levels,
+                   "Add normal noise of N/255 to the stored values")
+      ->check(NonNegative())
+      ->type_name("N");
+  command->add_option("--seed", options->seed, "Of the noise; default 0")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
+  command->add_option("--bits", options->bits, "A value of the picture: 8 (default) or 16")
+      ->check(CLI::IsMember({8, 16}))
+      ->type_name("N");
+  AddDeviceOption(command, &options->device);
+}
+
+}  // namespace
+
+void AddRenderCommand(CLI::App* program, CommandAction* action) {
+  CLI::App* command = program->add_subcommand(
+      "render", "Pictures from a light field, or the light field in another layout");
+  const auto options = std::make_shared<RenderOptions>();
+  command->add_option("light_field", options->light_field, "Folder of ours or in the HCI layout")
+      ->required()
+      ->type_name("LF");
+  command->add_option("-o,--output", options->output, "PNG file; for --convert a folder")
+      ->required()
+      ->type_name("OUT");
+  AddWhatToRender(command, options.get());
+  AddHowToRender(command, options.get());
+  AddReadingOptions(command, &options->reading);
+  AddCommonOptions(command, &options->common);
+  command->callback([options, action, command] {
+    options->is_epi = command->count("--epi") > 0;
+    *action = [options] {
+      CheckUsage(options.get());
+      if (!options->view.empty()) ParseView(options->view);
+      ParseEpi(options->epi);
+      ReadingOf(options->reading);
+      RequireDistinctFiles({options->common.json_path, options->output}, {options->light_field});
+      RunCommand(options->common, [&] {
+        return options->convert.empty() ? RenderPicture(*options) : Convert(*options);
+      });
+    };
+  });
+}
+
+}  // namespace thicklens::tools

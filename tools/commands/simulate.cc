@@ -1,0 +1,168 @@
+// thicklens simulate: made-up bench photographs with their truth.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/simulated_sweep.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/sweep_simulator.h"
+#include "tools/commands/commands.h"
+#include "tools/commands/simulate_scene.h"
+#include "tools/options/command_frame.h"
+#include "tools/options/effect_options.h"
+#include "tools/report/attribution_page.h"
+#include "tools/system/progress_line.h"
+
+namespace thicklens::tools {
+namespace {
+
+// Sign of a folder that this program wrote and may replace.
+constexpr char kMarkerFile[] = "truth.yaml";
+
+struct SimulateOptions {
+  CommonOptions common;
+  std::string config_path;
+  std::string output_folder;
+  std::optional<std::int64_t> seed;
+  bool unknown_offset = false;
+  bool attribute = false;
+  EffectOptions effects{{}, {}, {}, ""};  // auto has no choice
+};
+
+// Returns the bits of what is stored.
+int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
+                 OutputFolder* folder) {
+  const auto& frames = simulator.truth().frames;
+  const int count = static_cast<int>(frames.size());
+  ProgressLine progress("rendering", common.quiet);
+  std::atomic<int> done{0}, bits{0};
+  ParallelFor(count, common.threads, [&](int i) {
+    ThrowIfCancelled();
+    const model::StoredPicture stored = simulator.RenderFrame(i);
+    bits = stored.bits;
+    folder->Write(frames[static_cast<std::size_t>(i)].image, io::EncodePng(stored));
+    progress.Show(++done, count);
+  });
+  return bits;
+}
+
+nlohmann::json Summary(const SimulateOptions& options,
+                       const model::SweepSimulationOptions& simulation,
+                       const model::SweepTruth& truth, double seconds) {
+  const auto [near, far] =
+      std::minmax_element(truth.frames.begin(), truth.frames.end(),
+                          [](const auto& a, const auto& b) { return a.depth_mm < b.depth_mm; });
+  return {{"status", "ok"},
+          {"reason", ""},
+          {"output", options.output_folder},
+          {"frames", truth.frames.size()},
+          {"width_px", simulation.camera.sensor.width_px},
+          {"height_px", simulation.camera.sensor.height_px},
+          {"target", model::TargetKindName(simulation.target.kind)},
+          {"seed", simulation.seed},
+          {"nearest_depth_mm", near->depth_mm},
+          {"farthest_depth_mm", far->depth_mm},
+          {"truth",
+           {{"image_distance_mm", truth.image_distance_mm},
+            {"focus_depth_mm", truth.focus_depth_mm},
+            {"blur_ratio", truth.blur_ratio},
+            {"blur_floor_px", truth.blur_floor_px},
+            {"bench_offset_mm", truth.bench_offset_mm}}},
+          {"seconds", seconds}};
+}
+
+CommandResult SimulateSweep(const SimulateOptions& options) {
+  const auto start = Clock::now();
+  model::SweepSimulationOptions simulation = model::ReadSweepSimulation(options.config_path);
+  if (options.seed) simulation.seed = static_cast<std::uint64_t>(*options.seed);
+  CheckEffectNames(options.effects, model::SweepEffects());
+  ApplyEffectOptions(options.effects, &simulation.effects);
+  OutputFolder folder(
+      options.output_folder, kMarkerFile,
+      {"frames", "sweep.yaml", "camera.yaml", kMarkerFile, kAttributionPage, kAttributionTable});
+
+  const model::LinearPicture target_picture = io::ReadTargetPicture(simulation.target);
+  const model::SweepSimulator simulator(simulation, target_picture);
+  const int bits = RenderFrames(simulator, options.common, &folder);
+  model::Camera camera = simulator.camera();
+  camera.calibration.reset();  // what a calibration of this sweep has to find
+  folder.Write("camera.yaml", model::CameraToYaml(camera));
+  folder.Write("sweep.yaml", model::SweepToYaml(
+                                 io::DescribeSweep(simulation, simulator, options.unknown_offset)));
+  folder.Write(kMarkerFile, model::SweepTruthToYaml(simulator.truth()));
+  Attribution attribution;
+  if (options.attribute) {
+    ProgressLine progress("attributing", options.common.quiet);
+    attribution.sweep = AttributeSweepOf(options.config_path, simulation, options.unknown_offset,
+                                         AttributionRunWith(options.common, &progress));
+    WriteAttribution(attribution, options.config_path, &folder);
+  }
+  ThrowIfCancelled();
+  folder.Commit();
+
+  const std::chrono::duration<double> seconds = Clock::now() - start;
+  CommandResult result;
+  result.is_written = true;
+  result.summary = Summary(options, simulation, simulator.truth(), seconds.count());
+  result.summary["bits"] = bits;
+  result.summary["effects"] = EffectsJson(simulator.effects());
+  PrintResult(options.common,
+              fmt::format("{} frames of {} x {} px in {:.1f} s: {}\n", simulation.frame_count,
+                          camera.sensor.width_px, camera.sensor.height_px, seconds.count(),
+                          options.output_folder) +
+                  EffectsText(simulator.effects()) +
+                  (options.attribute ? AttributionText(attribution) : ""));
+  if (options.attribute) result.summary["attribution"] = AttributionJson(attribution);
+  return result;
+}
+
+}  // namespace
+
+void AddSimulateCommand(CLI::App* program, CommandAction* action) {
+  CLI::App* simulate = program->add_subcommand("simulate", "Make photographs with their truth");
+  simulate->require_subcommand(1);
+  CLI::App* command = simulate->add_subcommand(
+      "sweep",
+      "A focus sweep: frames/, camera.yaml (without calibration), sweep.yaml and truth.yaml");
+  const auto options = std::make_shared<SimulateOptions>();
+  command->add_option("config", options->config_path, "What to simulate")
+      ->required()
+      ->type_name("CONFIG");
+  command->add_option("-o,--output", options->output_folder, "Folder to write")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--seed", options->seed, "Replaces the config's seed")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
+  command->add_flag("--unknown-offset", options->unknown_offset,
+                    "Leave the bench offset out of sweep.yaml, to be found by a calibration");
+  AddEffectOptions(command, &options->effects);
+  command->add_flag("--attribute", options->attribute,
+                    "Also simulate and calibrate it without each effect in turn, and tell what "
+                    "each changes: a table, attribution.csv and the page attribution.html");
+  AddCommonOptions(command, &options->common);
+  command->callback([options, action] {
+    *action = [options] {
+      RequireDistinctFiles({options->common.json_path, options->output_folder},
+                           {options->config_path});
+      RunCommand(options->common, [&] { return SimulateSweep(*options); });
+    };
+  });
+  AddSimulateSceneCommands(simulate, action);
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,286 @@
+// thicklens simulate picture, thicklens simulate light-field: a made-up photograph with its depth
+// map, and the true light field of the same scene.
+#include "tools/commands/simulate_scene.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/stopwatch.h"
+#include "thicklens/io/depth_io.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/light_field_io.h"
+#include "thicklens/io/picture_description.h"
+#include "thicklens/io/scene_pixels.h"
+#include "thicklens/io/simulated_sweep.h"
+#include "thicklens/model/camera_file.h"
+#include "thicklens/model/scene_simulator.h"
+#include "tools/options/effect_options.h"
+#include "tools/options/light_field_options.h"
+#include "tools/options/option_values.h"
+#include "tools/report/attribution_page.h"
+#include "tools/system/build_info.h"
+#include "tools/system/machine.h"
+#include "tools/system/progress_line.h"
+
+namespace thicklens::tools {
+namespace {
+
+// Sign of a folder that this program wrote and may replace.
+constexpr char kPictureMarker[] = "truth.yaml";
+
+struct SceneOptions {
+  CommonOptions common;
+  std::string config_path;
+  std::string output_folder;
+  std::optional<std::int64_t> seed;
+  EffectOptions effects;
+  bool attribute = false;             // picture
+  std::string sweep_path;             // picture; of the attribution
+  ViewsOption views;                  // light-field
+  std::optional<double> uv_depth_mm;  // light-field
+  std::string format = "png";         // light-field
+};
+
+model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
+  model::SceneSimulationOptions scene = model::ReadSceneSimulation(options.config_path);
+  if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
+  CheckEffectNames(options.effects, model::PictureEffects());
+  ApplyEffectOptions(options.effects, &scene.effects);
+  const auto [u_count, v_count] = ViewCounts(options.views);
+  if (u_count > 0) {
+    scene.u_count = u_count;
+    scene.v_count = v_count;
+  }
+  if (options.uv_depth_mm) scene.uv_depth_mm = *options.uv_depth_mm;
+  return scene;
+}
+
+// Progress on the terminal, and an end when the person asks for one.
+model::SceneRun RunWith(const CommonOptions& common, ProgressLine* progress) {
+  return {common.threads, [progress](int done, int total) {
+            ThrowIfCancelled();
+            progress->Show(done, total);
+          }};
+}
+
+nlohmann::json Summary(const SceneOptions& options, const model::SceneSimulationOptions& scene,
+                       const model::SceneTruth& truth, Clock::time_point start) {
+  const std::chrono::duration<double> seconds = Clock::now() - start;
+  return {{"status", "ok"},
+          {"reason", ""},
+          {"output", options.output_folder},
+          {"width_px", scene.camera.sensor.width_px},
+          {"height_px", scene.camera.sensor.height_px},
+          {"layers", scene.layers.size()},
+          {"seed", scene.seed},
+          {"nearest_depth_mm", truth.nearest_depth_mm},
+          {"farthest_depth_mm", truth.farthest_depth_mm},
+          {"largest_blur_sigma_px", truth.largest_blur_sigma_px},
+          {"truth",
+           {{"image_distance_mm", truth.image_distance_mm},
+            {"focus_depth_mm", truth.focus_depth_mm},
+            {"blur_ratio", truth.blur_ratio},
+            {"blur_floor_px", truth.blur_floor_px}}},
+          {"seconds", seconds.count()}};
+}
+
+std::string SamplingText(const model::SceneSimulationOptions& scene,
+                         const model::SceneSimulator& simulator) {
+  const double error = simulator.sampling_error_grey_levels();
+  const double asked = scene.sampling_error_grey_levels;
+  return fmt::format("sampling error where it is largest: about {:.2g} grey levels rms{}\n", error,
+                     error > asked && asked > 0
+                         ? fmt::format(", above the {:.2g} asked for: rays_per_pixel is {}", asked,
+                                       scene.rays_per_pixel)
+                         : "");
+}
+
+Attribution Attribute(const SceneOptions& options, const model::SceneSimulationOptions& scene,
+                      const std::vector<model::LayerPixels>& pixels) {
+  Attribution attribution;
+  std::optional<model::SweepSimulationOptions> sweep;
+  if (!options.sweep_path.empty()) {  // read before anything long
+    sweep = model::ReadSweepSimulation(options.sweep_path);
+    if (options.seed) sweep->seed = static_cast<std::uint64_t>(*options.seed);
+  }
+  // The sweep first: it may have no calibration to compare with.
+  if (sweep) {
+    ProgressLine progress("attributing the sweep", options.common.quiet);
+    attribution.sweep = AttributeSweepOf(options.sweep_path, *sweep, false,
+                                         AttributionRunWith(options.common, &progress));
+  }
+  ProgressLine progress("attributing", options.common.quiet);
+  attribution.scene = AttributeScene(scene, pixels, AttributionRunWith(options.common, &progress));
+  return attribution;
+}
+
+CommandResult SimulatePicture(const SceneOptions& options) {
+  const auto start = Clock::now();
+  const model::SceneSimulationOptions scene = ReadConfig(options);
+  OutputFolder folder(options.output_folder, kPictureMarker,
+                      {"picture.png", "depth.pfm", "camera.yaml", kPictureMarker, kAttributionPage,
+                       kAttributionTable});
+
+  const std::vector<model::LayerPixels> pixels = io::ReadScenePixels(scene);
+  const model::SceneSimulator simulator(scene, pixels, options.common.threads);
+  const model::RawDepthMap depth = simulator.RenderDepth();
+  const model::SceneTruth truth = simulator.Truth(depth);
+  int bits = 0;
+  {
+    ProgressLine progress("rendering", options.common.quiet);
+    const model::LinearPicture picture =
+        simulator.RenderNoiseless(RunWith(options.common, &progress));
+    const model::StoredPicture stored = simulator.Store(picture);
+    bits = stored.bits;
+    folder.Write("picture.png",
+                 io::WithDescription(io::EncodePng(stored),
+                                     fmt::format("simulated; effects: {}",
+                                                 model::JoinedNames(simulator.effects().on))));
+  }
+  folder.Write("depth.pfm", io::EncodePfm(depth));
+  folder.Write("camera.yaml", model::CameraToYaml(simulator.camera()));
+  folder.Write(kPictureMarker, model::SceneTruthToYaml(truth));
+  Attribution attribution;
+  if (options.attribute) {
+    attribution = Attribute(options, scene, pixels);
+    WriteAttribution(attribution, options.config_path, &folder);
+  }
+  ThrowIfCancelled();
+  folder.Commit();
+
+  CommandResult result;
+  result.is_written = true;
+  result.summary = Summary(options, scene, truth, start);
+  result.summary["bits"] = bits;
+  result.summary["effects"] = EffectsJson(simulator.effects());
+  result.summary["sampling_error_grey_levels"] = simulator.sampling_error_grey_levels();
+  result.summary["rays_per_pixel"] = scene.rays_per_pixel;
+  result.summary["mean_rays_per_pixel"] = simulator.mean_rays_per_pixel();
+  PrintResult(
+      options.common,
+      fmt::format("a picture of {} x {} px, depths from {:.6g} to {:.6g} mm, blur sigma up "
+                  "to {:.3g} px, in {:.1f} s: {}\n",
+                  scene.camera.sensor.width_px, scene.camera.sensor.height_px,
+                  truth.nearest_depth_mm, truth.farthest_depth_mm, truth.largest_blur_sigma_px,
+                  result.summary["seconds"].get<double>(), options.output_folder) +
+          EffectsText(simulator.effects()) + SamplingText(scene, simulator) +
+          (options.attribute ? AttributionText(attribution) : ""));
+  if (options.attribute) result.summary["attribution"] = AttributionJson(attribution);
+  return result;
+}
+
+CommandResult SimulateLightField(const SceneOptions& options) {
+  const auto start = Clock::now();
+  const model::SceneSimulationOptions scene = ReadConfig(options);
+  OutputFolder folder(options.output_folder, io::kLightFieldMarker, io::LightFieldEntries());
+
+  const model::SceneSimulator simulator(scene, io::ReadScenePixels(scene), options.common.threads);
+  std::size_t clipped = 0;
+  {
+    ProgressLine progress("rendering", options.common.quiet);
+    model::LightField light_field = simulator.RenderLightField(scene.u_count, scene.v_count,
+                                                               RunWith(options.common, &progress));
+    light_field.origin.version = Version();
+    light_field.origin.date = NowIso8601();
+    const io::ViewFormat format =
+        options.format == "tiff" ? io::ViewFormat::kTiff : io::ViewFormat::kPng;
+    clipped = io::WriteLightField(light_field, format, &folder);
+  }
+  const model::SceneTruth truth = simulator.Truth(simulator.RenderDepth());
+  ThrowIfCancelled();
+  folder.Commit();
+
+  CommandResult result;
+  result.is_written = true;
+  result.summary = Summary(options, scene, truth, start);
+  result.summary["views"] = {scene.u_count, scene.v_count};
+  result.summary["clipped_values"] = clipped;
+  result.summary["effects_of_views"] = simulator.effects_of_views().Names();
+  PrintResult(
+      options.common,
+      fmt::format("{} x {} views of {} x {} px in {:.1f} s: {}\n", scene.u_count, scene.v_count,
+                  scene.camera.sensor.width_px, scene.camera.sensor.height_px,
+                  result.summary["seconds"].get<double>(), options.output_folder) +
+          fmt::format("effects of the views: {}\n",
+                      model::JoinedNames(simulator.effects_of_views())));
+  return result;
+}
+
+CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std::string& help,
+                          SceneOptions* options) {
+  CLI::App* command = simulate->add_subcommand(name, help);
+  command->add_option("config", options->config_path, "The scene")->required()->type_name("CONFIG");
+  command->add_option("-o,--output", options->output_folder, "Folder to write")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--seed", options->seed, "Replaces the config's seed")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
+  AddEffectOptions(command, &options->effects);
+  AddCommonOptions(command, &options->common);
+  return command;
+}
+
+}  // namespace
+
+void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
+  const auto picture = std::make_shared<SceneOptions>();
+  CLI::App* command =
+      AddSceneCommand(simulate, "picture",
+                      "A photograph of a scene: picture.png, depth.pfm (z in mm), camera.yaml (the "
+                      "true calibration) and truth.yaml",
+                      picture.get());
+  command->add_flag("--attribute", picture->attribute,
+                    "Also simulate it without each effect in turn and estimate the light field of "
+                    "each, and tell what each changes: a table, attribution.csv and the page "
+                    "attribution.html");
+  command
+      ->add_option("--sweep", picture->sweep_path,
+                   "With --attribute: a simulated sweep (as of simulate sweep), to tell what each "
+                   "effect changes in its calibration")
+      ->type_name("SWEEP");
+  command->callback([picture, action] {
+    *action = [picture] {
+      if (!picture->sweep_path.empty() && !picture->attribute) {
+        throw UsageError("--sweep belongs to --attribute");
+      }
+      RequireDistinctFiles({picture->common.json_path, picture->output_folder},
+                           {picture->config_path, picture->sweep_path});
+      RunCommand(picture->common, [&] { return SimulatePicture(*picture); });
+    };
+  });
+
+  const auto views = std::make_shared<SceneOptions>();
+  command = AddSceneCommand(simulate, "light-field",
+                            "The true light field of a scene, as its views", views.get());
+  AddViewsOption(command, &views->views, "Replaces the config's views");
+  command
+      ->add_option("--uv-depth", views->uv_depth_mm,
+                   "Depth of the UV plane, 0: the aperture; replaces the config's uv_depth_mm")
+      ->check(Finite())
+      ->type_name("MM");
+  command
+      ->add_option("--format", views->format,
+                   "Of the views: png (16 bit, stored values) or tiff (float, linear light)")
+      ->check(CLI::IsMember({"png", "tiff"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command->callback([views, action] {
+    *action = [views] {
+      RequireDistinctFiles({views->common.json_path, views->output_folder}, {views->config_path});
+      RunCommand(views->common, [&] { return SimulateLightField(*views); });
+    };
+  });
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,214 @@
+// thicklens target: a sheet to be photographed for a calibration, at true scale.
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/model/camera_file.h"
+#include "tools/commands/commands.h"
+#include "tools/options/command_frame.h"
+#include "tools/options/option_values.h"
+#include "tools/report/target_drawing.h"
+#include "tools/report/target_page.h"
+#include "tools/report/target_texture.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr double kShortestSideMm = 50;
+constexpr double kLongestSideMm = 2000;
+constexpr double kMaxFeatureMm = 50;
+constexpr double kMaxDistanceMm = 1e6;
+constexpr double kLeastDpi = 72, kMostDpi = 4800;
+// Both axes of the edge's pixels get many phases, and the plateaus stay wide.
+constexpr double kLeastEdgeDeg = 2, kMostEdgeDeg = 20;
+
+enum class Format { kPdf, kSvg, kPng };
+
+struct NamedSheet {
+  const char* name;
+  double width_mm, height_mm;
+};
+constexpr std::array<NamedSheet, 3> kNamedSheets = {
+    {{"a4", 210, 297}, {"a3", 297, 420}, {"letter", 215.9, 279.4}}};
+
+struct TargetOptions {
+  CommonOptions common;
+  std::string output_path;
+  std::string size = "a4";
+  std::string camera_path;
+  double distance_mm = 0;
+  double dots_per_inch = 600;
+  std::optional<double> feature_mm;
+  std::int64_t seed = 1;
+  TargetRequest request;
+};
+
+Format FormatOf(const std::string& path) {
+  const std::string ending = std::filesystem::path(path).extension().string();
+  if (ending == ".pdf") return Format::kPdf;
+  if (ending == ".svg") return Format::kSvg;
+  if (ending == ".png") return Format::kPng;
+  throw UsageError(fmt::format("{}: a name that ends in .pdf, .svg or .png is expected", path));
+}
+
+SheetSize ParseSheet(const std::string& text) {
+  for (const NamedSheet& sheet : kNamedSheets) {
+    if (text == sheet.name) return {sheet.width_mm, sheet.height_mm, true};
+  }
+  const std::string form =
+      fmt::format("a4, a3, letter or WxH in mm from {:g} to {:g}", kShortestSideMm, kLongestSideMm);
+  const std::vector<double> sides_mm = SplitNumbers("--size", text, 'x', form);
+  const auto possible = [](double side_mm) {
+    return side_mm >= kShortestSideMm && side_mm <= kLongestSideMm;
+  };
+  if (sides_mm.size() != 2 || !possible(sides_mm[0]) || !possible(sides_mm[1])) {
+    throw UsageError(fmt::format("--size: {} is expected, found '{}'", form, text));
+  }
+  return {sides_mm[0], sides_mm[1], false};
+}
+
+nlohmann::json RectangleJson(const Rectangle& area) {
+  return {{"x_mm", area.x}, {"y_mm", area.y}, {"width_mm", area.width}, {"height_mm", area.height}};
+}
+
+nlohmann::json Summary(const TargetOptions& options, const TargetRequest& request,
+                       const TargetPage& page, std::size_t leaves) {
+  nlohmann::json summary = {{"status", "ok"},
+                            {"reason", ""},
+                            {"output", options.output_path},
+                            {"sheet_width_mm", page.width_mm},
+                            {"sheet_height_mm", page.height_mm},
+                            {"pattern", RectangleJson(page.pattern)},
+                            {"edge_patch", RectangleJson(page.patch)},
+                            {"edge_angle_deg", page.edge_angle_deg},
+                            {"bar", RectangleJson(page.bar)},
+                            {"smallest_feature_mm", page.feature_mm},
+                            {"smallest_feature_px", nullptr},
+                            {"two_tone", page.two_tone},
+                            {"seed", page.seed},
+                            {"leaves", leaves},
+                            {"caption", page.caption},
+                            {"choice", page.choice}};
+  if (request.view) {
+    summary["smallest_feature_px"] = page.feature_mm / request.view->px_mm;
+    summary["camera_view"] = {{"distance_mm", request.view->distance_mm},
+                              {"width_mm", request.view->width_mm},
+                              {"height_mm", request.view->height_mm},
+                              {"mm_per_px", request.view->px_mm}};
+  }
+  return summary;
+}
+
+CommandResult MakeTarget(const TargetOptions& options, Format format, TargetRequest request) {
+  if (!options.camera_path.empty()) {
+    const model::Camera camera = model::ReadCamera(options.camera_path);
+    TellAssumedFields(camera);
+    request.view = ViewOfTarget(camera, options.distance_mm);
+  }
+  const TargetPage page = LayOutTarget(request);
+  std::optional<PngSize> png_size;
+  if (format == Format::kPng) png_size = TargetPngSize(page, options.dots_per_inch);
+
+  OutputFile output(options.output_path);
+  const std::vector<Leaf> leaves = DeadLeaves(page);
+  const std::string bytes = format == Format::kPdf   ? TargetPdf(page, leaves)
+                            : format == Format::kSvg ? TargetSvg(page, leaves)
+                                                     : TargetPng(page, leaves, *png_size);
+  ThrowIfCancelled();
+  output.Commit(bytes);
+
+  CommandResult result;
+  result.is_written = true;
+  result.summary = Summary(options, request, page, leaves.size());
+  std::string size = fmt::format("sheet {:g} x {:g} mm", page.width_mm, page.height_mm);
+  if (png_size) {
+    result.summary["width_px"] = png_size->width_px;
+    result.summary["height_px"] = png_size->height_px;
+    result.summary["pixels_per_metre"] = png_size->pixels_per_metre;
+    size += fmt::format(", {} x {} px", png_size->width_px, png_size->height_px);
+  }
+  PrintResult(options.common,
+              fmt::format("{}: {}\n{}\nedge {:.1f} mm high, {:g} degrees from the vertical\nprint "
+                          "at 100 %, without scaling; the bar must then measure {:.1f} mm\n",
+                          options.output_path, size, page.choice, page.patch.height,
+                          page.edge_angle_deg, page.bar.width));
+  return result;
+}
+
+void AddTargetOptions(CLI::App* command, TargetOptions* options) {
+  command->add_option("-o,--output", options->output_path, "File to write: .pdf, .svg or .png")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--size", options->size, "Sheet: a4, a3, letter, or width x height in mm")
+      ->capture_default_str()
+      ->type_name("WxH");
+  CLI::Option* camera = command
+                            ->add_option("--camera", options->camera_path,
+                                         "Camera whose field the pattern has to fill")
+                            ->type_name("CAMERA.yaml");
+  CLI::Option* distance = command
+                              ->add_option("--distance-mm", options->distance_mm,
+                                           "From its aperture to the target in focus")
+                              ->check(Between(0, kMaxDistanceMm, "mm from the aperture"))
+                              ->needs(camera)
+                              ->type_name("Z");
+  camera->needs(distance);
+  command->add_option("--feature-mm", options->feature_mm, "Smallest feature; else it is chosen")
+      ->check(Between(0, kMaxFeatureMm, "mm on the sheet"))
+      ->type_name("S");
+  command
+      ->add_option("--finest-mm", options->request.finest_mm,
+                   "Smallest feature that the print method resolves")
+      ->check(Between(0, kMaxFeatureMm, "mm on the sheet"))
+      ->capture_default_str()
+      ->type_name("S");
+  command
+      ->add_option("--edge-angle-deg", options->request.edge_angle_deg,
+                   "Of the edge from the vertical, upper end to the right")
+      ->check(Between(kLeastEdgeDeg, kMostEdgeDeg, "degrees from the vertical"))
+      ->capture_default_str()
+      ->type_name("A");
+  command->add_flag("--two-tone", options->request.two_tone,
+                    "Black and white alone, for printers that make greys of dots");
+  command->add_option("--dpi", options->dots_per_inch, "Resolution of a .png, dots per inch")
+      ->check(Between(kLeastDpi, kMostDpi, "dots per inch"))
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--seed", options->seed, "Another seed, another texture")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->capture_default_str()
+      ->type_name("N");
+  AddCommonOptions(command, &options->common);
+}
+
+}  // namespace
+
+void AddTargetCommand(CLI::App* program, CommandAction* action) {
+  CLI::App* command =
+      program->add_subcommand("target", "A calibration target at true scale, to be printed");
+  const auto options = std::make_shared<TargetOptions>();
+  AddTargetOptions(command, options.get());
+  command->callback([options, action] {
+    *action = [options] {
+      const Format format = FormatOf(options->output_path);
+      TargetRequest request = options->request;
+      request.sheet = ParseSheet(options->size);
+      request.feature_mm = options->feature_mm;
+      request.seed = static_cast<std::uint64_t>(options->seed);
+      RequireDistinctFiles({options->output_path, options->common.json_path},
+                           {options->camera_path});
+      RunCommand(options->common, [&] { return MakeTarget(*options, format, request); });
+    };
+  });
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,155 @@
+// The program: finds the command that is asked for, runs it, and tells a failure in one line.
+#include <fmt/format.h>
+#include <glog/logging.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <string>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/estimator/blas.h"
+#include "tools/commands/commands.h"
+#include "tools/options/option_values.h"
+#include "tools/system/build_info.h"
+#include "tools/system/interrupt.h"
+#include "tools/system/message_line.h"
+#include "tools/system/process_start.h"
+#include "tools/system/program_memory.h"
+#include "tools/system/sanitized.h"
+#include "tools/system/trusted_environment.h"
+
+namespace {
+
+using namespace thicklens;
+
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2 };
+
+void SetUpMessages() {
+  // Libraries keep still: what goes wrong is told by whoever asked them, with the file's name.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  FLAGS_minloglevel = google::GLOG_FATAL;  // Ceres logs through glog
+  FLAGS_logtostderr = true;                // and not into files of /tmp or the current folder
+  google::InitGoogleLogging("thicklens");
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("thicklens"));
+  spdlog::set_formatter(tools::MakeMessageFormatter());
+}
+
+int Fail(std::string message, ExitCode code) {
+  tools::BeginEnd(code);
+  while (!message.empty() && message.back() == '\n') message.pop_back();
+  spdlog::error("{}", message);
+  return code;
+}
+
+// A variable of the shell that was never set gives an empty text, which is never a value.
+void RequireNoEmptyValue(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_expected_min() == 0) continue;  // it may stand without a value
+    for (const std::string& value : option->results()) {
+      if (value.empty()) {
+        throw tools::UsageError(fmt::format("{}: a value is expected, found ''",
+                                            option->get_name(option->get_positional())));
+      }
+    }
+  }
+  for (const CLI::App* inner : command.get_subcommands()) RequireNoEmptyValue(*inner);
+}
+
+int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc, char** argv) {
+  try {
+    program->parse(argc, argv);
+  } catch (const CLI::Success& asked_for) {  // --help, --version
+    return program->exit(asked_for);
+  } catch (const CLI::ParseError& error) {
+    return Fail(fmt::format("{} (see --help)", error.what()), kUsage);
+  }
+  RequireNoEmptyValue(*program);
+  (*action)();
+  // Results that did not reach their file are a failure; a reader who went away is none.
+  errno = 0;
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    if (errno != EPIPE) {
+      throw Error(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
+    }
+  }
+  tools::BeginEnd(kDone);
+  return kDone;
+}
+
+int Main(int argc, char** argv) {
+  tools::KeepFreedMemory();
+  SetUpMessages();
+  tools::CatchSignals();
+  for (const auto& [name, value] : tools::ForgottenCaches())
+    spdlog::warn("{}", tools::RelativePathIsIgnored(name, value));
+  for (const std::string& line : tools::DistrustRelativePaths()) spdlog::warn("{}", line);
+  tools::RequireStack();
+  tools::WatchSignals();
+  const CancelScope scope(tools::ProgramToken());
+  CLI::App program(
+      "Thick-lens camera calibration from focus sweeps, and light fields from one picture",
+      "thicklens");
+  program.set_version_flag("--version", tools::BuildInfo(), "Version, and what it was built with");
+  program.require_subcommand(1);
+  tools::CommandAction action;
+  tools::AddSimulateCommand(&program, &action);
+  tools::AddCalibrateCommand(&program, &action);
+  tools::AddEstimateCommand(&program, &action);
+  tools::AddRenderCommand(&program, &action);
+  tools::AddCompareCommand(&program, &action);
+  tools::AddReportCommand(&program, &action);
+  tools::AddExplainCommand(&program, &action);
+  tools::AddBenchCommand(&program, &action);
+  tools::AddDoctorCommand(&program, &action);
+  tools::AddCameraCommand(&program, &action);
+  tools::AddTargetCommand(&program, &action);
+  return ParseAndRun(&program, &action, argc, argv);
+}
+
+// However the program ends, by main's return or by a library that calls exit(), nothing is left to
+// the ends of libraries: where memory is short the threads that OpenBLAS starts with the program
+// ask for some again and again, and its end would wait for theirs forever. Sanitizers tell at the
+// end what they found.
+void EndWithoutLibraries() {
+#if defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
+  ::on_exit(
+      [](int status, void*) {
+        std::fflush(nullptr);
+        std::_Exit(status);
+      },
+      nullptr);
+#endif
+}
+
+int Run(int argc, char** argv) {
+  try {
+    return Main(argc, argv);
+  } catch (const tools::UsageError& error) {
+    return Fail(error.what(), kUsage);
+  } catch (const std::bad_alloc&) {
+    return Fail("out of memory", kFailed);
+  } catch (const cv::Exception& error) {
+    // OpenCV says it this way, too, when memory is short.
+    return Fail(error.code == cv::Error::StsNoMem ? "out of memory" : error.what(), kFailed);
+  } catch (const std::exception& error) {
+    return Fail(error.what(), kFailed);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  EndWithoutLibraries();
+  thicklens::estimator::KeepBlasToOneThread();
+  return Run(argc, argv);
+}

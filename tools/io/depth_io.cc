@@ -1,0 +1,174 @@
+#include "thicklens/io/depth_io.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/printable_text.h"
+#include "tools/io/picture_kind.h"
+#include "tools/io/png_check.h"
+
+namespace thicklens::io {
+namespace {
+
+constexpr int kMaxImageSizePx = 100000;
+constexpr char kPfmHeader[] = "\"Pf\", width, height and a scale that is not 0";
+
+bool StartsWith(const std::string& bytes, const std::string& start) {
+  return bytes.compare(0, start.size(), start) == 0;
+}
+
+bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+// The next word of the header; `at` is left behind it.
+std::string NextWord(const std::string& bytes, std::size_t* at) {
+  constexpr std::size_t kLongest = 40;
+  while (*at < bytes.size() && IsSpace(bytes[*at])) ++*at;
+  const std::size_t begin = *at;
+  while (*at < bytes.size() && !IsSpace(bytes[*at]) && *at - begin < kLongest) ++*at;
+  return bytes.substr(begin, *at - begin);
+}
+
+template <typename Number>
+std::optional<Number> NumberOf(const std::string& word) {
+  Number value{};
+  const auto [rest, status] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (status != std::errc() || rest != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+Error WrongPfmHeader(const std::string& name, const std::string& word) {
+  return Error(fmt::format("{}: broken PFM header: {} are expected, found '{}'", name, kPfmHeader,
+                           PrintableUtf8(word)));
+}
+
+float FloatFromBytes(const char* bytes, bool little_endian) {
+  std::uint32_t bits = 0;
+  for (int i = 0; i < 4; ++i) {
+    const auto byte = static_cast<std::uint8_t>(bytes[little_endian ? 3 - i : i]);
+    bits = bits << 8 | byte;
+  }
+  float value = 0;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+// The magnitude of the scale is the unit of the picture's light; for depth it means nothing.
+model::RawDepthMap DecodePfm(const std::string& bytes, const std::string& name) {
+  std::size_t at = 2;  // behind "Pf"
+  model::RawDepthMap map;
+  for (int* size_px : {&map.width_px, &map.height_px}) {
+    const std::string word = NextWord(bytes, &at);
+    const auto size = NumberOf<int>(word);
+    if (!size || *size < 1 || *size > kMaxImageSizePx) throw WrongPfmHeader(name, word);
+    *size_px = *size;
+  }
+  const std::string word = NextWord(bytes, &at);
+  const auto scale = NumberOf<double>(word);
+  if (!scale || !std::isfinite(*scale) || *scale == 0 || at == bytes.size())
+    throw WrongPfmHeader(name, word);
+  ++at;  // one white space, then the values
+
+  const auto width = static_cast<std::size_t>(map.width_px);
+  const auto height = static_cast<std::size_t>(map.height_px);
+  const std::size_t expected = width * height * sizeof(float);
+  if (bytes.size() - at != expected) {
+    throw Error(fmt::format("{}: broken PFM: {} bytes of values for {}x{} px: {} are expected",
+                            name, bytes.size() - at, map.width_px, map.height_px, expected));
+  }
+  map.values.resize(width * height);
+  for (std::size_t row = 0; row < height; ++row) {
+    ThrowIfCancelled();
+    const char* stored = bytes.data() + at + (height - 1 - row) * width * sizeof(float);
+    for (std::size_t x = 0; x < width; ++x)
+      map.values[row * width + x] = FloatFromBytes(stored + x * sizeof(float), *scale < 0);
+  }
+  return map;
+}
+
+std::string TypeName(const cv::Mat& picture) {
+  static const char* const kNames[] = {"8-bit",         "signed 8-bit",  "16-bit",
+                                       "signed 16-bit", "signed 32-bit", "32-bit float",
+                                       "64-bit float",  "16-bit float"};
+  return fmt::format("{} values in {} channel(s)", kNames[picture.depth()], picture.channels());
+}
+
+const std::vector<PictureKind> kDepthKinds = {PictureKind::kPng, PictureKind::kTiff,
+                                              PictureKind::kExr};
+
+// A PNG of fewer bits would be spread over 8 when decoded.
+bool IsAsExpected(const cv::Mat& picture, PictureKind kind, const std::string& bytes) {
+  if (kind == PictureKind::kPng)
+    return PngBits(bytes) >= 8 && (picture.type() == CV_8UC1 || picture.type() == CV_16UC1);
+  return picture.type() == CV_32FC1 || (kind == PictureKind::kTiff && picture.type() == CV_16UC1);
+}
+
+std::string ExpectedOf(PictureKind kind) {
+  if (kind == PictureKind::kPng) return "a PNG depth map has 8- or 16-bit values";
+  if (kind == PictureKind::kTiff) return "a TIFF depth map has 16-bit or 32-bit float values";
+  return "an EXR depth map has float values";
+}
+
+cv::Mat Decode(const std::string& bytes, const std::string& name) {
+  std::string why;
+  cv::Mat picture = DecodeUnchanged(bytes, name, kDepthKinds, &why);
+  if (!picture.empty()) return picture;
+  throw Error(fmt::format("{}: cannot be decoded as a depth map ({} bytes){}", name, bytes.size(),
+                          why.empty() ? "" : ": " + why));
+}
+
+}  // namespace
+
+model::RawDepthMap ReadDepthMap(const std::string& path) {
+  const std::string bytes = ReadWholeFile(path);
+  if (StartsWith(bytes, "PF") && bytes.size() > 2 && IsSpace(bytes[2]))
+    throw Error(fmt::format("{}: a PFM of three channels; a depth map has one", path));
+  if (StartsWith(bytes, "Pf")) return DecodePfm(bytes, path);
+  const std::optional<PictureKind> kind = KindOfPicture(bytes);
+  if (!kind || std::find(kDepthKinds.begin(), kDepthKinds.end(), *kind) == kDepthKinds.end()) {
+    throw Error(fmt::format("{}: no depth map: a PFM, PNG, TIFF or EXR file is expected", path));
+  }
+  const cv::Mat picture = Decode(bytes, path);
+  if (!IsAsExpected(picture, *kind, bytes)) {
+    throw Error(fmt::format(
+        "{}: {} in one channel, found {}{}", path, ExpectedOf(*kind), TypeName(picture),
+        *kind == PictureKind::kPng ? fmt::format(" ({} bits in the file)", PngBits(bytes)) : ""));
+  }
+  model::RawDepthMap map{picture.cols, picture.rows, {}, picture.depth() != CV_32F};
+  cv::Mat values;
+  picture.convertTo(values, CV_32F);  // exact: float holds every 16-bit number
+  map.values.reserve(values.total());
+  for (int y = 0; y < values.rows; ++y) {
+    ThrowIfCancelled();
+    const auto* row = values.ptr<float>(y);
+    map.values.insert(map.values.end(), row, row + values.cols);
+  }
+  return map;
+}
+
+std::string EncodePfm(const model::RawDepthMap& map) {
+  std::string bytes = fmt::format("Pf\n{} {}\n-1.0\n", map.width_px, map.height_px);
+  const auto width = static_cast<std::size_t>(map.width_px);
+  bytes.reserve(bytes.size() + map.values.size() * sizeof(float));
+  for (int y = map.height_px - 1; y >= 0; --y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      std::uint32_t bits = 0;
+      std::memcpy(&bits, &map.values[static_cast<std::size_t>(y) * width + x], sizeof bits);
+      for (int i = 0; i < 4; ++i) bytes += static_cast<char>(bits >> (8 * i) & 0xFFU);
+    }
+  }
+  return bytes;
+}
+
+}  // namespace thicklens::io

@@ -1,0 +1,42 @@
+#include "thicklens/io/frame_files.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/yaml_reader.h"
+#include "thicklens/io/data_hash.h"
+#include "thicklens/io/image_io.h"
+
+namespace thicklens::io {
+
+FrameFiles::FrameFiles(std::vector<model::SweepFrame> frames)
+    : frames_(std::move(frames)), digests_(frames_.size()) {}
+
+std::string FrameFiles::ReadAndDigest(std::size_t index) {
+  std::string bytes = ReadWholeFile(frames_.at(index).image);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!digests_[index].empty()) return bytes;
+  }
+  std::string digest = Sha256Hex(bytes);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  digests_[index] = std::move(digest);
+  return bytes;
+}
+
+cv::Mat FrameFiles::Read(std::size_t index) {
+  return DecodePicture(ReadAndDigest(index), frames_.at(index).image);
+}
+
+std::string FrameFiles::DataSha256() {
+  std::string lines;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (digests_[i].empty()) ReadAndDigest(i);
+    lines += fmt::format("{} {}\n", digests_[i], YamlNumber(frames_[i].reading_mm));
+  }
+  return Sha256Hex(lines);
+}
+
+}  // namespace thicklens::io

@@ -1,0 +1,28 @@
+#ifndef THICKLENS_IO_DATA_HASH_H_
+#define THICKLENS_IO_DATA_HASH_H_
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace thicklens::io {
+
+// SHA-256 of data that arrives in pieces.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  void Add(std::string_view bytes);
+  // Call this once, at the end. Returns lower-case hexadecimal, as sha256sum prints it.
+  std::string Hex();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+std::string Sha256Hex(std::string_view bytes);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_IO_DATA_HASH_H_

@@ -1,0 +1,39 @@
+#ifndef THICKLENS_IO_EXIF_H_
+#define THICKLENS_IO_EXIF_H_
+
+#include <optional>
+#include <string>
+
+namespace thicklens::io {
+
+// A photograph's statements about the camera that took it. Absent: not stated, or not usable.
+struct PhotoExif {
+  std::optional<double> focal_length_mm;
+  std::optional<double> f_number;
+  std::optional<double> pixel_pitch_mm;
+  std::string why_no_pitch;  // set if pixel_pitch_mm is absent
+  std::string model;
+  // Distance that the lens was focused at; infinite if EXIF says so.
+  std::optional<double> subject_distance_mm;
+  std::optional<double> focal_length_35mm;  // equivalent of a frame of 36 x 24 mm
+  std::optional<double> digital_zoom;       // ratio; 1: none
+  // The image as the camera made it, before it was scaled or cropped.
+  std::optional<int> made_width_px, made_height_px;
+  std::optional<double> made_pixel_pitch_mm;
+  int orientation = 1;  // 1 to 8; 1: as stored
+
+  // Returns whether EXIF states nothing that can be compared with a camera file.
+  bool IsEmpty() const;
+};
+
+// Throws Error if the file cannot be read as an image with metadata. A photograph without EXIF
+// gives an empty result. `width_px` and `height_px` are those of the images that the camera file is
+// for.
+PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px);
+// Reads a file that need not be able to hold EXIF. The result is empty if it cannot, and if its
+// metadata is damaged; `why` then gets the reason.
+PhotoExif ReadExifIfAny(const std::string& path, int width_px, int height_px, std::string* why);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_IO_EXIF_H_

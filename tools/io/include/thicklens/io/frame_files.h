@@ -1,0 +1,36 @@
+#ifndef THICKLENS_IO_FRAME_FILES_H_
+#define THICKLENS_IO_FRAME_FILES_H_
+
+#include <cstddef>
+#include <mutex>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/sweep_file.h"
+
+namespace thicklens::io {
+
+// The image files of a sweep, read on request; several threads may read.
+class FrameFiles {
+ public:
+  explicit FrameFiles(std::vector<model::SweepFrame> frames);
+
+  cv::Mat Read(std::size_t index);  // throws Error naming the file
+
+  // SHA-256 over lines "digest reading", one for each frame in the sweep's order, where digest is
+  // that of the file's bytes and reading is in mm. The digest of a file is computed when the file
+  // is first read, or here.
+  std::string DataSha256();
+
+ private:
+  std::string ReadAndDigest(std::size_t index);
+
+  std::vector<model::SweepFrame> frames_;
+  std::vector<std::string> digests_;  // empty: not read yet
+  std::mutex mutex_;
+};
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_IO_FRAME_FILES_H_

@@ -1,0 +1,28 @@
+#ifndef THICKLENS_IO_IMAGE_IO_H_
+#define THICKLENS_IO_IMAGE_IO_H_
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "thicklens/model/scene.h"
+
+namespace thicklens::io {
+
+// Decodes the image in the bytes of a file, exactly as stored: 8 or 16 bit; 1, 3 (RGB) or 4 (RGBA)
+// channels; never rotated. Throws Error that begins with `name`.
+cv::Mat DecodePicture(const std::string& bytes, const std::string& name);
+cv::Mat ReadPictureFile(const std::string& path);
+
+model::StoredPicture ToStoredPicture(const cv::Mat& picture);
+// Returns the first three of four channels, and other images unchanged: alpha contains no light.
+model::StoredPicture WithoutAlpha(const model::StoredPicture& picture);
+
+// Encodes a PNG file of 1, 3 or 4 channels, 8 or 16 bit. The compression is light: a stronger one
+// takes much longer and hardly makes the noise of a photograph smaller.
+std::string EncodePng(const model::StoredPicture& picture);
+// Encodes bytes unchanged in one channel. Throws Error if they are not rows of that width.
+std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_IO_IMAGE_IO_H_

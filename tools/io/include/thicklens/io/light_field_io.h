@@ -1,0 +1,99 @@
+#ifndef THICKLENS_IO_LIGHT_FIELD_IO_H_
+#define THICKLENS_IO_LIGHT_FIELD_IO_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/base/output_file.h"
+#include "thicklens/model/light_field.h"
+#include "thicklens/model/stored_levels.h"
+
+namespace thicklens::io {
+
+// The user's options for a light field that is read; see light_field_options.h.
+struct LightFieldReading {
+  int grid = 0;  // --grid: row length of the HCI numbering; 0: from parameters.cfg, or square
+  bool sparse = false;  // --sparse: any set of views may be present
+  // --views: the inner ones; 0: all
+  int u_count = 0, v_count = 0;
+  std::optional<model::PixelRect> crop;  // --crop
+};
+
+// Reads a folder of our layout (lightfield.yaml) or of the HCI layout (input_CamNNN.png row-major,
+// NNN = grid * v + u, and parameters.cfg if it exists), then takes the inner views and the crop.
+// HCI light fields are relative, sRGB, with uniform weights. Throws Error that names the folder and
+// the view that is missing, broken or of another size. Unless `sparse` is set, a view that is
+// missing within the smallest rectangle that holds the others is such an Error.
+model::LightField ReadLightField(const std::string& folder, const LightFieldReading& reading);
+
+enum class ViewFormat {
+  kPng,   // 16 bit, encoded by the light field's transfer curve, clipped
+  kTiff,  // float, linear light
+};
+// Entries that a folder of our layout may hold, for OutputFolder.
+extern const char kLightFieldMarker[];  // "lightfield.yaml"
+std::vector<std::string> LightFieldEntries();
+
+// Writes a light field of which only some views are in memory at a time. Views are written as they
+// are made, in any order and from several threads at once; their description follows at the end.
+class LightFieldWriter {
+ public:
+  // `folder` is not owned and must outlive the writer; the caller commits it.
+  LightFieldWriter(const model::TransferCurve& transfer, ViewFormat format, OutputFolder* folder);
+
+  void WriteView(int k, int l, const model::LinearPicture& view);
+  // Writes one byte for each ray, row by row (docs/file-formats.md). Call it for all views or for
+  // none.
+  void WriteConfidence(int k, int l, const std::vector<std::uint8_t>& confidence, int width_px);
+  // Call this after the last view. The values of `light_field` are not read. Returns the number of
+  // clipped values.
+  std::size_t Finish(const model::LightField& light_field);
+
+  // Returns the bytes that the writer needs besides a view of `values` values while it writes it.
+  double BytesForView(double values) const;
+  // Number of rays with each confidence.
+  const std::array<std::size_t, 256>& confidence_counts() const { return confidence_counts_; }
+  double seconds() const { return seconds_; }  // time spent on views, summed over the threads
+
+ private:
+  const model::TransferCurve transfer_;
+  std::optional<model::StoredLevels> levels_;  // levels of PNG files
+  const ViewFormat format_;
+  OutputFolder* folder_;
+  std::mutex mutex_;
+  std::size_t clipped_ = 0;
+  std::array<std::size_t, 256> confidence_counts_{};
+  bool has_confidence_ = false;
+  double seconds_ = 0;
+};
+
+// Writes all views that are present.
+void WriteViews(const model::LightField& light_field, LightFieldWriter* writer);
+
+// Writes views/view_VV_UU.png or .tiff, lightfield.yaml, and camera.yaml if there is a camera,
+// below the folder's staging path; the caller commits. Returns the number of clipped values.
+std::size_t WriteLightField(const model::LightField& light_field, ViewFormat format,
+                            OutputFolder* folder);
+
+// Writes the HCI layout: input_CamNNN.png (8 bit sRGB) and parameters.cfg, below the staging path.
+// Returns the number of clipped values.
+extern const char kHciMarker[];  // "parameters.cfg"
+std::size_t WriteHciLightField(const model::LightField& light_field, OutputFolder* folder);
+
+// Claims a folder for the HCI layout. The benchmark's own folders look the same, so a folder that
+// this program did not write is not replaced. Throws Error.
+OutputFolder ClaimHciFolder(const std::string& path);
+
+// Counts the values that a file of 8 or 16 bits cannot hold: those more than half a level below 0
+// or above full scale, and NaN.
+std::size_t CountClipped(const model::LinearPicture& picture, const model::TransferCurve& transfer,
+                         int bits);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_IO_LIGHT_FIELD_IO_H_

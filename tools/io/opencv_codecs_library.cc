@@ -1,0 +1,56 @@
+// The library that opencv_codecs.h speaks of. Nothing else of the program may include imgcodecs.
+#include <cstddef>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "tools/io/opencv_codecs.h"
+
+namespace thicklens::io {
+namespace {
+
+// OpenCV keeps colours as BGR; the project as RGB. Of depths that nobody asked for it is not known
+// how to; they are told by their type.
+cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
+  const int channels = picture.channels(), depth = picture.depth();
+  const bool has_colours = channels == 3 || channels == 4;
+  const bool is_known = depth == CV_8U || depth == CV_16U || depth == CV_32F;
+  if (picture.empty() || !has_colours || !is_known) return picture;
+  cv::Mat swapped;
+  cv::cvtColor(picture, swapped, channels == 3 ? cv::COLOR_BGR2RGB : cv::COLOR_BGRA2RGBA);
+  return swapped;
+}
+
+cv::Mat Decode(const std::string& bytes, std::string* why) {
+  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
+    *why = "it is larger than the 2 GiB that OpenCV decodes";
+    return {};
+  }
+  try {
+    // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
+    // pixels as the sensor gave them.
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
+                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
+    return SwapRedAndBlue(cv::imdecode(buffer, cv::IMREAD_UNCHANGED));
+  } catch (const cv::Exception& error) {
+    *why = error.err;  // e.g. that OpenCV was built, or started, without EXR
+    return {};
+  }
+}
+
+std::vector<unsigned char> EncodeJpeg(const cv::Mat& picture, int quality) {
+  std::vector<unsigned char> bytes;
+  const bool done =
+      cv::imencode(".jpg", SwapRedAndBlue(picture), bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return done ? bytes : std::vector<unsigned char>();
+}
+
+}  // namespace
+}  // namespace thicklens::io
+
+extern "C" __attribute__((visibility("default"))) const thicklens::io::OpenCvCodecs*
+ThicklensOpenCvCodecs() {
+  static const thicklens::io::OpenCvCodecs codecs{thicklens::io::Decode, thicklens::io::EncodeJpeg};
+  return &codecs;
+}

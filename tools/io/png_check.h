@@ -1,0 +1,27 @@
+#ifndef THICKLENS_TOOLS_IO_PNG_CHECK_H_
+#define THICKLENS_TOOLS_IO_PNG_CHECK_H_
+
+#include <string>
+
+namespace thicklens::io {
+
+// Throws Error that begins with `name` if the bytes are a PNG file that ends early or has a damaged
+// chunk; other files pass. Call it before such a file is decoded: decoders know neither the file's
+// name nor the position of the chunk.
+void RequireWholePng(const std::string& bytes, const std::string& name);
+
+// Returns a PNG file without chunks that do not affect the look of its pixels: texts, which may
+// decompress to any size, profiles, and a merely suggested palette. Other files, and files that end
+// early, are returned unchanged.
+std::string WithoutPngTexts(const std::string& bytes);
+
+// Bits of each value of a PNG file; 0 for other files.
+int PngBits(const std::string& bytes);
+
+// Returns a PNG file with its resolution: the chunk pHYs, by which programs print it at its true
+// size. `png` must be complete and have no resolution yet.
+std::string WithPngResolution(const std::string& png, int pixels_per_metre);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_PNG_CHECK_H_

@@ -1,0 +1,25 @@
+#ifndef THICKLENS_TOOLS_IO_PNG_PIXELS_H_
+#define THICKLENS_TOOLS_IO_PNG_PIXELS_H_
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+namespace thicklens::io {
+
+// Decodes the pixels of a PNG file as they are stored, with libspng: 8 or 16 bits (fewer are spread
+// over 8); 1, 3 (RGB) or 4 channels (RGBA: also for grey with alpha, and for images other than grey
+// with a transparent colour). Empty if they cannot be decoded; `why` then gets the reason.
+cv::Mat DecodePngPixels(const std::string& bytes, std::string* why);
+
+enum class PngPacking {
+  kFast,         // for noise, which stronger compression hardly makes smaller
+  kRepetitions,  // for flat areas
+  kSmall,        // the strongest compression
+};
+
+// Encodes 8 or 16 bits; 1, 3 (RGB) or 4 (RGBA) channels. Throws Error if memory is short.
+std::string EncodePngPixels(const cv::Mat& picture, PngPacking packing);
+
+}  // namespace thicklens::io
+
+#endif  // THICKLENS_TOOLS_IO_PNG_PIXELS_H_

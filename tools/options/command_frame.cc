@@ -1,0 +1,132 @@
+#include "tools/options/command_frame.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/core/utility.hpp>
+#include <optional>
+#include <system_error>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/input_file.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/printable_text.h"
+#include "thicklens/base/temporaries.h"
+#include "tools/options/option_values.h"
+#include "tools/options/run_files.h"
+#include "tools/system/interrupt.h"
+#include "tools/system/message_line.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMaxThreads = 1024;
+constexpr char kStandardOutput[] = "-";
+
+// File names may be any bytes, JSON may not: what is no UTF-8 is replaced.
+std::string JsonText(const nlohmann::json& summary) {
+  return summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+// Whether why nothing came of a run may be written there. A person who has mixed up names may have
+// meant one of the inputs, and a run that is refused early does not know all of them.
+bool MayTellRefusal(const std::string& path) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return true;
+  try {
+    const std::string older = ReadOwnFile(path, kMaxTextBytes);
+    const std::size_t first = older.find_first_not_of(" \t\r\n");
+    return first == std::string::npos || older[first] == '{';
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+// Where --json goes: a file that is claimed before anything is done, or standard output.
+class SummaryOutput {
+ public:
+  explicit SummaryOutput(const std::string& path) : path_(path) {
+    if (!path_.empty() && path_ != kStandardOutput) file_.emplace(path_);
+  }
+
+  void Write(const nlohmann::json& summary) {
+    const std::string text = JsonText(summary);
+    if (path_ == kStandardOutput) std::fwrite(text.data(), 1, text.size(), stdout);
+    if (!file_) return;
+    file_->Commit(text);
+    spdlog::debug("{} written", path_);
+  }
+  void WriteRefusal(const std::string& reason) {
+    if (file_ && !MayTellRefusal(path_)) {
+      spdlog::warn("{}: holds no JSON and is left as it is; the reason is not written there",
+                   PrintableUtf8(path_));
+      return;
+    }
+    Write({{"status", "refused"}, {"reason", reason}});
+  }
+
+ private:
+  std::string path_;
+  std::optional<OutputFile> file_;
+};
+
+}  // namespace
+
+void AddCommonOptions(CLI::App* command, CommonOptions* options) {
+  command
+      ->add_option(
+          "--json", options->json_path,
+          "Write the results to this file, as JSON; -: to standard output, in place of the text")
+      ->type_name("FILE");
+  CLI::Option* quiet = command->add_flag("--quiet", options->quiet, "Print no results");
+  command->add_flag("--verbose", options->verbose, "Tell what is done")->excludes(quiet);
+  command->add_option("--threads", options->threads, "Threads to use; 0: one per core")
+      ->check(CLI::Range(0, kMaxThreads))
+      ->type_name("N");
+}
+
+void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command) {
+  if (options.verbose) spdlog::set_level(spdlog::level::debug);
+  // More than there are cores would not be faster, and the library below would complain.
+  cv::setNumThreads(std::min(ResolveThreads(options.threads), ResolveThreads(0)));
+  EnterRunOutput(options.json_path);
+  SummaryOutput summary(options.json_path);
+  CommandResult result;
+  try {
+    result = command();
+    if (!result.is_written) ThrowIfCancelled();
+  } catch (const Interrupted&) {
+    const std::vector<std::string> in_place = OutputsInPlace();
+    if (in_place.empty()) throw;
+    throw Error(InterruptedText(in_place));
+  } catch (const Error& error) {
+    RethrowIfInputWouldBeLost();
+    summary.WriteRefusal(MessageLine(error.what()));
+    throw;
+  }
+  summary.Write(result.summary);
+  if (!result.refusal.empty()) throw Error(result.refusal);
+}
+
+void PrintResult(const CommonOptions& options, const std::string& text) {
+  if (!options.quiet && options.json_path != kStandardOutput)
+    std::fwrite(text.data(), 1, text.size(), stdout);
+}
+
+void TellAssumedFields(const model::Camera& camera) {
+  for (const std::string& notice : camera.notices) spdlog::warn("{}", PrintableUtf8(notice));
+  const std::vector<std::string> fields = model::AssumedFields(camera);
+  if (fields.empty()) return;
+  spdlog::warn("camera '{}': assumed, neither published nor measured: {}",
+               PrintableUtf8(camera.name), fmt::join(fields, ", "));
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,150 @@
+#include "tools/options/effect_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+// Throws UsageError with the option's name for what the parser says is wrong.
+template <typename Parse>
+auto Parsed(const std::string& option, const Parse& parse) {
+  try {
+    return parse();
+  } catch (const Error& error) {
+    throw UsageError(fmt::format("{}: {}", option, error.what()));
+  }
+}
+
+std::string BoundText(const model::EffectFinding& finding) {
+  const double grey_levels = finding.impact.grey_levels;
+  if (grey_levels == 0) return "0";
+  if (grey_levels < 0.001) return "< 0.001";
+  return fmt::format("{:.3g}", grey_levels);
+}
+
+std::string CostText(model::Effect effect,
+                     const std::vector<std::pair<model::Effect, double>>& costs) {
+  for (const auto& [of, seconds] : costs) {
+    if (of == effect) return seconds == 0 ? "~0" : fmt::format("{:+.2g}", seconds);
+  }
+  return "-";
+}
+
+}  // namespace
+
+void AddEffectOptions(CLI::App* command, EffectOptions* options) {
+  command
+      ->add_option("--effects", options->effects,
+                   "Effects of image formation: auto (those that matter here), all, none, or names "
+                   "between commas (thicklens explain lists them)")
+      ->type_name("NAMES");
+  command->add_option("--without", options->without, "Effects to leave out in any case")
+      ->type_name("NAMES");
+  if (options->tolerance_option.empty()) return;
+  command
+      ->add_option(options->tolerance_option, options->tolerance,
+                   "What auto may leave out, all together: 0.5gl (grey levels of 255) or 0.1px")
+      ->type_name("AMOUNT");
+}
+
+void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model) {
+  model::EffectChoice named;
+  ApplyEffectOptions(options, &named);
+  for (const auto& [option, effects] :
+       {std::pair("--effects", named.given), std::pair("--without", named.without)}) {
+    const model::EffectSet foreign = effects.Without(of_model);
+    if (foreign.empty()) continue;
+    throw UsageError(fmt::format("{}: effect {} is not one of those there are here: {}", option,
+                                 model::JoinedNames(foreign), model::JoinedNames(of_model)));
+  }
+}
+
+void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice) {
+  if (options.effects && options.effects->empty()) {
+    throw UsageError("--effects: auto, all, none or names between commas are expected, found ''");
+  }
+  if (options.effects) {
+    const model::EffectChoice given =
+        Parsed("--effects", [&] { return model::EffectChoiceFromText(*options.effects, "", ""); });
+    choice->base = given.base;
+    choice->given = given.given;
+  }
+  if (options.without) {
+    choice->without =
+        Parsed("--without", [&] { return model::EffectSetFromNames(*options.without); });
+  }
+  if (options.tolerance) {
+    choice->tolerance = Parsed(options.tolerance_option,
+                               [&] { return model::EffectToleranceFromText(*options.tolerance); });
+  }
+}
+
+std::string EffectPlaceText(const model::EffectPlace& place) {
+  const std::string depth =
+      std::isfinite(place.depth_mm) ? fmt::format("{:.5g} mm", place.depth_mm) : "infinity";
+  return fmt::format("{}, at ({:.0f}, {:.0f})", depth, place.position_px.x(),
+                     place.position_px.y());
+}
+
+nlohmann::json EffectsJson(const model::EffectDecision& decision) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const model::EffectFinding& finding : decision.findings) {
+    const model::EffectFacts& facts = model::FactsOf(finding.effect);
+    const double depth_mm = finding.place.depth_mm;
+    json.push_back(
+        {{"name", facts.name},
+         {"impact", finding.impact.amount},
+         {"unit", model::EffectUnitName(facts.unit)},
+         {"bound_grey_levels", finding.impact.grey_levels},
+         {"random", facts.random},
+         {"on", decision.on.Has(finding.effect)},
+         {"where",
+          {{"depth_mm", std::isfinite(depth_mm) ? nlohmann::json(depth_mm) : nlohmann::json()},
+           {"position_px", {finding.place.position_px.x(), finding.place.position_px.y()}}}}});
+  }
+  return json;
+}
+
+std::string EffectsText(const model::EffectDecision& decision) {
+  std::string left_out;
+  for (const model::EffectFinding& finding : decision.findings) {
+    if (decision.on.Has(finding.effect)) continue;
+    left_out += fmt::format("{}{} ({})", left_out.empty() ? "" : ", ",
+                            model::EffectName(finding.effect), BoundText(finding));
+  }
+  return fmt::format("effects: {}; left out, with their bounds in grey levels: {}\n",
+                     model::JoinedNames(decision.on), left_out.empty() ? "none" : left_out);
+}
+
+std::string EffectsTable(const model::EffectDecision& decision,
+                         const std::vector<std::pair<model::Effect, double>>* cost_seconds) {
+  std::string text =
+      fmt::format("{:<15} {:>22} {:>13}{}  {:<4} {}\n", "effect", "largest impact", "grey levels",
+                  cost_seconds != nullptr ? fmt::format("{:>10}", "cost s") : "", "", "where");
+  for (const model::EffectFinding& finding : decision.findings) {
+    const model::EffectFacts& facts = model::FactsOf(finding.effect);
+    const std::string unit =
+        facts.unit == model::EffectUnit::kGreyLevels ? "levels" : model::EffectUnitName(facts.unit);
+    const std::string on = decision.on.Has(finding.effect) ? "on" : "off";
+    const std::string cost = cost_seconds != nullptr
+                                 ? fmt::format("{:>10}", CostText(finding.effect, *cost_seconds))
+                                 : "";
+    if (finding.impact.amount == 0 && finding.impact.grey_levels == 0) {
+      text += fmt::format("{:<15} {:>22} {:>13}{}  {}\n", facts.name, "none here", "0", cost, on);
+      continue;
+    }
+    text += fmt::format(
+        "{:<15} {:>22} {:>13}{}  {:<4} {}\n", facts.name,
+        fmt::format("{}{:.4g} {}", facts.random ? "sd " : "", finding.impact.amount, unit),
+        BoundText(finding), cost, on, EffectPlaceText(finding.place));
+  }
+  return text;
+}
+
+}  // namespace thicklens::tools

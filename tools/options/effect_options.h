@@ -1,0 +1,41 @@
+#ifndef THICKLENS_TOOLS_OPTIONS_EFFECT_OPTIONS_H_
+#define THICKLENS_TOOLS_OPTIONS_EFFECT_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "thicklens/model/effect_choice.h"
+
+namespace thicklens::tools {
+
+// The options --effects, --without and --tolerance of commands with a forward model. An absent
+// value was not given.
+struct EffectOptions {
+  std::optional<std::string> effects, without, tolerance;
+  std::string tolerance_option = "--tolerance";  // another name of the option; empty: there is none
+};
+void AddEffectOptions(CLI::App* command, EffectOptions* options);
+// Throws UsageError for named effects that the forward model does not have.
+void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_model);
+// Overrides `choice` with the given options. Throws UsageError.
+void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice);
+
+// "250 mm, at (0, 479)".
+std::string EffectPlaceText(const model::EffectPlace& place);
+// One entry for each effect: name, impact with its unit, bound in grey levels, on, where.
+nlohmann::json EffectsJson(const model::EffectDecision& decision);
+// One line on the effects that were on and those that were left out.
+std::string EffectsText(const model::EffectDecision& decision);
+// One line for each effect. `cost_seconds` may be null; otherwise it holds the costs of some
+// effects, shown in a column of their own.
+std::string EffectsTable(
+    const model::EffectDecision& decision,
+    const std::vector<std::pair<model::Effect, double>>* cost_seconds = nullptr);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_OPTIONS_EFFECT_OPTIONS_H_

@@ -1,0 +1,441 @@
+#include "tools/options/estimate_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "tools/options/light_field_effects.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kReportName[] = "index.html";
+constexpr int kMaxIterations = 1000000;
+
+std::optional<double> PositiveNumber(const std::string& text) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [read, failure] = std::from_chars(text.data(), end, value);
+  if (failure != std::errc() || read != end || !(value > 0) || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+CLI::Validator IsStrength() {
+  return {[](std::string& given) {
+            if (given == "auto" || given == "gcv" || PositiveNumber(given)) return std::string();
+            return fmt::format("auto, gcv or a number above 0 is expected, found '{}'", given);
+          },
+          ""};
+}
+
+// What a variable of the shell gives that was never set.
+CLI::Validator NotEmpty(const std::string& what) {
+  return {[what](std::string& given) {
+            return given.empty() ? what + " is expected, found ''" : std::string();
+          },
+          ""};
+}
+
+void AddInputOptions(CLI::App* command, EstimateOptions* options) {
+  command->add_option("picture", options->picture_path, "The photograph")
+      ->required()
+      ->type_name("IMAGE");
+  command->add_option("depth", options->depth_path, "Its depth map, pixel by pixel")
+      ->required()
+      ->type_name("DEPTH");
+  command
+      ->add_option("--camera", options->camera_path,
+                   "The calibrated camera; not needed for a disparity map")
+      ->type_name("CAMERA.yaml");
+  command
+      ->add_option("--sensor-origin", options->sensor_origin,
+                   "Where on the camera's sensor a picture of a part of it begins, px")
+      ->type_name("X,Y");
+  command->add_flag("--ignore-exif", options->ignore_exif,
+                    "Go on where the photograph's EXIF says that it was taken with another lens, "
+                    "setting or sensor than the camera file describes");
+  command->add_option("-o,--output", options->output_folder, "Folder for the light field")
+      ->required()
+      ->type_name("LF");
+  command
+      ->add_option("--report", options->report_folder,
+                   "Folder for index.html, a page that shows the estimate and what it knows of "
+                   "itself")
+      ->type_name("DIR");
+  AddDepthOptions(command, &options->depth);
+  AddCropOption(command, &options->crop);
+  command
+      ->add_option("--transfer", options->transfer,
+                   "How light became stored values: linear, srgb or gamma-2.2; default: what the "
+                   "camera's file says, without a camera srgb")
+      ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
+      ->type_name("NAME");
+}
+
+void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
+  AddViewsOption(command, &options->views, "Views across and down; default 7x7");
+  AddApertureShapeOption(command, &options->aperture_shape);
+  command
+      ->add_option(
+          "--aperture-of", options->aperture_of,
+          "Take the views, and which of them the photograph saw, from this light field; how "
+          "it weighs them too, where its lightfield.yaml states that, else by "
+          "--aperture-shape")
+      ->type_name("LF");
+  command->add_option("--grid", options->grid, "Of --aperture-of: row length of the HCI numbering")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N");
+  command->add_flag("--sparse", options->sparse, "Of --aperture-of: any set of views may be there");
+  command
+      ->add_option("--st-depth-mm", options->st_depth_mm,
+                   "Depth of the ST plane (UV is the aperture); default: the plane of focus")
+      ->check(Between(0, 1e9, "millimetres"))
+      ->type_name("MM");
+  command->add_flag("--keep-depth-noise", options->keep_depth_noise,
+                    "Takes the depth as it is, however noisy: it is smoothed along surfaces else");
+  command
+      ->add_option("--fill", options->fill,
+                   "What the centre view does not show: as the solver has it, or by the source's "
+                   "inpainting (telea), view by view, for comparison")
+      ->check(CLI::IsMember({"solver", "telea"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  AddEffectOptions(command, &options->effects);
+  command
+      ->add_option("--format", options->format,
+                   "Of the views: png (16 bit, stored values) or tiff (float, linear light)")
+      ->check(CLI::IsMember({"png", "tiff"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+}
+
+void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
+  command
+      ->add_option(
+          "--solver", options->solver,
+          "scene: the whole picture at once. For comparison: blocks, the source's, block by "
+          "block; functional and grid, the source's functional for the whole picture, on the rays "
+          "of scene points or of the views")
+      ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option("--memory-limit", options->memory_limit_mib,
+                   "For the whole program; scene then solves the picture in bands. Default of "
+                   "scene: four fifths of what is available")
+      ->check(Between(0, 1e9, "MiB"))
+      ->type_name("MIB");
+  AddDeviceOption(command, &options->device);
+}
+
+void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
+  command
+      ->add_option(
+          "--prior", options->prior,
+          "Of scene: what is taken for granted of the radiance: ridge, gradient, tv "
+          "(total variation, default) or patches (tv, few waves in a patch, and folds of the "
+          "depth show in the shading: better where depth and camera explain the picture "
+          "well, but slower)")
+      ->check(CLI::IsMember({"ridge", "gradient", "tv", "patches"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--strength", options->strength,
+                   "Of scene, of the prior: auto (from the picture's noise, default), gcv "
+                   "(cross-validation) or a number")
+      ->check(IsStrength())
+      ->type_name("RULE");
+  command->add_flag("--check-blur", options->check_blur,
+                    "Of scene: look whether the photograph asks for a narrower blur, or another "
+                    "plane of focus, than camera and depth say, and propose it; costs one more "
+                    "solve at half the size, and seven to seventeen where something may be wrong");
+}
+
+void AddFunctionalOptions(CLI::App* command, EstimateOptions* options) {
+  const estimator::FunctionalOptions usual;
+  command
+      ->add_option("--gamma", options->gamma,
+                   fmt::format("Of all but scene: weight of the smoothness along scene points; "
+                               "default {:g}",
+                               usual.gamma))
+      ->check(Finite())
+      ->type_name("X");
+  command
+      ->add_option("--ridge", options->ridge,
+                   "Of all but scene: weight mu of the distance to the warped picture; default "
+                   "0.01/(U V)")
+      ->check(Finite())
+      ->type_name("X");
+}
+
+void AddIterationOptions(CLI::App* command, EstimateOptions* options) {
+  const estimator::SceneOptions scene;
+  const estimator::FunctionalOptions functional;
+  command
+      ->add_option("--tolerance", options->tolerance,
+                   fmt::format("Of iterative solvers: relative residual at which they stop; "
+                               "default {:g} (scene with tv), {:g} (blocks) or {:g}",
+                               scene.tolerance_or_usual(), estimator::BlockOptions().tolerance,
+                               functional.tolerance))
+      ->check(Inside(0, 1, "a relative residual"))
+      ->type_name("X");
+  command
+      ->add_option(
+          "--max-iterations", options->max_iterations,
+          fmt::format("Of iterative solvers: in all (scene; default {}; as many for the relief of "
+                      "patches), for each channel (default {}), or for each block's "
+                      "(default {})",
+                      scene.max_iterations, functional.max_iterations,
+                      estimator::BlockOptions().max_iterations))
+      ->check(CLI::Range(1, kMaxIterations))
+      ->type_name("N");
+  command->add_flag("--double", options->double_precision,
+                    "Of all but blocks: numbers of 64 bit instead of 32");
+}
+
+void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
+  const std::string usual = estimator::BlockSolverName(estimator::DefaultBlockSolver());
+  command
+      ->add_option("--block-solver", options->block_solver,
+                   fmt::format("Of blocks: umfpack, cholmod or eigen; iterative, for comparison: "
+                               "cg, bicgstab or viennacl; default {}",
+                               usual))
+      ->check(CLI::IsMember({"umfpack", "cholmod", "eigen", "cg", "bicgstab", "viennacl"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--block-px", options->block_px,
+                   "Of blocks: their edge; default 16, or the largest that --memory-limit allows")
+      ->check(CLI::Range(1, 100000))
+      ->type_name("PX");
+  command
+      ->add_option("--stencil", options->stencil,
+                   "Of blocks, of the smoothness: warp (default), or the source's six differences")
+      ->check(CLI::IsMember({"warp", "source"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--splat", options->splat,
+                   "Of blocks: a ray reaches the two nearest pixels (bilinear, default), or the "
+                   "nearest")
+      ->check(CLI::IsMember({"nearest", "bilinear"}))
+      ->type_name("NAME");
+  command
+      ->add_option("--checkpoint", options->checkpoint_path,
+                   "Of blocks: keep each that is solved in this file, so that the same command "
+                   "goes on where it was interrupted; removed once the light field is there")
+      ->check(NotEmpty("a file's name"))
+      ->type_name("FILE");
+}
+
+// An option that not every solver has.
+struct OptionOfSolvers {
+  const char* name;
+  bool is_given;
+  std::vector<std::string> solvers;
+};
+
+std::vector<OptionOfSolvers> OptionsOfSolvers(const EstimateOptions& options) {
+  const std::vector<std::string> scene = {"scene"}, blocks = {"blocks"};
+  const std::vector<std::string> smooth = {"blocks", "functional", "grid"};
+  const std::vector<std::string> whole_picture = {"scene", "functional", "grid"};
+  std::vector<std::string> iterative = whole_picture;
+  if (options.block_solver &&
+      estimator::IsIterative(estimator::BlockSolverFromName(*options.block_solver))) {
+    iterative.emplace_back("blocks");
+  }
+  return {{"--prior", options.prior.has_value(), scene},
+          {"--strength", options.strength.has_value(), scene},
+          {"--check-blur", options.check_blur, scene},
+          {"--tolerance", options.tolerance.has_value(), iterative},
+          {"--max-iterations", options.max_iterations.has_value(), iterative},
+          {"--double", options.double_precision, whole_picture},
+          {"--gamma", options.gamma.has_value(), smooth},
+          {"--ridge", options.ridge.has_value(), smooth},
+          {"--block-solver", options.block_solver.has_value(), blocks},
+          {"--block-px", options.block_px.has_value(), blocks},
+          {"--stencil", options.stencil.has_value(), blocks},
+          {"--splat", options.splat.has_value(), blocks},
+          {"--checkpoint", !options.checkpoint_path.empty(), blocks}};
+}
+
+// "a", "a or b", "a, b or c".
+std::string Either(const std::vector<std::string>& names) {
+  if (names.size() < 2) return fmt::format("{}", fmt::join(names, ""));
+  return fmt::format("{} or {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
+}
+
+// The light field's folder is replaced as a whole; what lies in it would go with the older one.
+void RequireBesideLightField(const char* option, const std::string& path,
+                             const EstimateOptions& options) {
+  if (path.empty()) return;
+  const auto resolved = [](const std::string& given) {
+    std::error_code failure;
+    fs::path found = fs::weakly_canonical(fs::absolute(given), failure);
+    if (failure) found = fs::absolute(given).lexically_normal();
+    return found.has_filename() ? found : found.parent_path();
+  };
+  const fs::path inner = resolved(path);
+  const fs::path output = resolved(options.output_folder);
+  const auto differing = std::mismatch(inner.begin(), inner.end(), output.begin(), output.end());
+  if (differing.second == output.end()) {
+    throw UsageError(
+        fmt::format("{} {}: lies in the light field's folder {}; choose a name outside of it",
+                    option, path, options.output_folder));
+  }
+}
+
+}  // namespace
+
+std::string EstimateOptions::report_path() const {
+  return report_folder.empty() ? "" : (fs::path(report_folder) / kReportName).string();
+}
+
+void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
+  AddInputOptions(command, options);
+  AddLightFieldOptions(command, options);
+  AddSolverOptions(command, options);
+  AddSceneOptions(command, options);
+  AddIterationOptions(command, options);
+  AddFunctionalOptions(command, options);
+  AddBlockOptions(command, options);
+  AddPlanWishOptions(command, &options->wish);
+  command
+      ->add_option("--profile", options->profile_path,
+                   "What --quality, --within and --psnr-loss choose from, as bench accuracy "
+                   "--save-profile writes it; default: your own, or the one that ships")
+      ->type_name("FILE");
+  AddCommonOptions(command, &options->common);
+}
+
+void CheckSolverUsage(const EstimateOptions& options) {
+  for (const OptionOfSolvers& option : OptionsOfSolvers(options)) {
+    const auto& solvers = option.solvers;
+    if (!option.is_given ||
+        std::find(solvers.begin(), solvers.end(), options.solver) != solvers.end()) {
+      continue;
+    }
+    const bool is_iterations =
+        option.name == std::string("--tolerance") || option.name == std::string("--max-iterations");
+    throw UsageError(
+        fmt::format("{} is of --solver {}{}, the solver is {}", option.name, Either(solvers),
+                    options.by_blocks() && is_iterations
+                        ? ", or of blocks with an iterative --block-solver (cg, bicgstab, viennacl)"
+                        : "",
+                    options.solver));
+  }
+  if (options.block_solver == "viennacl" && options.device != "auto") {
+    throw UsageError(fmt::format(
+        "--device {} is not for --block-solver viennacl, which takes a device for itself (auto)",
+        options.device));
+  }
+  if (options.solver != "scene" && !options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
+    throw UsageError(fmt::format(
+        "--device {} is for --solver scene or blocks; the solver {} computes on the processor "
+        "(auto or cpu)",
+        options.device, options.solver));
+  }
+}
+
+void CheckEstimateUsage(const EstimateOptions& options) {
+  ViewCounts(options.views);
+  CropRect(options.crop);
+  const auto needs = [](bool given, bool met, const std::string& what) {
+    if (given && !met) throw UsageError(what);
+  };
+  const bool camera = !options.camera_path.empty();
+  const bool aperture_of = !options.aperture_of.empty();
+  needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
+  needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, which EXIF may contradict");
+  needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
+  needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
+  needs(IsLeftOut(options.effects, model::Effect::kApertureShape),
+        options.aperture_shape.empty() && !aperture_of,
+        "--aperture-shape and --aperture-of say which shape the aperture has; without the effect "
+        "aperture-shape it is Gaussian");
+  CheckSolverUsage(options);
+  needs(!options.profile_path.empty(), options.wish.IsMade(),
+        "--profile is what --quality, --within or --psnr-loss choose from, and none is given");
+  RequireBesideLightField("--report", options.report_folder, options);
+  RequireBesideLightField("--checkpoint", options.checkpoint_path, options);
+}
+
+estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress) {
+  estimator::SceneOptions solver;
+  if (options.prior) solver.prior = estimator::PriorFromName(*options.prior);
+  const std::string strength = options.strength.value_or("auto");
+  if (strength == "gcv") {
+    solver.strength_rule = estimator::StrengthRule::kGcv;
+  } else if (strength != "auto") {
+    solver.strength_rule = estimator::StrengthRule::kGiven;
+    solver.strength = PositiveNumber(strength).value_or(0);
+  }
+  if (options.tolerance) solver.tolerance = *options.tolerance;
+  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
+  solver.double_precision = options.double_precision;
+  solver.falloff = on.Has(model::Effect::kFalloff);
+  solver.threads = options.common.threads;
+  solver.memory_limit_mib = options.memory_limit_mib;
+  solver.progress = std::move(progress);
+  std::string why;
+  if (!solver.IsValid(&why)) throw Error(why);
+  return solver;
+}
+
+estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options,
+                                               const model::EffectSet& on, Progress progress) {
+  estimator::BlurCheckOptions check;
+  check.falloff = on.Has(model::Effect::kFalloff);
+  check.threads = options.common.threads;
+  check.memory_limit_mib = options.memory_limit_mib;
+  check.progress = std::move(progress);
+  return check;
+}
+
+estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress) {
+  estimator::BlockOptions solver;
+  if (options.block_solver) solver.solver = estimator::BlockSolverFromName(*options.block_solver);
+  if (options.stencil) solver.stencil = estimator::StencilFromName(*options.stencil);
+  if (options.splat == "nearest") solver.splat = kernels::Splat::kNearest;
+  if (options.gamma) solver.gamma = *options.gamma;
+  solver.ridge = options.ridge;
+  if (options.tolerance) solver.tolerance = *options.tolerance;
+  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
+  solver.block_px = options.block_px;
+  solver.memory_limit_mib = options.memory_limit_mib;
+  solver.falloff = on.Has(model::Effect::kFalloff);
+  solver.threads = options.common.threads;
+  solver.progress = std::move(progress);
+  std::string why;
+  if (!solver.IsValid(&why)) throw Error(why);
+  return solver;
+}
+
+estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options,
+                                                 const model::EffectSet& on, Progress progress) {
+  estimator::FunctionalOptions solver;
+  if (options.gamma) solver.gamma = *options.gamma;
+  solver.ridge = options.ridge;
+  if (options.tolerance) solver.tolerance = *options.tolerance;
+  if (options.max_iterations) solver.max_iterations = *options.max_iterations;
+  solver.double_precision = options.double_precision;
+  solver.falloff = on.Has(model::Effect::kFalloff);
+  solver.threads = options.common.threads;
+  solver.memory_limit_mib = options.memory_limit_mib;
+  solver.progress = std::move(progress);
+  std::string why;
+  if (!solver.IsValid(&why)) throw Error(why);
+  return solver;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,83 @@
+#ifndef THICKLENS_TOOLS_OPTIONS_ESTIMATE_OPTIONS_H_
+#define THICKLENS_TOOLS_OPTIONS_ESTIMATE_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/estimator/block_solver.h"
+#include "thicklens/estimator/blur_check.h"
+#include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/scene_solver.h"
+#include "tools/options/command_frame.h"
+#include "tools/options/effect_options.h"
+#include "tools/options/light_field_options.h"
+#include "tools/options/plan_wish.h"
+
+namespace thicklens::tools {
+
+// The command line of `thicklens estimate`. An empty or absent value was not given.
+struct EstimateOptions {
+  CommonOptions common;
+  std::string picture_path, depth_path, camera_path, output_folder, report_folder;
+  DepthOptions depth;
+  ViewsOption views;
+  CropOption crop;
+  std::string aperture_shape;
+  std::string aperture_of;  // a light field whose views give the positions on the aperture
+  int grid = 0;
+  bool sparse = false;
+  std::string sensor_origin;
+  bool ignore_exif = false;  // for a photograph whose EXIF contradicts the camera file
+  std::optional<double> st_depth_mm;
+  std::string transfer;
+  std::string solver = "scene";
+  std::optional<double> memory_limit_mib;
+  bool keep_depth_noise = false;
+  std::string fill = "solver";  // or "telea"
+  EffectOptions effects{{}, {}, {}, "--effect-tolerance"};
+  std::string device = "auto";
+  std::string format = "png";
+  // Options of some solvers, as the help says.
+  std::optional<std::string> prior, strength;
+  bool check_blur = false;
+  std::optional<double> tolerance;
+  std::optional<int> max_iterations;
+  bool double_precision = false;
+  std::optional<std::string> block_solver, stencil, splat;
+  std::optional<double> gamma, ridge;
+  std::optional<int> block_px;
+  std::string checkpoint_path;
+  // A wish that replaces the options above; a profile chooses them (empty path: the user's own
+  // profile, or the default profile of the program).
+  PlanWish wish;
+  std::string profile_path;
+
+  bool by_blocks() const { return solver == "blocks"; }
+  std::string report_path() const;  // path of the page in its folder; empty: none
+};
+
+void AddEstimateOptions(CLI::App* command, EstimateOptions* options);
+
+// Throws UsageError for contradictory options: no given option is ignored silently.
+void CheckEstimateUsage(const EstimateOptions& options);
+// The part of CheckEstimateUsage for the solver's own options.
+void CheckSolverUsage(const EstimateOptions& options);
+
+// Return the given options and the solver's defaults for the others. `on` lists the effects of the
+// photograph that the solver must take into account. They throw Error for invalid options.
+using Progress = std::function<void(int done, int total)>;
+estimator::SceneOptions SceneOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress);
+estimator::BlurCheckOptions BlurCheckOptionsOf(const EstimateOptions& options,
+                                               const model::EffectSet& on, Progress progress);
+estimator::BlockOptions BlockOptionsOf(const EstimateOptions& options, const model::EffectSet& on,
+                                       Progress progress);
+estimator::FunctionalOptions FunctionalOptionsOf(const EstimateOptions& options,
+                                                 const model::EffectSet& on, Progress progress);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_OPTIONS_ESTIMATE_OPTIONS_H_

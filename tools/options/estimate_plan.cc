@@ -1,0 +1,202 @@
+#include "tools/options/estimate_plan.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/base/memory_available.h"
+#include "thicklens/base/stopwatch.h"
+#include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/grid_solver.h"
+#include "thicklens/estimator/scene_solver.h"
+
+namespace thicklens::tools {
+namespace {
+
+using nlohmann::json;
+
+void StopWhenAsked(int /*done*/, int /*total*/) { ThrowIfCancelled(); }
+
+template <typename Summary>
+void TakeIterations(const Summary& summary, PlanRun* run) {
+  run->iterations = summary.iterations;
+  run->converged = summary.converged;
+  run->relative_residual = summary.relative_residual;
+}
+
+template <typename Summary>
+void TakeSeconds(const Summary& summary, PlanRun* run) {
+  run->setup_seconds = summary.setup_seconds;
+  run->solve_seconds = summary.solve_seconds;
+  run->views_seconds = summary.views_seconds;
+}
+
+template <typename Value>
+Value FieldOf(const json& fields, const char* name, const std::string& where) {
+  const auto found = fields.find(name);
+  if (found == fields.end()) throw Error(fmt::format("{}: the plan has no '{}'", where, name));
+  try {
+    return found->get<Value>();
+  } catch (const json::exception&) {
+    throw Error(fmt::format("{}: {}: found {}, which it cannot be", where, name, found->dump()));
+  }
+}
+
+template <typename Value>
+std::optional<Value> OptionalFieldOf(const json& fields, const char* name,
+                                     const std::string& where) {
+  const auto found = fields.find(name);
+  if (found == fields.end() || found->is_null()) return std::nullopt;
+  return FieldOf<Value>(fields, name, where);
+}
+
+}  // namespace
+
+std::string PlanName(const EstimatePlan& plan) {
+  std::string name = plan.solver;
+  if (!plan.prior.empty()) name += " " + plan.prior;
+  if (!plan.block_solver.empty()) name += " " + plan.block_solver;
+  if (plan.block_px) name += fmt::format(" {} px", *plan.block_px);
+  if (plan.tolerance) name += fmt::format(", tolerance {:g}", *plan.tolerance);
+  if (plan.double_precision) name += ", double";
+  if (plan.on_opencl) name += ", opencl";
+  return name;
+}
+
+std::vector<std::string> PlanWords(const EstimatePlan& plan) {
+  std::vector<std::string> words = {"--solver", plan.solver};
+  const auto add = [&words](const char* option, const std::string& value) {
+    words.insert(words.end(), {option, value});
+  };
+  if (!plan.prior.empty()) add("--prior", plan.prior);
+  if (!plan.block_solver.empty()) add("--block-solver", plan.block_solver);
+  if (plan.block_px) add("--block-px", fmt::format("{}", *plan.block_px));
+  if (plan.tolerance) add("--tolerance", fmt::format("{:g}", *plan.tolerance));
+  if (plan.double_precision) words.emplace_back("--double");
+  if (plan.on_opencl) add("--device", "opencl");
+  // Else the best there is; ViennaCL takes one for itself.
+  if (!plan.on_opencl && plan.solver == "blocks" && plan.block_solver != "viennacl") {
+    add("--device", "cpu");
+  }
+  return words;
+}
+
+std::string PlanArguments(const EstimatePlan& plan) {
+  return fmt::format("{}", fmt::join(PlanWords(plan), " "));
+}
+
+json PlanJson(const EstimatePlan& plan) {
+  const auto or_null = [](const auto& value) { return value ? json(*value) : json(); };
+  const auto name_or_null = [](const std::string& name) {
+    return name.empty() ? json() : json(name);
+  };
+  return {{"solver", plan.solver},
+          {"prior", name_or_null(plan.prior)},
+          {"block_solver", name_or_null(plan.block_solver)},
+          {"tolerance", or_null(plan.tolerance)},
+          {"double", plan.double_precision},
+          {"block_px", or_null(plan.block_px)},
+          {"device", plan.on_opencl ? "opencl" : "cpu"}};
+}
+
+EstimatePlan PlanFromJson(const json& fields, const std::string& where) {
+  if (!fields.is_object()) {
+    throw Error(fmt::format("{}: a plan's fields are expected, found {}", where, fields.dump()));
+  }
+  EstimatePlan plan;
+  plan.solver = FieldOf<std::string>(fields, "solver", where);
+  plan.prior = OptionalFieldOf<std::string>(fields, "prior", where).value_or("");
+  plan.block_solver = OptionalFieldOf<std::string>(fields, "block_solver", where).value_or("");
+  plan.tolerance = OptionalFieldOf<double>(fields, "tolerance", where);
+  plan.double_precision = OptionalFieldOf<bool>(fields, "double", where).value_or(false);
+  plan.block_px = OptionalFieldOf<int>(fields, "block_px", where);
+  const std::string device = OptionalFieldOf<std::string>(fields, "device", where).value_or("cpu");
+  if (device != "cpu" && device != "opencl") {
+    throw Error(fmt::format("{}: device: cpu or opencl is expected, found '{}'", where, device));
+  }
+  plan.on_opencl = device == "opencl";
+  if (plan.solver != "scene" && plan.solver != "blocks" && plan.solver != "functional" &&
+      plan.solver != "grid") {
+    throw Error(fmt::format("{}: solver: scene, blocks, functional or grid is expected, found '{}'",
+                            where, plan.solver));
+  }
+  // What estimate's command line would refuse is not believed of a file either.
+  EstimateOptions options;
+  ApplyPlan(plan, &options);
+  try {
+    CheckSolverUsage(options);
+    if (plan.solver == "scene") {
+      SceneOptionsOf(options, {}, {});
+    } else if (plan.solver == "blocks") {
+      BlockOptionsOf(options, {}, {});
+    } else {
+      FunctionalOptionsOf(options, {}, {});
+    }
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", where, error.what()));
+  }
+  return plan;
+}
+
+void ApplyPlan(const EstimatePlan& plan, EstimateOptions* options) {
+  const auto given = [](const std::string& name) {
+    return name.empty() ? std::nullopt : std::optional<std::string>(name);
+  };
+  options->solver = plan.solver;
+  options->prior = given(plan.prior);
+  options->block_solver = given(plan.block_solver);
+  options->tolerance = plan.tolerance;
+  options->double_precision = plan.double_precision;
+  options->block_px = plan.block_px;
+  // ViennaCL takes a device for itself.
+  const char* processor = plan.block_solver == "viennacl" ? "auto" : "cpu";
+  options->device = plan.on_opencl ? "opencl" : processor;
+}
+
+PlanRun RunPlan(const EstimatePlan& plan, const estimator::EstimateInput& input, int threads,
+                kernels::Backend* backend) {
+  EstimateOptions options;
+  ApplyPlan(plan, &options);
+  options.common.threads = threads;
+  const model::EffectSet on = {model::Effect::kFalloff};
+  PlanRun run;
+  if (plan.solver == "scene") {
+    estimator::SceneSummary summary;
+    estimator::SceneOptions scene = SceneOptionsOf(options, on, StopWhenAsked);
+    scene.memory_limit_mib = UsualMemoryLimitMib();  // which `estimate` respects, too
+    run.light_field = estimator::EstimateScene(input, scene, &summary, nullptr, backend);
+    TakeSeconds(summary, &run);
+    TakeIterations(summary, &run);
+    run.device = summary.device;
+  } else if (plan.solver == "blocks") {
+    estimator::EstimateSummary summary;
+    run.light_field = estimator::EstimateByBlocks(input, BlockOptionsOf(options, on, StopWhenAsked),
+                                                  backend, &summary);
+    run.setup_seconds = summary.setup_seconds;
+    run.solve_seconds = summary.solve_seconds;
+    run.relative_residual = summary.relative_residual;
+    run.rcond = summary.rcond_min;
+    run.device = summary.device;
+    if (!summary.rcond_min) TakeIterations(summary, &run);
+  } else {
+    const auto estimate =
+        plan.solver == "grid" ? estimator::EstimateOnGrid : estimator::EstimateFunctional;
+    estimator::FunctionalSummary summary;
+    run.light_field = estimate(input, FunctionalOptionsOf(options, on, StopWhenAsked), &summary);
+    TakeSeconds(summary, &run);
+    TakeIterations(summary, &run);
+  }
+  return run;
+}
+
+PlanRun RunWarping(const estimator::EstimateInput& input, int threads) {
+  PlanRun run;
+  const auto start = Clock::now();
+  run.light_field = estimator::WarpedLightField(input, true, threads);
+  run.views_seconds = SecondsSince(start);
+  return run;
+}
+
+}  // namespace thicklens::tools

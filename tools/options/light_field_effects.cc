@@ -1,0 +1,111 @@
+#include "tools/options/light_field_effects.h"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "thicklens/estimator/aperture_weights.h"
+#include "thicklens/model/effect_impact.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+using model::Effect;
+using model::EffectSet;
+
+EffectSet EffectsOf(const std::string& solver, bool camera) {
+  EffectSet effects = {Effect::kDefocus, Effect::kApertureShape};
+  if (solver != "functional") effects.Add(Effect::kOcclusion);
+  return camera ? effects.With({Effect::kThickness, Effect::kFalloff}) : effects;
+}
+
+model::EffectChoice ChoiceOf(const EffectOptions& options) {
+  model::EffectChoice choice;
+  ApplyEffectOptions(options, &choice);
+  return choice;
+}
+
+model::EffectDecision DecisionWithoutCamera(const EffectOptions& options,
+                                            const EffectSet& of_model) {
+  if (options.tolerance) {
+    throw UsageError(options.tolerance_option +
+                     ": without a camera nothing is known of what effects matter");
+  }
+  const model::EffectChoice choice = ChoiceOf(options);
+  const EffectSet base = choice.base == model::EffectChoice::Base::kGiven ? choice.given : of_model;
+  return {base.Without(choice.without), {}};
+}
+
+}  // namespace
+
+bool IsLeftOut(const EffectOptions& options, Effect effect) {
+  const model::EffectChoice choice = ChoiceOf(options);
+  return choice.without.Has(effect) ||
+         (choice.base == model::EffectChoice::Base::kGiven && !choice.given.Has(effect));
+}
+
+model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
+                                            const std::optional<model::Camera>& camera,
+                                            const std::optional<model::DepthStatistics>& depth) {
+  const EffectSet of_model = EffectsOf(options.solver, camera.has_value());
+  CheckEffectNames(options.effects, of_model);
+  model::EffectChoice choice = ChoiceOf(options.effects);
+  // The solution's own, which cost what they bring.
+  choice.kept = EffectsOf(options.solver, false);
+  const bool is_gaussian = options.aperture_shape.empty() && options.aperture_of.empty() &&
+                           camera && camera->psf == model::Psf::kGaussian;
+  if (is_gaussian) choice.kept.Remove(Effect::kApertureShape);
+  if (IsLeftOut(options.effects, Effect::kDefocus)) {
+    throw UsageError(
+        "--effects, --without: defocus is what an estimate undoes and cannot be left out; "
+        "thicklens compare --dibr measures the picture that is only warped by its depth");
+  }
+  if (of_model.Has(Effect::kOcclusion) && IsLeftOut(options.effects, Effect::kOcclusion)) {
+    throw UsageError(
+        "--effects, --without: occlusion cannot be left out of an estimate, whose views show the "
+        "depth map as each of them sees it; where nothing is hidden it costs nothing");
+  }
+  if (!camera) return DecisionWithoutCamera(options.effects, of_model);
+  model::EffectConditions conditions;
+  conditions.camera = *camera;
+  const double focus_depth_mm = camera->focus_depth_mm();
+  return model::DecideEffects(choice, conditions,
+                              model::PlacesBetween(*camera, depth ? depth->min_mm : focus_depth_mm,
+                                                   depth ? depth->max_mm : focus_depth_mm, true),
+                              of_model);
+}
+
+model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
+                                              const model::LightField& light_field) {
+  const EffectSet of_views = {Effect::kDefocus, Effect::kApertureShape};
+  EffectSet of_model =
+      light_field.camera ? of_views.With({Effect::kThickness, Effect::kFalloff}) : of_views;
+  if (estimator::IsOffAperture(light_field)) of_model.Add(Effect::kVignetting);
+  CheckEffectNames(options, of_model);
+  if (!light_field.camera) return DecisionWithoutCamera(options, of_model);
+  model::EffectChoice choice = ChoiceOf(options);
+  choice.kept = of_views;
+  model::EffectConditions conditions;
+  conditions.camera = *light_field.camera;
+  if (light_field.grid) conditions.planes = light_field.grid->planes;
+  // Views do not tell their depths: any, from half of that of the plane of focus on. What defocus
+  // and aperture shape do there is therefore not told.
+  constexpr double kFarMm = 1e6;
+  const double near_mm = std::min(light_field.camera->focus_depth_mm(), kFarMm) / 2;
+  model::EffectDecision decision =
+      model::DecideEffects(choice, conditions,
+                           model::PlacesBetween(*light_field.camera, near_mm,
+                                                std::numeric_limits<double>::infinity(), false),
+                           of_model);
+  // Without defocus a pixel has one ray.
+  if (!decision.on.Has(Effect::kDefocus)) decision.on.Remove(Effect::kVignetting);
+  decision.findings.erase(std::remove_if(decision.findings.begin(), decision.findings.end(),
+                                         [&](const model::EffectFinding& finding) {
+                                           return of_views.Has(finding.effect);
+                                         }),
+                          decision.findings.end());
+  return decision;
+}
+
+}  // namespace thicklens::tools

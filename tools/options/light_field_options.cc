@@ -1,0 +1,229 @@
+#include "tools/options/light_field_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "thicklens/base/error.h"
+#include "thicklens/estimator/fill_holes.h"
+#include "thicklens/kernels/device.h"
+#include "tools/options/naming_the_file.h"
+#include "tools/options/option_values.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr int kMaxGrid = 1000;
+
+// Step between views on the aperture, mm, along u, or along v where there is one view in u.
+double ApertureStepMm(const model::LightFieldGrid& grid, const model::Camera& camera) {
+  const Eigen::Vector2d step = model::ApertureStepsMm(grid, camera);
+  return std::abs(step.x() != 0 ? step.x() : step.y());
+}
+
+estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
+                                     const model::LinearPicture& picture, double at_infinity,
+                                     PreparedDepth* prepared) {
+  for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
+  return estimator::FillHoles(map, picture, &prepared->holes, at_infinity);
+}
+
+void RequireSize(const model::RawDepthMap& map, const std::string& map_name,
+                 const model::LinearPicture& picture) {
+  if (map.width_px == picture.width_px && map.height_px == picture.height_px) return;
+  throw Error(fmt::format("{}: it is {}x{} px, the picture {}x{} px: the sizes must be equal",
+                          map_name, map.width_px, map.height_px, picture.width_px,
+                          picture.height_px));
+}
+
+PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& map_name,
+                              model::DepthConvention convention,
+                              const model::LinearPicture& picture, const model::Camera& camera,
+                              const model::LightFieldGrid& grid) {
+  if (convention.kind == model::DepthKind::kDisparity)
+    convention.aperture_step_mm = ApertureStepMm(grid, camera);
+  // Of the picture, only its size counts here.
+  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  empty.values.assign(map.values.size(), 0.0F);
+  const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, map_name);
+  PreparedDepth prepared;
+  prepared.depth = scene.depth;
+  prepared.disparity = NamingTheFile(map_name, [&] {
+    return WithoutHoles(
+        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), picture,
+        estimator::DisparityAtInfinity(grid), &prepared);
+  });
+  return prepared;
+}
+
+}  // namespace
+
+void AddViewsOption(CLI::App* command, ViewsOption* option, const std::string& help) {
+  command->add_option("--views", option->text, help)->type_name("UxV");
+}
+
+// One way; the number of rays is far beyond any memory before.
+constexpr int kMaxViews = 99;
+
+std::pair<int, int> ViewCounts(const ViewsOption& option) {
+  if (option.text.empty()) return {0, 0};
+  const std::string form = "UxV (views across and down, e.g. 7x7)";
+  const std::vector<int> counts = SplitWhole("--views", option.text, 'x', form, 1, kMaxViews);
+  if (counts.size() != 2) {
+    throw UsageError(fmt::format("--views: {} is expected, found '{}'", form, option.text));
+  }
+  return {counts[0], counts[1]};
+}
+
+void AddCropOption(CLI::App* command, CropOption* option) {
+  command->add_option("--crop", option->text, "Take only this rectangle, px")
+      ->type_name("X,Y,WIDTH,HEIGHT");
+}
+
+std::optional<model::PixelRect> CropRect(const CropOption& option) {
+  if (option.text.empty()) return std::nullopt;
+  const std::string form = "x,y,width,height";
+  const std::vector<int> px = SplitPixels("--crop", option.text, ',', form);
+  if (px.size() != 4 || px[2] < 1 || px[3] < 1) {
+    throw UsageError(
+        fmt::format("--crop: {}, the sizes above 0, is expected, found '{}'", form, option.text));
+  }
+  return model::PixelRect{px[0], px[1], px[2], px[3]};
+}
+
+void AddReadingOptions(CLI::App* command, ReadingOptions* options) {
+  command
+      ->add_option("--grid", options->grid,
+                   "Of a folder in the HCI layout: how many views its numbering counts in a row; "
+                   "default: parameters.cfg says it, or the views are a full square")
+      ->check(CLI::Range(1, kMaxGrid))
+      ->type_name("N");
+  command->add_flag("--sparse", options->sparse, "Accept a light field with views missing");
+  AddViewsOption(command, &options->views, "Take only the UxV views in the middle");
+  AddCropOption(command, &options->crop);
+}
+
+io::LightFieldReading ReadingOf(const ReadingOptions& options) {
+  io::LightFieldReading reading;
+  reading.grid = options.grid;
+  reading.sparse = options.sparse;
+  std::tie(reading.u_count, reading.v_count) = ViewCounts(options.views);
+  reading.crop = CropRect(options.crop);
+  return reading;
+}
+
+void AddDepthOptions(CLI::App* command, DepthOptions* options) {
+  command
+      ->add_option("--depth-kind", options->kind,
+                   "What the depth map says: z (along the axis), range (along the pixel's ray) or "
+                   "disparity (px per view step, near positive, 0 in the plane of focus)")
+      ->check(CLI::IsMember({"z", "range", "disparity"}))
+      ->type_name("KIND");
+  command
+      ->add_option("--depth-unit", options->unit,
+                   "Of z and range: mm, cm, m, or tum5000 (16-bit PNG, metres times 5000)")
+      ->check(CLI::IsMember({"mm", "cm", "m", "tum5000"}))
+      ->type_name("UNIT");
+  command
+      ->add_option("--disparity-scale", options->disparity_scale,
+                   "disparity = scale * value + offset")
+      ->check(Finite())
+      ->capture_default_str()
+      ->type_name("X");
+  command->add_option("--disparity-offset", options->disparity_offset_px, "See --disparity-scale")
+      ->check(Finite())
+      ->capture_default_str()
+      ->type_name("PX");
+}
+
+model::DepthConvention ConventionOf(const DepthOptions& options) {
+  if (options.kind.empty()) {
+    throw UsageError(
+        "--depth-kind is missing: z, range or disparity must be given, a depth map does not say it "
+        "itself");
+  }
+  model::DepthConvention convention;
+  convention.kind = model::DepthKindFromName(options.kind);
+  if (convention.kind == model::DepthKind::kDisparity) {
+    if (!options.unit.empty()) {
+      throw UsageError(fmt::format(
+          "--depth-unit {}: a disparity has none, it is px per view step; see --disparity-scale",
+          options.unit));
+    }
+    if (options.disparity_scale == 0) {
+      throw UsageError("--disparity-scale: must not be 0, all would lie in the plane of focus");
+    }
+    convention.disparity_scale = options.disparity_scale;
+    convention.disparity_offset_px = options.disparity_offset_px;
+    return convention;
+  }
+  if (options.unit.empty()) {
+    throw UsageError(fmt::format(
+        "--depth-unit is missing: --depth-kind {} needs mm, cm, m or tum5000", options.kind));
+  }
+  if (options.disparity_scale != 1 || options.disparity_offset_px != 0) {
+    throw UsageError(fmt::format(
+        "--disparity-scale and --disparity-offset are for --depth-kind disparity, found {}",
+        options.kind));
+  }
+  convention.unit_mm = model::DepthUnitMm(options.unit);
+  return convention;
+}
+
+void AddApertureShapeOption(CLI::App* command, std::string* text) {
+  command
+      ->add_option("--aperture-shape", *text,
+                   "How the aperture weighs the views: uniform, gaussian or disc")
+      ->check(CLI::IsMember({"uniform", "gaussian", "disc"}))
+      ->type_name("SHAPE");
+}
+
+model::ApertureShape ApertureShapeOr(const std::string& text, model::ApertureShape otherwise) {
+  return text.empty() ? otherwise : model::ApertureShapeFromName(text);
+}
+
+void AddDeviceOption(CLI::App* command, std::string* text) {
+  if (text->empty()) *text = "auto";
+  const CLI::Validator is_device(
+      [](std::string& given) {
+        try {
+          kernels::ParseDeviceRequest(given);
+          return std::string();
+        } catch (const Error& error) {
+          return std::string(error.what());
+        }
+      },
+      "");
+  command
+      ->add_option("--device", *text,
+                   "Where the kernels run: auto, cpu, opencl, opencl:PLATFORM or "
+                   "opencl:PLATFORM:DEVICE")
+      ->check(is_device)
+      ->capture_default_str()
+      ->type_name("DEVICE");
+}
+
+PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map_name,
+                           const DepthOptions& options, const model::LinearPicture& picture,
+                           const model::Camera* camera, const model::LightFieldGrid* grid) {
+  const model::DepthConvention convention = ConventionOf(options);
+  RequireSize(map, map_name, picture);
+  if (camera != nullptr) return PrepareByCamera(map, map_name, convention, picture, *camera, *grid);
+  if (convention.kind != model::DepthKind::kDisparity) {
+    throw UsageError(fmt::format(
+        "--depth-kind {}: millimetres need a camera (--camera CAMERA.yaml); without one the map "
+        "must be a disparity",
+        options.kind));
+  }
+  PreparedDepth prepared;
+  prepared.disparity = NamingTheFile(map_name, [&] {
+    return WithoutHoles(estimator::DisparityFromMap(map, convention.disparity_scale,
+                                                    convention.disparity_offset_px),
+                        picture, -std::numeric_limits<double>::infinity(), &prepared);
+  });
+  return prepared;
+}
+
+}  // namespace thicklens::tools

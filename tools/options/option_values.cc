@@ -1,0 +1,97 @@
+#include "tools/options/option_values.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+namespace thicklens::tools {
+namespace {
+
+constexpr int kMaxPixels = 100000;
+
+std::optional<double> FiniteNumber(const std::string& text) {
+  const char* begin = text.data() + (text.rfind('+', 0) == 0 ? 1 : 0);
+  const char* end = text.data() + text.size();
+  double value = 0;
+  const auto [rest, status] = std::from_chars(begin, end, value);
+  if (status != std::errc() || rest != end || begin == end || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+// CLI11 puts the option's name in front of what is returned; empty: fine.
+template <typename Condition>
+CLI::Validator NumberThat(const std::string& must, Condition condition) {
+  return CLI::Validator(
+      [must, condition](std::string& text) {
+        const std::optional<double> value = FiniteNumber(text);
+        if (!value) return fmt::format("a finite number is expected, found '{}'", text);
+        return condition(*value) ? std::string() : fmt::format("must be {}, found {}", must, text);
+      },
+      "");
+}
+
+UsageError WrongForm(const std::string& option, const std::string& text, const std::string& form) {
+  return UsageError(fmt::format("{}: {} is expected, found '{}'", option, form, text));
+}
+
+}  // namespace
+
+CLI::Validator Finite() {
+  return NumberThat("finite", [](double) { return true; });
+}
+
+CLI::Validator NonNegative() {
+  return NumberThat(">= 0", [](double value) { return value >= 0; });
+}
+
+CLI::Validator Between(double lo, double hi, const std::string& hint) {
+  const std::string must = lo == 0 ? fmt::format("above 0 and at most {} ({})", hi, hint)
+                                   : fmt::format("from {} to {} ({})", lo, hi, hint);
+  return NumberThat(
+      must, [lo, hi](double value) { return (lo == 0 ? value > 0 : value >= lo) && value <= hi; });
+}
+
+CLI::Validator Inside(double lo, double hi, const std::string& hint) {
+  return NumberThat(fmt::format("above {} and below {} ({})", lo, hi, hint),
+                    [lo, hi](double value) { return value > lo && value < hi; });
+}
+
+std::vector<double> SplitNumbers(const std::string& option, const std::string& text, char separator,
+                                 const std::string& form) {
+  std::vector<double> numbers;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, separator);) {
+    const std::optional<double> number = FiniteNumber(part);
+    if (!number) throw WrongForm(option, text, form);
+    numbers.push_back(*number);
+  }
+  if (numbers.empty() || text.back() == separator) throw WrongForm(option, text, form);
+  return numbers;
+}
+
+std::vector<int> SplitWhole(const std::string& option, const std::string& text, char separator,
+                            const std::string& form, int least, int most) {
+  std::vector<int> whole;
+  for (const double number : SplitNumbers(option, text, separator, form)) {
+    if (!(number >= least) || !(number <= most) || number != std::floor(number)) {
+      throw UsageError(
+          fmt::format("{}: {}, each a whole number from {} to {}, is expected, found "
+                      "'{}'",
+                      option, form, least, most, text));
+    }
+    whole.push_back(static_cast<int>(number));
+  }
+  return whole;
+}
+
+std::vector<int> SplitPixels(const std::string& option, const std::string& text, char separator,
+                             const std::string& form) {
+  return SplitWhole(option, text, separator, form + " in px", 0, kMaxPixels);
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,76 @@
+#include "tools/options/plan_wish.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+namespace thicklens::tools {
+namespace {
+
+// A number of at least 0 with its unit, which may be left out.
+std::optional<double> NumberWithUnit(const std::string& text, const std::string& unit) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [read, failure] = std::from_chars(text.data(), end, value);
+  if (failure != std::errc() || !std::isfinite(value) || value < 0) return std::nullopt;
+  const std::string rest(read, end);
+  return rest.empty() || rest == unit ? std::optional(value) : std::nullopt;
+}
+
+CLI::Option* AddNumberWithUnit(CLI::App* command, const std::string& name, const std::string& unit,
+                               const std::string& example, const std::string& help,
+                               std::optional<double>* value) {
+  return command
+      ->add_option_function<std::string>(
+          name,
+          [=](const std::string& text) {
+            *value = NumberWithUnit(text, unit);
+            if (!*value) {
+              throw CLI::ValidationError(
+                  name, fmt::format("a number such as {} is expected, found '{}'", example, text));
+            }
+          },
+          help)
+      ->type_name(example);
+}
+
+}  // namespace
+
+std::string PlanWish::Text() const {
+  std::string text;
+  const auto add = [&](const std::string& option) { text += (text.empty() ? "" : " ") + option; };
+  if (!quality.empty()) add("--quality " + quality);
+  if (within_s) add(fmt::format("--within {:g}s", *within_s));
+  if (psnr_loss_db) add(fmt::format("--psnr-loss {:g}dB", *psnr_loss_db));
+  return text;
+}
+
+void AddPlanWishOptions(CLI::App* command, PlanWish* wish) {
+  CLI::Option* quality =
+      command
+          ->add_option("--quality", wish->quality,
+                       "In place of a solver. draft: the fastest way that gains half of what the "
+                       "best one does over warping; standard: nine tenths; best")
+          ->check(CLI::IsMember({"draft", "standard", "best"}))
+          ->type_name("NAME");
+  CLI::Option* within = AddNumberWithUnit(
+      command, "--within", "s", "2s",
+      "In place of a solver: the best that is expected to be done in that time, reading and "
+      "writing included",
+      &wish->within_s);
+  CLI::Option* loss = AddNumberWithUnit(
+      command, "--psnr-loss", "dB", "0.1dB",
+      "In place of a solver: the fastest that is expected to lose no more against the best one; "
+      "with --within both",
+      &wish->psnr_loss_db);
+  quality->excludes(within)->excludes(loss);
+  for (const char* chosen : {"--solver", "--prior", "--strength", "--check-blur", "--tolerance",
+                             "--max-iterations", "--double", "--gamma", "--ridge", "--block-solver",
+                             "--block-px", "--stencil", "--splat", "--checkpoint", "--device"}) {
+    for (CLI::Option* option : {quality, within, loss}) option->excludes(chosen);
+  }
+}
+
+}  // namespace thicklens::tools

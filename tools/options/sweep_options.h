@@ -1,0 +1,16 @@
+#ifndef THICKLENS_TOOLS_OPTIONS_SWEEP_OPTIONS_H_
+#define THICKLENS_TOOLS_OPTIONS_SWEEP_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+
+#include "tools/options/sweep_input.h"
+
+namespace thicklens::tools {
+
+// Adds the options that override statements of a sweep's file: --offset-mm, --offset-sigma-mm,
+// --direction, --reading-sigma-mm, --floor-px, --floor-from, --target, --roi.
+void AddSweepStatements(CLI::App* command, SweepArguments* sweep);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_OPTIONS_SWEEP_OPTIONS_H_

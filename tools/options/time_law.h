@@ -1,0 +1,85 @@
+#ifndef THICKLENS_TOOLS_OPTIONS_TIME_LAW_H_
+#define THICKLENS_TOOLS_OPTIONS_TIME_LAW_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace thicklens::tools {
+
+// Quantities known before an estimate that determine its time.
+struct PictureLoad {
+  double megapixels = 0;
+  int channels = 1;
+  int views = 0;             // U V
+  double blur_sigma_px = 0;  // of the photograph by its depth, root mean square over the pixels
+  // Seconds that one thread needs to encode the files of all views, which depend on the content.
+  double file_seconds = 0;
+};
+
+// Parts of the seconds of a run. The rest of the whole is making the views, and the end.
+struct PartSeconds {
+  // of the files, until the plan is chosen; it has passed by then and is in no law
+  double read = 0;
+  double setup = 0;  // geometry
+  double solve = 0;  // depends on the plan alone; all other parts are equal for plans of one kind
+  double files = 0;  // writing the views
+};
+
+struct TimedLoad {
+  PictureLoad load;
+  double seconds = 0;  // of the whole run, > 0
+  PartSeconds parts;   // none below 0; their sum is at most the whole
+};
+
+// Seconds of a run from the start of reading its files [D120], as a sum of terms, none of them
+// negative. Pixels are in millions.
+class TimeLaw {
+ public:
+  // The terms are in the order of the profile's file, whose schema changes with it. s is the blur's
+  // sigma in px.
+  enum Term {
+    kStart,                // seconds, independent of the image
+    kPixels,               // depth
+    kPixelsChannels,       // work of iterations for a pixel
+    kPixelsViews,          // the geometry of the views
+    kPixelsViewsChannels,  // making the views
+    kPixelsChannelsBlur,   // times s: work of iterations for a blur
+    kPixelsViewsBlur,      // times s: work of the geometry for a blur
+    kFileSeconds,          // the threads' share in encoding
+    kViews,                // files and threads of a view, independent of size
+    // times s / (1 + s): iterations level off with blur, and are few without it
+    kPixelsViewsChannelsIterations,
+    kPixelsChannelsIterations,  // times s / (0.2 + s), on scene points: iterations level off sooner
+    kPixelsViewsBlurArea,       // times s^2: pixels that a blur reaches
+  };
+  static constexpr int kTerms = kPixelsViewsBlurArea + 1;
+  using Terms = Eigen::Matrix<double, kTerms, 1>;
+
+  TimeLaw() : coefficients_(Terms::Zero()) {}
+  explicit TimeLaw(const Terms& coefficients) : coefficients_(coefficients) {}
+
+  double Seconds(const PictureLoad& load) const;
+  const Terms& coefficients() const { return coefficients_; }
+
+ private:
+  Terms coefficients_;
+};
+
+// Times of plans on the same images in the same order. The plans differ only in what they solve.
+using TimesOfPlans = std::vector<std::vector<TimedLoad>>;
+
+// Fits a law for each plan. It is the sum of a law for each part of a run, with only the terms that
+// such work has, because a few images cannot separate all terms. The common parts of the plans are
+// fitted to the mean of all plans, so that noise does not separate plans where the images do not.
+// Each law has the least sum of squared errors, relative to the whole time, with no coefficient
+// below 0. Throws Error for fewer than two images, times that are not above 0, parts that do not
+// fit their times, or plans with different images.
+std::vector<TimeLaw> FitTimeLaws(const TimesOfPlans& plans);
+
+// Returns for each plan and image the ratio of predicted to measured time. The prediction is made
+// when the image has been read, by the law from the images of all other sizes.
+std::vector<std::vector<double>> LeftOutRatios(const TimesOfPlans& plans);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_OPTIONS_TIME_LAW_H_

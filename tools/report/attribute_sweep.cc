@@ -1,0 +1,238 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/stopwatch.h"
+#include "thicklens/calib/calibrate.h"
+#include "thicklens/io/simulated_sweep.h"
+#include "tools/report/attribution.h"
+
+namespace thicklens::tools {
+namespace {
+
+// Frames below that are held, larger sweeps are simulated again where they are looked at.
+constexpr double kMostHeldBytes = 1 << 30;
+
+// What is made of each frame, held or made when it is asked for.
+template <typename Frame>
+class Frames {
+ public:
+  Frames(int count, double bytes, int threads, std::function<Frame(int)> make)
+      : make_(std::move(make)) {
+    if (count * bytes > kMostHeldBytes) return;
+    held_.resize(static_cast<std::size_t>(count));
+    ParallelFor(count, threads, [this](int i) { held_[static_cast<std::size_t>(i)] = make_(i); });
+  }
+  Frame At(int i) const { return held_.empty() ? make_(i) : held_[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::function<Frame(int)> make_;
+  std::vector<Frame> held_;
+};
+
+// One simulation of the sweep.
+class SweepWorld {
+ public:
+  SweepWorld(const model::SweepSimulationOptions& options,
+             const model::LinearPicture& target_picture, bool unknown_offset,
+             const AttributionRun& run, const std::function<void()>& tell)
+      : start_(Clock::now()),
+        options_(options),
+        simulator_(options, target_picture),
+        unknown_offset_(unknown_offset),
+        threads_(run.threads),
+        tell_(tell),
+        stored_(options.frame_count, Pixels() * 2, run.threads,
+                [this](int i) {
+                  tell_();
+                  return simulator_.RenderFrame(i);
+                }),
+        seconds_(SecondsSince(start_)) {}
+  SweepWorld(const SweepWorld&) = delete;
+  SweepWorld& operator=(const SweepWorld&) = delete;
+
+  double Pixels() const {
+    return static_cast<double>(options_.camera.sensor.width_px) * options_.camera.sensor.height_px;
+  }
+  const model::SweepSimulator& simulator() const { return simulator_; }
+  double seconds() const { return seconds_; }
+
+  estimator::StoredValues Values(int frame, bool with_noise) const {
+    tell_();
+    return with_noise ? estimator::StoredValuesOf(stored_.At(frame))
+                      : estimator::StoredValuesOf(simulator_.RenderNoiseless(frame),
+                                                  simulator_.camera().sensor.transfer);
+  }
+
+  calib::Calibration Calibrated() const {
+    model::Camera camera = simulator_.camera();
+    camera.calibration.reset();
+    calib::FocusSweep sweep =
+        calib::MakeFocusSweep(io::DescribeSweep(options_, simulator_, unknown_offset_), camera);
+    sweep.read_frame = [this](std::size_t i) {
+      return io::AsFile(stored_.At(static_cast<int>(i)));
+    };
+    calib::CalibrationOptions options;
+    options.map_field = false;
+    options.threads = threads_;
+    options.progress = [this](int, int) {
+      tell_();
+      return true;
+    };
+    return calib::Calibrate(sweep, options);
+  }
+
+ private:
+  Clock::time_point start_;
+  model::SweepSimulationOptions options_;
+  model::SweepSimulator simulator_;
+  bool unknown_offset_;
+  int threads_;
+  std::function<void()> tell_;
+  Frames<model::StoredPicture> stored_;
+  double seconds_;
+};
+
+std::optional<CalibratedValues> ValuesOf(const calib::Calibration& calibration,
+                                         std::string* refusal) {
+  if (calibration.image_distance_mm && calibration.blur_ratio) {
+    return CalibratedValues{calibration.image_distance_mm->value,
+                            calibration.image_distance_mm->sigma, calibration.blur_ratio->value,
+                            calibration.blur_ratio->sigma};
+  }
+  *refusal = calibration.reason;
+  return std::nullopt;
+}
+
+class SweepAttributor {
+ public:
+  SweepAttributor(const model::SweepSimulationOptions& sweep,
+                  const model::LinearPicture& target_picture, bool unknown_offset,
+                  const AttributionRun& run)
+      : sweep_(sweep),
+        target_picture_(target_picture),
+        unknown_offset_(unknown_offset),
+        run_(run) {}
+
+  SweepAttribution Run() {
+    model::SweepSimulationOptions by_auto = sweep_;
+    by_auto.effects.base = model::EffectChoice::Base::kAuto;
+    const model::EffectSet kept = model::SweepSimulator(by_auto, target_picture_).effects().on;
+
+    sweep_.effects = AllInsteadOfAuto(sweep_.effects);
+    const SweepWorld base(sweep_, target_picture_, unknown_offset_, run_, [this] { Tell(); });
+    const model::SweepSimulator& simulator = base.simulator();
+    result_.on = simulator.effects().on;
+    total_ = static_cast<int>(result_.on.Effects().size()) + 1;
+    result_.frames = sweep_.frame_count;
+    result_.true_image_distance_mm = simulator.truth().image_distance_mm;
+    result_.true_blur_ratio = simulator.truth().blur_ratio;
+    result_.picture_seconds = base.seconds();
+    CalibrateBase(base);
+    const Frames<estimator::StoredValues> noiseless(sweep_.frame_count, base.Pixels() * 4,
+                                                    run_.threads,
+                                                    [&](int i) { return base.Values(i, false); });
+    for (const model::EffectFinding& finding : simulator.effects().findings) {
+      if (!result_.on.Has(finding.effect)) continue;
+      ++done_;
+      Tell();
+      SweepEffect row;
+      row.effect = finding.effect;
+      row.bound_grey_levels = finding.impact.grey_levels;
+      row.kept_by_auto = kept.Has(finding.effect);
+      TakeAway(base, noiseless, &row);
+      result_.effects.push_back(std::move(row));
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void Tell() const {
+    if (run_.progress) run_.progress(done_, total_);
+  }
+
+  void CalibrateBase(const SweepWorld& base) {
+    const auto start = Clock::now();
+    std::string refusal;
+    const auto values = ValuesOf(base.Calibrated(), &refusal);
+    if (!values) {
+      throw Error("the sweep with all its effects gives no calibration to compare with: " +
+                  refusal);
+    }
+    result_.calibration = *values;
+    result_.calibration_seconds = SecondsSince(start);
+  }
+
+  void TakeAway(const SweepWorld& base, const Frames<estimator::StoredValues>& noiseless,
+                SweepEffect* row) const {
+    model::SweepSimulationOptions options = sweep_;
+    options.effects.without.Add(row->effect);
+    const SweepWorld world(options, target_picture_, unknown_offset_, run_, [this] { Tell(); });
+    row->picture_seconds = world.seconds();
+    Compare(base, noiseless, world, row);
+    row->absent = row->picture.nothing() && SameReadings(base, world);
+    if (row->absent) {
+      row->calibration = result_.calibration;
+      return;
+    }
+    const auto start = Clock::now();
+    row->calibration = ValuesOf(world.Calibrated(), &row->refusal);
+    row->calibration_seconds = SecondsSince(start);
+  }
+
+  static bool SameReadings(const SweepWorld& a, const SweepWorld& b) {
+    const auto& of_a = a.simulator().truth().frames;
+    const auto& of_b = b.simulator().truth().frames;
+    return std::equal(
+        of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
+        [](const auto& one, const auto& other) { return one.reading_mm == other.reading_mm; });
+  }
+
+  void Compare(const SweepWorld& base, const Frames<estimator::StoredValues>& noiseless,
+               const SweepWorld& world, SweepEffect* row) const {
+    const bool with_noise = IsOfStorage(row->effect);
+    const auto with = [&](int i) { return with_noise ? base.Values(i, true) : noiseless.At(i); };
+    std::vector<PictureChangeMeter> meters(static_cast<std::size_t>(sweep_.frame_count));
+    std::vector<double> rms(meters.size());
+    ParallelFor(sweep_.frame_count, run_.threads, [&](int i) {
+      const auto at = static_cast<std::size_t>(i);
+      rms[at] = meters[at].Add(with(i), world.Values(i, with_noise));
+    });
+    PictureChangeMeter all;
+    for (const PictureChangeMeter& meter : meters) all.Add(meter);
+    row->picture = all.Result();
+    if (row->picture.nothing()) return;
+    const auto most = std::max_element(rms.begin(), rms.end()) - rms.begin();
+    const auto frame = static_cast<int>(most);
+    const estimator::StoredValues there = with(frame);
+    row->difference = {
+        there.width_px, there.height_px,
+        GreyLevelDifference(there, world.Values(frame, with_noise)),
+        fmt::format("frame {} of {}, at {:.5g} mm", frame + 1, sweep_.frame_count,
+                    base.simulator().truth().frames[static_cast<std::size_t>(most)].depth_mm)};
+  }
+
+  model::SweepSimulationOptions sweep_;
+  const model::LinearPicture& target_picture_;
+  const bool unknown_offset_;
+  const AttributionRun& run_;
+  int done_ = 0, total_ = 1;
+  SweepAttribution result_;
+};
+
+}  // namespace
+
+SweepAttribution AttributeSweep(const model::SweepSimulationOptions& sweep,
+                                const model::LinearPicture& target_picture, bool unknown_offset,
+                                const AttributionRun& run) {
+  return SweepAttributor(sweep, target_picture, unknown_offset, run).Run();
+}
+
+}  // namespace thicklens::tools

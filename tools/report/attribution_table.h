@@ -1,0 +1,60 @@
+#ifndef THICKLENS_TOOLS_REPORT_ATTRIBUTION_TABLE_H_
+#define THICKLENS_TOOLS_REPORT_ATTRIBUTION_TABLE_H_
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/report/attribution.h"
+
+namespace thicklens::tools {
+
+// At least one of the two attributions.
+struct Attribution {
+  std::optional<SceneAttribution> scene;
+  std::optional<SweepAttribution> sweep;
+};
+
+// One effect in all that was simulated, in the order of the enumeration. A null pointer means that
+// the effect was not part of that simulation.
+struct AttributionRow {
+  model::Effect effect = model::Effect::kDefocus;
+  const SceneEffect* scene = nullptr;
+  const SweepEffect* sweep = nullptr;
+
+  // The attribution for the scene, or for the sweep's frames if there is no scene.
+  const AttributedEffect& picture() const {
+    if (scene != nullptr) return *scene;
+    return *sweep;
+  }
+  bool absent() const {
+    return (scene == nullptr || scene->absent) && (sweep == nullptr || sweep->absent);
+  }
+};
+std::vector<AttributionRow> RowsOf(const Attribution& attribution);
+
+// The columns of the table beyond the effect's name; a scene and a sweep each add columns. Cells
+// are texts as shown, "-" where there is no value.
+struct AttributionTable {
+  struct Column {
+    std::string group, name;  // "picture", "rms gl"
+  };
+  std::vector<Column> columns;  // columns of one group are adjacent
+  struct Line {
+    std::string name;
+    std::vector<std::string> cells;
+  };
+  std::vector<Line> lines;  // the first line is "with all"
+};
+AttributionTable TableOf(const Attribution& attribution);
+// Notes that are needed to read the table, one sentence each.
+std::vector<std::string> AttributionNotes(const Attribution& attribution);
+
+std::string AttributionText(const Attribution& attribution);
+std::string AttributionCsv(const Attribution& attribution);
+nlohmann::json AttributionJson(const Attribution& attribution);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_REPORT_ATTRIBUTION_TABLE_H_

@@ -1,0 +1,368 @@
+#include "tools/report/calibration_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "thicklens/base/printable_text.h"
+#include "tools/report/blur_law.h"
+#include "tools/report/calibration_summary.h"
+#include "tools/report/calibration_words.h"
+#include "tools/report/determined.h"
+
+namespace thicklens::tools {
+namespace {
+
+using nlohmann::json;
+
+json Number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json Number(const std::optional<double>& value) { return value ? Number(*value) : json(nullptr); }
+
+// A meter that did not run leaves 0, which no meter measures.
+json Measured(double value) { return value == 0 ? json(nullptr) : Number(value); }
+
+json ResultJson(const std::optional<calib::Result>& result) {
+  if (!result || (!std::isfinite(result->value) && !result->systematic)) return nullptr;
+  json out = {{"value", Number(result->value)}, {"sigma", Number(result->sigma)}};
+  out["systematic"] = nullptr;
+  if (result->systematic && result->systematic->allFinite())
+    out["systematic"] = json::array({result->systematic->x(), result->systematic->y()});
+  return out;
+}
+
+// A value of the source's recipe, which has no error estimate.
+json SourceResultJson(const std::optional<double>& value) {
+  if (!value || !std::isfinite(*value)) return nullptr;
+  return {{"value", *value}, {"sigma", nullptr}, {"systematic", nullptr}};
+}
+
+json EstimateJson(const model::Estimate& estimate) {
+  return {{"value", Number(estimate.value)}, {"sigma", Number(estimate.sigma)}};
+}
+
+json EstimateJson(const std::optional<model::Estimate>& estimate) {
+  return estimate ? EstimateJson(*estimate) : json(nullptr);
+}
+
+json NumbersJson(const std::vector<double>& values) {
+  json out = json::array();
+  for (double value : values) out.push_back(Number(value));
+  return out;
+}
+
+json RangeJson(const Eigen::Vector2d& range) {
+  return json::array({Number(range.x()), Number(range.y())});
+}
+
+json TextsJson(const std::vector<std::string>& texts) {
+  json out = json::array();
+  for (const std::string& text : texts) out.push_back(PrintableUtf8(text));
+  return out;
+}
+
+json TextJson(const std::string& text) {
+  return text.empty() ? json(nullptr) : json(PrintableUtf8(text));
+}
+
+// Of a step that was done; else there is nothing to count.
+json Count(bool done, int count) { return done ? json(count) : json(nullptr); }
+
+// No frame that was opened has all of these at 0 and passes.
+bool IsMeasured(const calib::FrameMeasurement& frame) {
+  const calib::FrameStatistics& s = frame.statistics;
+  return !frame.rejection.empty() || s.mean_stored != 0 || s.contrast != 0 || s.noise_sigma != 0;
+}
+
+json StatisticsJson(const calib::FrameStatistics& statistics) {
+  return {{"mean_stored", Number(statistics.mean_stored)},
+          {"mean_linear", Number(statistics.mean_linear)},
+          {"contrast", Number(statistics.contrast)},
+          {"noise_sigma", Number(statistics.noise_sigma)},
+          {"top_gradient_per_px", Number(statistics.top_gradient)},
+          {"saturated_fraction", Number(statistics.saturated_fraction)},
+          {"saturation_level", Number(statistics.saturation_level)}};
+}
+
+// Frame by frame what the figures show. `law` may be null.
+json FrameJson(const calib::FrameMeasurement& frame, const BlurLaw* law) {
+  const bool has_blur = frame.blur_sigma_error_px != 0;
+  const bool has_edges = frame.edge_count > 0 || frame.mean_edge_slope != 0;
+  const bool has_reading_error = frame.reading_error_sigma_mm > 0;
+  const bool has_law = law != nullptr && IsDepth(frame.depth_mm);
+  json out = {
+      {"image", PrintableUtf8(frame.image)},
+      {"reading_mm", Number(frame.reading_mm)},
+      {"depth_mm", Measured(frame.depth_mm)},
+      {"rejection", TextJson(frame.rejection)},
+      {"not_in_fit", TextJson(frame.not_in_fit)},
+      {"statistics", IsMeasured(frame) ? StatisticsJson(frame.statistics) : json(nullptr)},
+      {"mean_edge_slope_per_px", Measured(frame.mean_edge_slope)},
+      {"normalised_edge_slope_per_px", Measured(frame.normalised_edge_slope)},
+      {"edge_count", Count(has_edges, frame.edge_count)},
+      {"source_blur_sigma_px", Measured(frame.source_blur_sigma_px)},
+      {"blur_sigma_px", has_blur ? Number(frame.blur_sigma_px) : json(nullptr)},
+      {"blur_sigma_error_px", has_blur ? Number(frame.blur_sigma_error_px) : json(nullptr)},
+      {"in_blur_fit", frame.in_blur_fit},
+      {"blur_fit_weight", frame.in_blur_fit ? Number(frame.blur_fit_weight) : json(nullptr)},
+      {"image_scale", Number(frame.image_scale)},
+      {"image_scale_sigma", Measured(frame.image_scale ? frame.image_scale_sigma : 0)},
+      {"in_scale_fit", frame.in_scale_fit},
+      {"reading_error_mm", has_reading_error ? Number(frame.reading_error_mm) : json(nullptr)},
+      {"reading_error_sigma_mm",
+       has_reading_error ? Number(frame.reading_error_sigma_mm) : json(nullptr)}};
+  out["blur_law_sigma_px"] = has_law ? Number(law->SigmaPx(frame.depth_mm)) : json(nullptr);
+  out["blur_law_error_px"] = has_law ? Number(law->SigmaErrorPx(frame.depth_mm)) : json(nullptr);
+  out["blur_residual_sigmas"] = has_law ? Number(law->ResidualSigmas(frame)) : json(nullptr);
+  return out;
+}
+
+json ImageJson(const calib::Calibration& calibration, int index) {
+  if (index < 0 || index >= static_cast<int>(calibration.frames.size())) return nullptr;
+  return PrintableUtf8(calibration.frames[static_cast<std::size_t>(index)].image);
+}
+
+json SourceJson(const calib::Calibration& calibration, const std::vector<ResultRow>& rows) {
+  json out = {
+      {"done", calibration.source.done},
+      {"message", PrintableUtf8(calibration.source.message)},
+      {"sharpest_image", ImageJson(calibration, calibration.source.sharpest_frame)},
+      {"ratio_frames", Count(calibration.source.done, calibration.source.ratio_frames)},
+      {"sharpest_normalised_image",
+       ImageJson(calibration, calibration.source.sharpest_normalised_frame)},
+      {"normalised_focus_depth_mm", Measured(calibration.source.normalised_focus_depth_mm)}};
+  for (const ResultRow& row : rows)
+    if (row.source || row.key == "image_distance_mm" || row.key == "focus_depth_mm" ||
+        row.key == "blur_ratio")
+      out[row.key] = SourceResultJson(row.source);
+  return out;
+}
+
+json SharpnessPeakJson(const calib::Calibration& calibration, const std::vector<ResultRow>& rows) {
+  const calib::SharpnessPeak& peak = calibration.sharpness;
+  json out = {{"done", peak.done},
+              {"message", PrintableUtf8(peak.message)},
+              {"frames_used", Count(peak.done, peak.frames_used)}};
+  for (const ResultRow& row : rows)
+    if (row.key == "focus_depth_mm") out[row.key] = ResultJson(row.peak);
+  out["fitted_depths_mm"] = nullptr;
+  out["log_parabola"] = nullptr;
+  if (peak.done) {
+    out["fitted_depths_mm"] = json::array({Number(peak.from_depth_mm), Number(peak.to_depth_mm)});
+    const Eigen::Vector3d& c = peak.log_parabola;
+    out["log_parabola"] = {{"coefficients", NumbersJson({c[0], c[1], c[2]})},
+                           {"reference_depth_mm", Number(peak.reference_depth_mm)}};
+  }
+  return out;
+}
+
+json ScaleLawJson(const calib::Calibration& calibration) {
+  const calib::ScaleLaw& scale = calibration.scale;
+  const bool done = scale.done;
+  return {{"done", done},
+          {"message", PrintableUtf8(scale.message)},
+          {"kind", ScaleKindName(scale.kind)},
+          {"reference_image", ImageJson(calibration, scale.reference_frame)},
+          {"offset_mm", done ? ResultJson(scale.offset_mm) : json(nullptr)},
+          {"reference_depth_mm", done ? Number(scale.reference_depth_mm) : json(nullptr)},
+          {"reading_rms_mm", done ? Number(scale.reading_rms_mm) : json(nullptr)},
+          {"frames_used", Count(done, scale.frames_used)},
+          {"change_over_sweep", EstimateJson(scale.change_over_sweep)},
+          {"distortion_at_corner", EstimateJson(scale.distortion_at_corner)}};
+}
+
+json CovarianceJson(const calib::Calibration& calibration) {
+  if (calibration.covariance_order.empty() || calibration.covariance.size() == 0) return nullptr;
+  json rows = json::array();
+  for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
+    json row = json::array();
+    for (Eigen::Index j = 0; j < calibration.covariance.cols(); ++j)
+      row.push_back(Number(calibration.covariance(i, j)));
+    rows.push_back(std::move(row));
+  }
+  return {{"order", TextsJson(calibration.covariance_order)}, {"rows", std::move(rows)}};
+}
+
+json TruthJson(const std::vector<ResultRow>& rows) {
+  json fit = json::object(), source = json::object(), peak = json::object(), out;
+  for (const ResultRow& row : rows) {
+    out[row.key] = Number(row.truth);
+    if (!row.truth) continue;
+    if (row.fit) fit[row.key] = Number(row.fit->value - *row.truth);
+    if (row.source) source[row.key] = Number(*row.source - *row.truth);
+    if (row.peak) peak[row.key] = Number(row.peak->value - *row.truth);
+  }
+  out["errors"] = {{"fit", fit}, {"source", source}, {"sharpness_peak", peak}};
+  return out;
+}
+
+json BlurFitJson(const calib::BlurFit& blur) {
+  const bool compared = blur.done && blur.gaussian_misfit && blur.disc_misfit;
+  return {{"done", blur.done},
+          {"message", PrintableUtf8(blur.message)},
+          {"frames_used", Count(blur.done, blur.frames_used)},
+          {"meter", TextJson(blur.meter)},
+          {"family", model::PsfName(blur.family)},
+          {"band", blur.band ? json(*blur.band) : json(nullptr)},
+          {"tails", blur.tails > 0 ? json(blur.tails) : json(nullptr)},
+          {"weak_direction", TextJson(blur.weak_direction)},
+          {"better_psf", compared ? json(model::PsfName(blur.better_psf)) : json(nullptr)},
+          {"gaussian_misfit_chi2_per_dof", Number(blur.gaussian_misfit)},
+          {"disc_misfit_chi2_per_dof", Number(blur.disc_misfit)},
+          {"outside_sweep_mm", blur.done ? Number(blur.outside_mm) : json(nullptr)}};
+}
+
+json SideJson(const calib::SideFit& side) {
+  return {{"done", side.done},
+          {"message", PrintableUtf8(side.message)},
+          {"focus_depth_mm", side.done ? EstimateJson(side.focus_depth_mm) : json(nullptr)},
+          {"blur_ratio", side.done ? EstimateJson(side.blur_ratio) : json(nullptr)},
+          {"frames_used", Count(side.done, side.frames_used)}};
+}
+
+json FieldJson(const calib::FieldMap& field) {
+  json tiles = json::array(), clusters = json::array();
+  for (const calib::FieldTile& tile : field.tiles)
+    tiles.push_back(
+        {{"centre_px", RangeJson(tile.centre_px)},
+         {"done", tile.done},
+         {"message", PrintableUtf8(tile.message)},
+         {"focus_depth_mm", tile.done ? EstimateJson(tile.focus_depth_mm) : json(nullptr)},
+         {"cluster", Count(tile.done, tile.cluster)}});
+  for (const calib::DepthCluster& cluster : field.clusters)
+    clusters.push_back(
+        {{"focus_depth_mm", EstimateJson(cluster.focus_depth_mm)}, {"tiles", cluster.tiles}});
+  return {{"done", field.done},
+          {"message", PrintableUtf8(field.message)},
+          {"columns", Count(field.done, field.columns)},
+          {"rows", Count(field.done, field.rows)},
+          {"tiles", std::move(tiles)},
+          {"tilt_right_deg", EstimateJson(field.tilt_right_deg)},
+          {"tilt_down_deg", EstimateJson(field.tilt_down_deg)},
+          {"curvature_mm", EstimateJson(field.curvature_mm)},
+          {"astigmatism_mm", EstimateJson(field.astigmatism_mm)},
+          {"clusters", std::move(clusters)}};
+}
+
+json ChannelsJson(const std::vector<calib::ChannelFocus>& channels) {
+  json out = json::array();
+  for (const calib::ChannelFocus& channel : channels)
+    out.push_back(
+        {{"name", PrintableUtf8(channel.name)},
+         {"done", channel.done},
+         {"message", PrintableUtf8(channel.message)},
+         {"focus_depth_mm", channel.done ? EstimateJson(channel.focus_depth_mm) : json(nullptr)}});
+  return out;
+}
+
+json MagnificationJson(const std::optional<calib::MagnificationCheck>& check) {
+  if (!check) return nullptr;
+  return {{"period_px", Number(check->period_px)},
+          {"period_mm", Number(check->period_mm)},
+          {"image_distance_mm", EstimateJson(check->image_distance_mm)}};
+}
+
+json PartsJson(const std::vector<calib::SystematicPart>& parts) {
+  json out = json::array();
+  for (const calib::SystematicPart& part : parts)
+    out.push_back({{"name", PrintableUtf8(part.name)},
+                   {"focus_depth_mm", RangeJson(part.focus_depth_mm)},
+                   {"image_distance_mm", RangeJson(part.image_distance_mm)},
+                   {"blur_ratio", RangeJson(part.blur_ratio)},
+                   {"remedy", TextJson(part.remedy)}});
+  return out;
+}
+
+json ExamplesJson(const calib::Calibration& calibration) {
+  json out = json::array();
+  for (const calib::BlurExample& example : calibration.examples)
+    out.push_back(
+        {{"image", ImageJson(calibration, example.frame)},
+         {"kind", example.is_edge ? "edge" : "transfer"},
+         {example.is_edge ? "distance_px" : "frequency_cycles_per_px", NumbersJson(example.x)},
+         {"measured", NumbersJson(example.measured)},
+         {"gaussian", NumbersJson(example.gaussian)},
+         {"disc", NumbersJson(example.disc)}});
+  return out;
+}
+
+// What the fit alone says, the results apart.
+json FitJson(const calib::Calibration& calibration) {
+  const bool done = calibration.blur.done;
+  return {{"chi2_per_dof", done ? Number(calibration.blur.chi2_per_dof) : json(nullptr)},
+          {"undetermined", TextsJson(calibration.blur.undetermined)},
+          {"covariance", CovarianceJson(calibration)},
+          {"blur_fit", BlurFitJson(calibration.blur)},
+          {"sides",
+           {{"nearer", SideJson(calibration.nearer)},
+            {"farther", SideJson(calibration.farther)},
+            {"apart_mm", EstimateJson(SidesApartMm(calibration))}}},
+          {"field", FieldJson(calibration.field)},
+          {"channels", ChannelsJson(calibration.channels)},
+          {"systematic_parts", PartsJson(calibration.systematic_parts)},
+          {"advice", TextJson(calibration.advice)},
+          {"examples", ExamplesJson(calibration)},
+          {"frames_used", calibration.frames_used},
+          {"status", calib::OutcomeName(calibration.outcome)},
+          {"reason",
+           calibration.outcome == calib::Outcome::kOk ? "" : PrintableUtf8(calibration.reason)}};
+}
+
+json FramesJson(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
+  const std::optional<BlurLaw> law = BlurLaw::Of(sweep, calibration);
+  json frames = json::array();
+  for (const calib::FrameMeasurement& frame : calibration.frames)
+    frames.push_back(FrameJson(frame, law ? &*law : nullptr));
+  return frames;
+}
+
+json RejectedJson(const calib::Calibration& calibration) {
+  json rejected = json::array();
+  for (const calib::FrameMeasurement& frame : calibration.frames)
+    if (!frame.rejection.empty())
+      rejected.push_back(
+          {{"image", PrintableUtf8(frame.image)}, {"reason", PrintableUtf8(frame.rejection)}});
+  return rejected;
+}
+
+}  // namespace
+
+json CalibrationJson(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
+                     const model::SweepTruth* truth, bool use_source_recipe) {
+  const std::vector<ResultRow> rows = ResultRows(calibration, truth);
+  json fit = FitJson(calibration), out;
+  for (const ResultRow& row : rows) fit[row.key] = ResultJson(row.fit);
+  out["other_methods"] = {{"source", SourceJson(calibration, rows)},
+                          {"sharpness_peak", SharpnessPeakJson(calibration, rows)}};
+  if (use_source_recipe) {
+    const calib::SourceRecipe& source = calibration.source;
+    out["status"] = source.done ? "ok" : "refused";
+    out["reason"] = source.done ? "" : PrintableUtf8(source.message);
+    out["frames_used"] = Count(source.done, source.ratio_frames);
+    out["chi2_per_dof"] = nullptr;
+    for (const ResultRow& row : rows) out[row.key] = SourceResultJson(row.source);
+    out["other_methods"]["fit"] = std::move(fit);
+  } else {
+    out.update(fit);
+  }
+  out["method"] = use_source_recipe ? "source" : "fit";
+  out["frames"] = FramesJson(sweep, calibration);
+  out["frames_rejected"] = RejectedJson(calibration);
+  out["seconds"] = Number(calibration.seconds);
+  out["camera"] = PrintableUtf8(sweep.camera.name);
+  out["assumed_fields"] = TextsJson(model::AssumedFields(sweep.camera));
+  out["warnings"] = TextsJson(calibration.warnings);
+  out["scale_law"] = ScaleLawJson(calibration);
+  out["sharpest_reading"] = SharpestJson(calibration);
+  out["diagnoses"] = DiagnosesJson(calibration);
+  out["frame_structure"] = StructureJson(calibration.structure);
+  out["magnification"] = MagnificationJson(calibration.magnification);
+  if (truth != nullptr) out["truth"] = TruthJson(rows);
+  return out;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,244 @@
+#include "tools/report/calibration_summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+
+#include "thicklens/base/printable_text.h"
+#include "tools/report/calibration_words.h"
+#include "tools/report/determined.h"
+#include "tools/report/rejection_groups.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr char kNotRun[] = "not run";
+constexpr std::size_t kPartsTold = 3;  // systematic parts in the text; the rest is in the JSON
+
+std::optional<std::string> ImageOf(const calib::Calibration& calibration, int index) {
+  if (index < 0 || index >= static_cast<int>(calibration.frames.size())) return std::nullopt;
+  return PrintableUtf8(calibration.frames[static_cast<std::size_t>(index)].image);
+}
+
+// A table of text: the first column to the left, the others to the right, two spaces between.
+std::string AlignedTable(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const std::vector<std::string>& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()), 0);
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  std::string text;
+  for (const std::vector<std::string>& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i)
+      text += i == 0 ? fmt::format("{:<{}}", row[i], widths[i])
+                     : fmt::format("  {:>{}}", row[i], widths[i]);
+    text += '\n';
+  }
+  return text;
+}
+
+std::string ResultTable(const std::vector<ResultRow>& results, bool has_truth) {
+  std::vector<std::vector<std::string>> rows;
+  rows.push_back({"", "source's recipe", "fit +- sigma", "systematic interval"});
+  if (has_truth)
+    for (const char* name : {"truth", "fit - truth", "source - truth"})
+      rows.back().emplace_back(name);
+  for (const ResultRow& result : results) {
+    const double sigma = result.fit ? result.fit->sigma : 0;
+    const auto rounded = [&](const std::optional<double>& value) {
+      return value ? RoundedTo(*value, sigma) : std::string("-");
+    };
+    std::vector<std::string> row = {
+        result.unit.empty() ? result.label : fmt::format("{} [{}]", result.label, result.unit),
+        rounded(result.source), "-", "-"};
+    if (result.fit) {
+      // Without a sigma it was not fitted: given, or taken for granted within the interval.
+      row[2] = !std::isfinite(result.fit->value) ? std::string("not determined")
+               : UsableSigma(sigma) ? fmt::format("{} +- {}", RoundedTo(result.fit->value, sigma),
+                                                  RoundedSigma(sigma))
+                                    : fmt::format("{} (held)", RoundedTo(result.fit->value, sigma));
+      if (result.fit->systematic)
+        row[3] = fmt::format("{} .. {}", RoundedTo(result.fit->systematic->x(), sigma),
+                             RoundedTo(result.fit->systematic->y(), sigma));
+    }
+    if (has_truth) {
+      row.push_back(rounded(result.truth));
+      std::string error = "-";
+      if (result.truth && result.fit && std::isfinite(result.fit->value)) {
+        const double off = result.fit->value - *result.truth;
+        const auto& interval = result.fit->systematic;
+        const bool is_within =
+            interval && interval->x() <= *result.truth && *result.truth <= interval->y();
+        error = SignedRoundedTo(off, sigma);
+        // sigma is the statistical part alone.
+        if (is_within && std::abs(off) > 2 * sigma) {
+          error += " (within the interval)";
+        } else if (UsableSigma(sigma)) {
+          error += fmt::format(" ({:+.1f} sigma)", off / sigma);
+        }
+      }
+      row.push_back(error);
+      row.push_back(result.truth && result.source
+                        ? SignedRoundedTo(*result.source - *result.truth, sigma)
+                        : "-");
+    }
+    rows.push_back(std::move(row));
+  }
+  return AlignedTable(rows);
+}
+
+void AddLine(const char* about, const std::string& line, std::string* text) {
+  if (!line.empty()) *text += fmt::format("{}: {}\n", about, PrintableUtf8(line));
+}
+
+std::string NormalisedSharpest(const calib::Calibration& calibration) {
+  const calib::SourceRecipe& source = calibration.source;
+  const auto image = ImageOf(calibration, source.sharpest_normalised_frame);
+  if (!image || !(source.normalised_focus_depth_mm > 0)) return "";
+  return fmt::format("; over mean grey {}, at {:.5g} mm", FrameName(*image),
+                     source.normalised_focus_depth_mm);
+}
+
+std::string SecondaryLines(const calib::Calibration& calibration,
+                           const std::vector<ResultRow>& rows) {
+  std::string text;
+  const calib::SourceRecipe& source = calibration.source;
+  text +=
+      source.done
+          ? fmt::format("source's recipe: sharpest frame {}, blur ratio from {} frames{}\n",
+                        FrameName(ImageOf(calibration, source.sharpest_frame).value_or("unknown")),
+                        source.ratio_frames, NormalisedSharpest(calibration))
+          : fmt::format("source's recipe: none, {}\n", PrintableUtf8(source.message));
+  for (const ResultRow& row : rows) {
+    if (row.key != "focus_depth_mm") continue;
+    if (!row.peak) {
+      text += fmt::format("normalised sharpness: no peak, {}\n",
+                          PrintableUtf8(calibration.sharpness.message));
+      continue;
+    }
+    text += fmt::format("normalised sharpness: peak at {} +- {} mm, {} frames",
+                        RoundedTo(row.peak->value, row.peak->sigma), RoundedSigma(row.peak->sigma),
+                        calibration.sharpness.frames_used);
+    if (row.truth)
+      text += fmt::format(", error {} mm",
+                          SignedRoundedTo(row.peak->value - *row.truth, row.peak->sigma));
+    text += '\n';
+  }
+  AddLine("sharpest", SharpestLine(calibration), &text);
+  AddLine("focus", FocusReadingLine(calibration), &text);
+  const calib::ScaleLaw& scale = calibration.scale;
+  if (!scale.done) AddLine("image scale", ScaleChangeLine(scale), &text);
+  text += scale.done
+              ? fmt::format(
+                    "image scale: bench offset {} +- {} mm, readings {:.2g} mm rms about the law, "
+                    "{} frames\n",
+                    RoundedTo(scale.offset_mm.value, scale.offset_mm.sigma),
+                    RoundedSigma(scale.offset_mm.sigma), scale.reading_rms_mm, scale.frames_used)
+              : fmt::format("image scale: no law, {}\n", PrintableUtf8(scale.message));
+  const calib::BlurFit& blur = calibration.blur;
+  AddLine("image scale", DistortionLine(scale), &text);
+  AddLine("magnification", MagnificationLine(calibration), &text);
+  text += blur.done ? fmt::format("blur fit: chi2/dof {:.2f}, {} frames{}\n", blur.chi2_per_dof,
+                                  blur.frames_used, blur.meter.empty() ? "" : ", by " + blur.meter)
+                    : fmt::format("blur fit: none, {}\n", PrintableUtf8(blur.message));
+  for (const std::string& name : blur.undetermined)
+    text += fmt::format("blur fit: the data do not determine {}\n", PrintableUtf8(name));
+  AddLine("blur fit", WorstKnownLine(blur), &text);
+  AddLine("blur fit", OutsideLine(blur), &text);
+  return text;
+}
+
+// What the frames say beyond the results: shape of the blur, sides, field, colours.
+std::string DetailLines(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
+  std::string text;
+  AddLine("blur shape", ShapeLine(sweep, calibration.blur), &text);
+  if (calibration.nearer.done || calibration.farther.done)
+    AddLine("sides of focus", SidesLine(calibration), &text);
+  for (const std::string& line : FieldLines(calibration.field)) AddLine("field", line, &text);
+  if (!calibration.field.done && calibration.field.message != kNotRun)
+    AddLine("field", "no map, " + calibration.field.message, &text);
+  AddLine("colours", ChannelLine(calibration.channels), &text);
+  const std::vector<calib::SystematicPart>& parts = calibration.systematic_parts;
+  for (std::size_t i = 0; i < std::min(parts.size(), kPartsTold); ++i)
+    AddLine("systematic",
+            fmt::format("{}: zf {} mm, d1 {} mm, kappa {}", parts[i].name,
+                        PartRange(parts[i].focus_depth_mm), PartRange(parts[i].image_distance_mm),
+                        PartRange(parts[i].blur_ratio)),
+            &text);
+  AddLine("advice", calibration.advice, &text);
+  if (calibration.outcome == calib::Outcome::kRefused)
+    for (const std::string& line : DiagnosisLines(calibration)) AddLine("compared", line, &text);
+  return text;
+}
+
+}  // namespace
+
+std::vector<ResultRow> ResultRows(const calib::Calibration& calibration,
+                                  const model::SweepTruth* truth) {
+  std::vector<ResultRow> rows(5);
+  rows[0] = {
+      "image_distance_mm", "image distance d1", "mm", calibration.image_distance_mm, {}, {}, {}};
+  rows[1] = {"focus_depth_mm", "depth of focus zf", "mm", calibration.focus_depth_mm, {}, {}, {}};
+  rows[2] = {"blur_ratio", "blur ratio kappa", "", calibration.blur_ratio, {}, {}, {}};
+  rows[3] = {"blur_floor_px", "blur floor", "px", calibration.blur_floor_px, {}, {}, {}};
+  rows[4] = {"bench_offset_mm", "bench offset", "mm", calibration.bench_offset_mm, {}, {}, {}};
+  if (calibration.source.done) {
+    rows[0].source = calibration.source.image_distance_mm;
+    rows[1].source = calibration.source.focus_depth_mm;
+    rows[2].source = calibration.source.blur_ratio;
+  }
+  if (calibration.sharpness.done)
+    rows[1].peak = calib::Result{calibration.sharpness.focus_depth_mm,
+                                 calibration.sharpness.sigma_mm, std::nullopt};
+  if (truth != nullptr) {
+    rows[0].truth = truth->image_distance_mm;
+    rows[1].truth = truth->focus_depth_mm;
+    rows[2].truth = truth->blur_ratio;
+    rows[3].truth = truth->blur_floor_px;
+    rows[4].truth = truth->bench_offset_mm;
+  }
+  return rows;
+}
+
+std::string FrameName(const std::string& image) {
+  const std::string name = std::filesystem::path(image).filename().string();
+  return PrintableUtf8(name.empty() ? image : name);
+}
+
+std::string CalibrationText(const calib::FocusSweep& sweep, const calib::Calibration& calibration,
+                            const model::SweepTruth* truth) {
+  const std::vector<ResultRow> rows = ResultRows(calibration, truth);
+  const auto rejected =
+      std::count_if(calibration.frames.begin(), calibration.frames.end(),
+                    [](const calib::FrameMeasurement& frame) { return !frame.rejection.empty(); });
+  std::string text =
+      fmt::format("camera {}, {} frames: {} used, {} rejected\n", PrintableUtf8(sweep.camera.name),
+                  sweep.frames.size(), calibration.frames_used, rejected);
+  const auto not_in_fit =
+      std::count_if(calibration.frames.begin(), calibration.frames.end(),
+                    [](const calib::FrameMeasurement& frame) { return !frame.not_in_fit.empty(); });
+  if (not_in_fit > 0) {
+    text += fmt::format(
+        "  {} more say nothing of the blur: too strongly blurred or too far off in scale for the "
+        "part of the target that all frames share\n",
+        not_in_fit);
+  }
+  text += RejectionLines(calibration.frames) + '\n';
+  if (std::any_of(rows.begin(), rows.end(),
+                  [](const ResultRow& row) { return row.fit || row.source || row.peak; }))
+    text += ResultTable(rows, truth != nullptr) + '\n';
+  text += SecondaryLines(calibration, rows) + DetailLines(sweep, calibration);
+  for (const std::string& warning : calibration.warnings)
+    text += fmt::format("warning: {}\n", PrintableUtf8(warning));
+  text += calibration.outcome == calib::Outcome::kOk
+              ? fmt::format("{}", calib::OutcomeName(calibration.outcome))
+              : fmt::format("{}: {}", calib::OutcomeName(calibration.outcome),
+                            PrintableUtf8(calibration.reason));
+  text += fmt::format(" ({:.1f} s)\n", calibration.seconds);
+  return text;
+}
+
+}  // namespace thicklens::tools

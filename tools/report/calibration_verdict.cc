@@ -1,0 +1,136 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "thicklens/base/printable_text.h"
+#include "tools/report/calibration_sections.h"
+#include "tools/report/calibration_words.h"
+#include "tools/report/determined.h"
+#include "tools/report/rounding.h"
+
+namespace thicklens::tools {
+namespace {
+
+using calib::Calibration;
+using calib::FocusSweep;
+
+// Of the sigma of the depth of focus: from here on the bench zero's is most of it.
+constexpr double kDominantShare = 0.7;
+
+std::string Paragraph(const std::string& text) {
+  return text.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeXml(text));
+}
+
+std::string FoundInWords(const Calibration& calibration) {
+  std::vector<std::string> found;
+  if (calibration.image_distance_mm)
+    found.push_back(
+        fmt::format("image distance d1 = {} mm", WithSigma(*calibration.image_distance_mm)));
+  if (calibration.focus_depth_mm)
+    found.push_back(
+        fmt::format("depth of focus zf = {} mm", WithSigma(*calibration.focus_depth_mm)));
+  if (calibration.blur_ratio)
+    found.push_back(fmt::format("blur ratio κ = {}", WithSigma(*calibration.blur_ratio)));
+  if (found.empty()) return "";
+  return fmt::format("Found: {}, from {} of {} frames{}.", fmt::join(found, ", "),
+                     calibration.frames_used, calibration.frames.size(),
+                     calibration.blur.done ? fmt::format(", χ²/dof {:.2f} (1 is expected)",
+                                                         calibration.blur.chi2_per_dof)
+                                           : "");
+}
+
+// What limits the depth of focus, noise or the systematic interval, in words; and what would help,
+// unless the calibration itself advises.
+std::string LimitInWords(const FocusSweep& sweep, const Calibration& calibration) {
+  if (!calibration.focus_depth_mm) return "";
+  const calib::Result& focus = *calibration.focus_depth_mm;
+  if (!focus.systematic || !focus.systematic->allFinite() || !(focus.sigma > 0)) return "";
+  const double half_mm =
+      std::max(focus.systematic->y() - focus.value, focus.value - focus.systematic->x());
+  const bool zero_dominates = calibration.bench_offset_mm &&
+                              calibration.bench_offset_mm->sigma > kDominantShare * focus.sigma;
+  const std::string numbers =
+      fmt::format("{} ±{} mm of the depth of focus open, the systematic interval up to {:.2g} mm.",
+                  zero_dominates ? "the bench zero leaves" : "noise and readings leave",
+                  RoundedSigma(focus.sigma), half_mm);
+  std::string text, help;
+  if (half_mm > 2 * focus.sigma) {
+    text = "What limits it is systematic: ";
+    help = fmt::format(
+        " More frames would not help; {}both sides of focus and tighter tolerances would.",
+        sweep.floor.given_px ? "" : "a blur floor measured on a knife edge, ");
+  } else if (half_mm < 0.5 * focus.sigma) {
+    text = "What limits it is statistical: ";
+    help = zero_dominates ? " Measuring offset_mm, or a longer sweep, would help."
+                          : " More frames, more light or better readings would help.";
+  } else {
+    text = zero_dominates ? "Bench zero and systematic errors limit it alike: "
+                          : "Noise and systematic errors limit it alike: ";
+  }
+  return text + numbers + (calibration.advice.empty() ? help : "");
+}
+
+// What does not hang on the bench zero or the camera: the first that most people want to know, and
+// all that there is where the rest is refused.
+std::string DeterminedInWords(const Calibration& calibration) {
+  std::string html;
+  const auto add = [&html](const std::string& about, const std::string& line) {
+    if (!line.empty()) html += Paragraph(Typeset(AsSentence(about + line)));
+  };
+  if (calibration.sharpest.done) add("The sweep is sharpest at the ", SharpestLine(calibration));
+  add("Focus lies at the ", FocusReadingLine(calibration));
+  if (calibration.outcome != calib::Outcome::kRefused) return html;
+  add("", ScaleChangeLine(calibration.scale));
+  add("", fmt::format("{} of {} frames can be used", calibration.frames_used,
+                      calibration.frames.size()));
+  for (const std::string& line : DiagnosisLines(calibration)) add("Compared: ", line);
+  return html;
+}
+
+std::string Outcome(const Calibration& calibration, std::string* css_class) {
+  if (calibration.outcome == calib::Outcome::kOk) {
+    *css_class = "ok";
+    return "Calibrated";
+  }
+  const bool partial = calibration.outcome == calib::Outcome::kPartial;
+  *css_class = partial ? "partial" : "refused";
+  return (partial ? "Partly calibrated: " : "Refused: ") + calibration.reason;
+}
+
+}  // namespace
+
+std::string AsSentence(std::string text) {
+  if (text.empty()) return text;
+  if (text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  if (text.back() != '.') text += '.';
+  return text;
+}
+
+std::string VerdictSection(const FocusSweep& sweep, const Calibration& calibration) {
+  std::string css_class;
+  const std::string outcome = Outcome(calibration, &css_class);
+  std::string html = fmt::format("<div class=\"verdict {}\">\n<p class=\"outcome\">{}</p>\n",
+                                 css_class, EscapeXml(Typeset(outcome)));
+  if (!calibration.advice.empty())
+    html += fmt::format("<p><b>What to do next:</b> {}</p>\n",
+                        EscapeXml(Typeset(AsSentence(calibration.advice))));
+  html += Paragraph(FoundInWords(calibration));
+  html += DeterminedInWords(calibration);
+  html += Paragraph(LimitInWords(sweep, calibration));
+  const calib::BlurFit& blur = calibration.blur;
+  html += Paragraph(AsSentence(OutsideLine(blur)));
+  if (!blur.undetermined.empty())
+    html +=
+        Paragraph(fmt::format("The data do not determine {}.", fmt::join(blur.undetermined, ", ")));
+  html += Paragraph(AsSentence(WorstKnownLine(blur)));
+  html += Paragraph(AsSentence(Typeset(ShapeLine(sweep, blur))));
+  html += "</div>\n";
+  if (calibration.warnings.empty()) return html;
+  html += "<ul class=\"warnings\">\n";
+  for (const std::string& warning : calibration.warnings)
+    html += fmt::format("<li>{}</li>\n", EscapeXml(Typeset(warning)));
+  return html + "</ul>\n";
+}
+
+}  // namespace thicklens::tools

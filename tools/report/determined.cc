@@ -1,0 +1,120 @@
+#include "tools/report/determined.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "thicklens/base/printable_text.h"
+#include "tools/report/calibration_summary.h"
+#include "tools/report/rounding.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr std::size_t kCausesTold = 4;  // of one symptom in the text; the rest is in the JSON
+
+nlohmann::json FiniteNumber(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
+nlohmann::json ErrorJson(const std::optional<model::Estimate>& estimate) {
+  if (!estimate) return nullptr;
+  return {{"value", FiniteNumber(estimate->value)}, {"sigma", FiniteNumber(estimate->sigma)}};
+}
+
+std::string SharpestImage(const calib::Calibration& calibration) {
+  const int index = calibration.sharpest.sharpest_frame;
+  if (index < 0 || index >= static_cast<int>(calibration.frames.size())) return "";
+  return calibration.frames[static_cast<std::size_t>(index)].image;
+}
+
+}  // namespace
+
+std::string SharpestLine(const calib::Calibration& calibration) {
+  const calib::SharpestReading& sharpest = calibration.sharpest;
+  if (!sharpest.done && sharpest.message == calib::SharpestReading().message) return "";
+  const std::string image = SharpestImage(calibration);
+  const std::string frame =
+      image.empty() ? "" : fmt::format("; {} is the sharpest", FrameName(image));
+  if (!sharpest.done) return fmt::format("no peak, {}{}", sharpest.message, frame);
+  return fmt::format("reading {}, by {} frames{}",
+                     WithError(sharpest.reading_mm.value, sharpest.reading_mm.sigma, "mm"),
+                     sharpest.frames_used, frame);
+}
+
+std::string FocusReadingLine(const calib::Calibration& calibration) {
+  if (!calibration.focus_reading_mm) return "";
+  return fmt::format(
+      "reading {}, by the blur; the error of the bench zero is not in it",
+      WithError(calibration.focus_reading_mm->value, calibration.focus_reading_mm->sigma, "mm"));
+}
+
+std::string ScaleChangeLine(const calib::ScaleLaw& scale) {
+  if (!scale.change_over_sweep) return "";
+  const model::Estimate& change = *scale.change_over_sweep;
+  const bool is_seen = std::abs(change.value) > 4 * change.sigma;
+  return fmt::format("1/scale changes by {} over the sweep: {}",
+                     SignedWithError(100 * change.value, 100 * change.sigma, "%"),
+                     !is_seen           ? "none beyond its error"
+                     : change.value > 0 ? "the target looks smaller at larger readings"
+                                        : "the target looks larger at larger readings");
+}
+
+std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration) {
+  std::vector<std::string> lines;
+  for (const calib::Diagnosis& diagnosis : calibration.diagnoses) {
+    std::vector<std::string> causes;
+    for (std::size_t i = 0; i < std::min(diagnosis.causes.size(), kCausesTold); ++i)
+      causes.push_back(fmt::format("{} (chi2 {:.3g}{})", diagnosis.causes[i].cause,
+                                   diagnosis.causes[i].chi2, i < diagnosis.named ? ", named" : ""));
+    causes.push_back(fmt::format("nothing at all (chi2 {:.3g})", diagnosis.chi2_of_none));
+    lines.push_back(fmt::format("{}: {}", diagnosis.symptom, fmt::join(causes, "; ")));
+  }
+  return lines;
+}
+
+nlohmann::json SharpestJson(const calib::Calibration& calibration) {
+  const calib::SharpestReading& sharpest = calibration.sharpest;
+  nlohmann::json out = {{"done", sharpest.done}, {"message", PrintableUtf8(sharpest.message)}};
+  out["reading_mm"] = sharpest.done ? ErrorJson(sharpest.reading_mm) : nlohmann::json(nullptr);
+  out["frames_used"] =
+      sharpest.done ? nlohmann::json(sharpest.frames_used) : nlohmann::json(nullptr);
+  const std::string image = SharpestImage(calibration);
+  out["sharpest_image"] =
+      image.empty() ? nlohmann::json(nullptr) : nlohmann::json(PrintableUtf8(image));
+  out["focus_by_blur_mm"] = ErrorJson(calibration.focus_reading_mm);
+  return out;
+}
+
+nlohmann::json DiagnosesJson(const calib::Calibration& calibration) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const calib::Diagnosis& diagnosis : calibration.diagnoses) {
+    nlohmann::json causes = nlohmann::json::array();
+    for (std::size_t i = 0; i < diagnosis.causes.size(); ++i)
+      causes.push_back({{"cause", PrintableUtf8(diagnosis.causes[i].cause)},
+                        {"chi2", FiniteNumber(diagnosis.causes[i].chi2)},
+                        {"named", i < diagnosis.named}});
+    out.push_back({{"symptom", PrintableUtf8(diagnosis.symptom)},
+                   {"chi2_of_none", FiniteNumber(diagnosis.chi2_of_none)},
+                   {"causes", std::move(causes)},
+                   {"separates", diagnosis.separates.empty()
+                                     ? nlohmann::json(nullptr)
+                                     : nlohmann::json(PrintableUtf8(diagnosis.separates))}});
+  }
+  return out;
+}
+
+nlohmann::json StructureJson(const calib::FrameStructureFinding& structure) {
+  if (!structure.measured) return nullptr;
+  nlohmann::json out = {{"ln_corner_over_centre", ErrorJson(structure.vignetting)},
+                        {"fixed_structure", ErrorJson(structure.fixed_structure)},
+                        {"bands", ErrorJson(structure.bands)}};
+  out["bands_run_along"] = !structure.HasBands()         ? nlohmann::json(nullptr)
+                           : structure.bands_are_columns ? nlohmann::json("columns")
+                                                         : nlohmann::json("rows");
+  return out;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,34 @@
+#ifndef THICKLENS_TOOLS_REPORT_DETERMINED_H_
+#define THICKLENS_TOOLS_REPORT_DETERMINED_H_
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "thicklens/calib/calibrate.h"
+
+namespace thicklens::tools {
+
+// Findings of a sweep that hold even if its calibration is refused: the sharpest frame, the
+// position of focus, the change of the image scale, and the causes of a symptom that were compared.
+// Each is one line without a newline, with "+-" and "-" in plain characters.
+
+// "reading 110.03 +- 0.11 mm, by 5 frames; frame_015.png is the sharpest", or why there is none.
+std::string SharpestLine(const calib::Calibration& calibration);
+// "reading 109.9984 +- 0.0004 mm, by the blur; the bench zero is not in it"; otherwise empty.
+std::string FocusReadingLine(const calib::Calibration& calibration);
+// "1/scale changes by +10.1 +- 0.1 % over the sweep: the target looks smaller at larger readings";
+// empty if it was not measured.
+std::string ScaleChangeLine(const calib::ScaleLaw& scale);
+// "the image scale against the readings: the target moves as stated (chi2 31); then ...": one line
+// for each comparison.
+std::vector<std::string> DiagnosisLines(const calib::Calibration& calibration);
+
+// The findings as JSON; null if nothing was measured.
+nlohmann::json SharpestJson(const calib::Calibration& calibration);
+nlohmann::json DiagnosesJson(const calib::Calibration& calibration);
+nlohmann::json StructureJson(const calib::FrameStructureFinding& structure);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_REPORT_DETERMINED_H_

@@ -1,0 +1,102 @@
+#include "tools/report/effect_costs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <ctime>
+
+#include "thicklens/model/light_field.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr int kPatchWidthPx = 96, kPatchHeightPx = 64;
+constexpr int kRounds = 5;
+constexpr double kFarthestMm = 1e6;
+// Of the picture's time; what is less is lost in what one run differs from the next.
+constexpr double kMeasurable = 0.05;
+
+model::SceneLayer Leaves(double depth_mm) {
+  model::SceneLayer layer;
+  layer.plane.depth_mm = depth_mm;
+  layer.texture.kind = model::TextureKind::kDeadLeaves;
+  return layer;
+}
+
+model::SceneSimulationOptions PatchOf(const model::Camera& camera, const DepthRange& range,
+                                      const model::SceneSimulationOptions& sensor) {
+  model::SceneSimulationOptions patch = sensor;
+  const model::Sensor& whole = camera.sensor;
+  const int width_px = std::min(kPatchWidthPx, whole.width_px);
+  const int height_px = std::min(kPatchHeightPx, whole.height_px);
+  patch.camera = model::CropCamera(
+      camera,
+      {(whole.width_px - width_px) / 2, (whole.height_px - height_px) / 2, width_px, height_px});
+  model::SceneLayer card = Leaves(range.near_mm);
+  card.outline.shape = model::OutlineOptions::Shape::kRectangle;
+  card.outline.centre = {0, height_px / 2.0};
+  card.outline.size = {static_cast<double>(width_px), 4.0 * height_px};
+  patch.layers = {Leaves(std::min(range.far_mm, kFarthestMm)), card};
+  patch.effects = {};
+  patch.effects.base = model::EffectChoice::Base::kGiven;
+  return patch;
+}
+
+// Of the processor, which says more than the clock where others have it, too.
+double SecondsOf(const model::SceneSimulationOptions& patch) {
+  const std::clock_t start = std::clock();
+  const model::SceneSimulator simulator(patch, {}, 1);
+  simulator.Store(simulator.RenderNoiseless({1, {}}));
+  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+}  // namespace
+
+EffectCosts MeasureEffectCosts(const model::Camera& camera, const DepthRange& range,
+                               const model::SceneSimulationOptions& sensor,
+                               const model::EffectDecision& decision,
+                               const std::function<void(int done, int total)>& tell) {
+  model::SceneSimulationOptions patch = PatchOf(camera, range, sensor);
+  const model::EffectSet known = decision.on.Both(model::PictureEffects());
+  EffectCosts costs;
+  std::vector<model::Effect> effects;
+  for (const model::EffectFinding& finding : decision.findings) {
+    if (!model::PictureEffects().Has(finding.effect)) continue;
+    if (finding.impact.amount == 0 && finding.impact.grey_levels == 0) {
+      costs.of_effect.emplace_back(finding.effect, 0);
+    } else {
+      effects.push_back(finding.effect);
+    }
+  }
+  // First that with those that are on, then that with each effect the other way round.
+  std::vector<std::vector<double>> seconds(effects.size() + 1);
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t i = 0; i <= effects.size(); ++i) {
+      tell(round * static_cast<int>(seconds.size()) + static_cast<int>(i),
+           kRounds * static_cast<int>(seconds.size()));
+      patch.effects.given = known;
+      if (i > 0 && known.Has(effects[i - 1])) patch.effects.given.Remove(effects[i - 1]);
+      if (i > 0 && !known.Has(effects[i - 1])) patch.effects.given.Add(effects[i - 1]);
+      seconds[i].push_back(SecondsOf(patch));
+    }
+  }
+  const model::Sensor& part = patch.camera.sensor;
+  const double patches = static_cast<double>(camera.sensor.width_px) * camera.sensor.height_px /
+                         (static_cast<double>(part.width_px) * part.height_px);
+  const double as_is = Median(seconds[0]);
+  costs.seconds = patches * as_is;
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    const double longer = Median(seconds[i + 1]) - as_is;
+    const double cost = known.Has(effects[i]) ? -longer : longer;
+    costs.of_effect.emplace_back(effects[i],
+                                 std::abs(cost) > kMeasurable * as_is ? patches * cost : 0);
+  }
+  return costs;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,260 @@
+#include "tools/report/target_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "thicklens/model/thick_lens.h"
+
+namespace thicklens::tools {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Measures of a sheet 210 mm or more wide; smaller sheets have them in proportion.
+constexpr double kFullSheetMm = 210;
+constexpr double kMarginMm = 15;
+constexpr double kCaptionHeightMm = 27;
+constexpr double kBarGapMm = 5;
+constexpr double kBarHeightMm = 3;
+constexpr double kTextGapMm = 5;
+constexpr double kTextSizeMm = 3.2;
+// Wider than the mean letter of any common sans serif font, in text sizes.
+constexpr double kLetterWidth = 0.6;
+
+// The pattern over the field, so that a frame somewhat farther away, or beside the middle, still
+// sees nothing else.
+constexpr double kOverfill = 1.15;
+// Part of the field's width and height that the patch takes: of its area each plateau is then 4 %,
+// so that a frame is not given up as clipped because of one of them alone; a long pattern has no
+// longer patch than this, so that an edge that leans leaves a plateau on both sides.
+constexpr double kPatchPart = 0.28;
+constexpr double kLongestPatch = 1.5;
+// Smaller features than these are lost in the pixels; with larger ones the texture gets scarce.
+constexpr double kFinestFeaturePx = 2;
+constexpr double kFeaturePx = 3;
+constexpr double kMostFeaturePx = 6;
+constexpr double kFeaturesAcross = 360;
+constexpr double kFewestFeaturesAcross = 30;
+constexpr double kMostFeatures = 5e6;
+constexpr double kRoundingSlack = 1e-9;
+
+double RoundToTwoDigits(double value) {
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
+  return std::round(value / unit) * unit;
+}
+
+// Whole tenths, as the caption writes them. The slack keeps 185.9 from becoming 185.8.
+double FloorToTenths(double value_mm) { return std::floor(value_mm * 10 + 1e-6) / 10; }
+double CeilToTenths(double value_mm) { return std::ceil(value_mm * 10 - 1e-6) / 10; }
+
+double SheetScale(const SheetSize& sheet) {
+  return std::min(1.0, std::min(sheet.width_mm, sheet.height_mm) / kFullSheetMm);
+}
+
+// What margins and caption leave to the pattern.
+Rectangle FreeArea(const SheetSize& sheet) {
+  const double margin_mm = kMarginMm * SheetScale(sheet);
+  const double caption_mm = kCaptionHeightMm * SheetScale(sheet);
+  return {margin_mm, margin_mm, FloorToTenths(sheet.width_mm - 2 * margin_mm),
+          FloorToTenths(sheet.height_mm - 2 * margin_mm - caption_mm)};
+}
+
+bool Holds(const Rectangle& free, double width_mm, double height_mm) {
+  return width_mm <= free.width + kRoundingSlack && height_mm <= free.height + kRoundingSlack;
+}
+
+SheetSize Turned(SheetSize sheet) {
+  std::swap(sheet.width_mm, sheet.height_mm);
+  return sheet;
+}
+
+// The sheet, turned if that is allowed and only then holds the field with its overfill.
+SheetSize SheetFor(const SheetSize& sheet, const std::optional<CameraView>& view) {
+  if (!view) return sheet;
+  const double width_mm = CeilToTenths(kOverfill * view->width_mm);
+  const double height_mm = CeilToTenths(kOverfill * view->height_mm);
+  if (Holds(FreeArea(sheet), width_mm, height_mm)) return sheet;
+  if (sheet.may_turn && Holds(FreeArea(Turned(sheet)), width_mm, height_mm)) return Turned(sheet);
+  const Rectangle free = FreeArea(sheet);
+  throw Error(fmt::format(
+      "the camera sees {:.1f} x {:.1f} mm at {:g} mm; a pattern of {:.1f} x {:.1f} mm, which "
+      "overfills this by 15 %, does not fit the sheet of {:g} x {:g} mm ({:.1f} x {:.1f} mm are "
+      "free): take a larger sheet (--size) or a shorter distance",
+      view->width_mm, view->height_mm, view->distance_mm, width_mm, height_mm, sheet.width_mm,
+      sheet.height_mm, free.width, free.height));
+}
+
+Rectangle PatternFor(const SheetSize& sheet, const std::optional<CameraView>& view) {
+  const Rectangle free = FreeArea(sheet);
+  if (!view) return free;
+  const double width_mm = CeilToTenths(kOverfill * view->width_mm);
+  const double height_mm = CeilToTenths(kOverfill * view->height_mm);
+  return {free.x + (free.width - width_mm) / 2, free.y + (free.height - height_mm) / 2, width_mm,
+          height_mm};
+}
+
+Rectangle PatchOf(const Rectangle& pattern) {
+  const double width_mm = kPatchPart * pattern.width / kOverfill;
+  const double height_mm = kPatchPart * pattern.height / kOverfill;
+  Rectangle patch;
+  patch.width = std::min(width_mm, kLongestPatch * height_mm);
+  patch.height = std::min(height_mm, kLongestPatch * width_mm);
+  patch.x = pattern.x + (pattern.width - patch.width) / 2;
+  patch.y = pattern.y + (pattern.height - patch.height) / 2;
+  return patch;
+}
+
+struct Feature {
+  double size_mm = 0;
+  std::string why;
+};
+
+std::string InPixels(double feature_mm, const CameraView& view) {
+  return fmt::format("{:.1f} px of the picture at {:g} mm", feature_mm / view.px_mm,
+                     view.distance_mm);
+}
+
+Feature GivenFeature(double feature_mm, const TargetRequest& request) {
+  if (!(feature_mm >= request.finest_mm)) {
+    throw Error(
+        fmt::format("smallest feature: {:g} mm is below the {:g} mm that the print method "
+                    "resolves: take a larger --feature-mm, or print more finely and say so with "
+                    "--finest-mm",
+                    feature_mm, request.finest_mm));
+  }
+  if (!request.view) return {feature_mm, "as given"};
+  const double feature_px = feature_mm / request.view->px_mm;
+  std::string why = "as given, " + InPixels(feature_mm, *request.view);
+  if (feature_px < kFinestFeaturePx) why += ", finer than the 2 to 6 px that are best";
+  if (feature_px > kMostFeaturePx) why += ", coarser than the 2 to 6 px that are best";
+  return {feature_mm, why};
+}
+
+// Three px, or what the print method resolves if that is not above six.
+Feature FeatureForCamera(const CameraView& view, double finest_mm) {
+  const double best_mm = RoundToTwoDigits(kFeaturePx * view.px_mm);
+  if (best_mm >= finest_mm) {
+    return {best_mm, InPixels(best_mm, view) + ", where 2 to 6 px are best"};
+  }
+  if (finest_mm <= kMostFeaturePx * view.px_mm) {
+    return {finest_mm, InPixels(finest_mm, view) + ", the finest that is printed"};
+  }
+  // The distance from which the finest printed feature is at most six px of pitch p: in the plane
+  // of focus m = f1/(zf - f1), from [S13], so that zf >= f1 (1 + feature/(6 p)) [D47], and with
+  // px_mm = p/m at the distance asked for: zf - f1 grows as px_mm does.
+  const double farther_mm = view.focal_length_mm + (view.distance_mm - view.focal_length_mm) *
+                                                       finest_mm / (kMostFeaturePx * view.px_mm);
+  throw Error(
+      fmt::format("features of 2 to 6 px at {:g} mm measure {:.2g} to {:.2g} mm on the target, "
+                  "below the {:g} mm that the print method resolves: take a larger distance "
+                  "({:.0f} mm or more) or a finer print method (--finest-mm)",
+                  view.distance_mm, kFinestFeaturePx * view.px_mm, kMostFeaturePx * view.px_mm,
+                  finest_mm, std::ceil(farther_mm)));
+}
+
+Feature ChooseFeature(const TargetRequest& request, const Rectangle& pattern) {
+  if (request.feature_mm) return GivenFeature(*request.feature_mm, request);
+  if (request.view) return FeatureForCamera(*request.view, request.finest_mm);
+  const double part_mm =
+      RoundToTwoDigits(std::min(pattern.width, pattern.height) / kFeaturesAcross);
+  if (part_mm >= request.finest_mm) {
+    return {part_mm, "1/360 of the pattern's shorter side, no camera being given"};
+  }
+  return {request.finest_mm, "the finest that is printed, no camera being given"};
+}
+
+void RequirePossibleTexture(const Rectangle& pattern, double feature_mm) {
+  const double shorter_mm = std::min(pattern.width, pattern.height);
+  if (!(shorter_mm >= kFewestFeaturesAcross * feature_mm)) {
+    throw Error(
+        fmt::format("a pattern of {:.1f} x {:.1f} mm has no room for a texture of features of {:g} "
+                    "mm: at least {:g} of them must fit its shorter side",
+                    pattern.width, pattern.height, feature_mm, kFewestFeaturesAcross));
+  }
+  if (!(pattern.width * pattern.height / (feature_mm * feature_mm) <= kMostFeatures)) {
+    throw Error(
+        fmt::format("a pattern of {:.1f} x {:.1f} mm with features of {:g} mm would hold more than "
+                    "{:g} million of them: take a larger --feature-mm or a smaller --size",
+                    pattern.width, pattern.height, feature_mm, kMostFeatures / 1e6));
+  }
+}
+
+double LongestBarMm(double room_mm) {
+  for (const double length_mm : {100.0, 50.0, 20.0}) {
+    if (length_mm <= room_mm) return length_mm;
+  }
+  return 10;
+}
+
+std::vector<std::string> CaptionOf(const TargetPage& page, const std::optional<CameraView>& view) {
+  std::vector<std::string> lines = {
+      fmt::format("thicklens target, pattern {:.1f} x {:.1f} mm, smallest feature {:g} mm, edge "
+                  "{:g} degrees, seed {}",
+                  page.pattern.width, page.pattern.height, page.feature_mm, page.edge_angle_deg,
+                  page.seed),
+      fmt::format("measure this bar: {:.1f} mm; print at 100 %, no scaling", page.bar.width)};
+  if (view) {
+    lines.push_back(fmt::format("for a camera that sees {:.1f} x {:.1f} mm at {:g} mm",
+                                view->width_mm, view->height_mm, view->distance_mm));
+  }
+  return lines;
+}
+
+void AddCaption(const SheetSize& sheet, const std::optional<CameraView>& view, TargetPage* page) {
+  const double scale = SheetScale(sheet);
+  const Rectangle free = FreeArea(sheet);
+  page->bar = {free.x, free.y + free.height + kBarGapMm * scale, LongestBarMm(free.width),
+               kBarHeightMm * scale};
+  page->caption = CaptionOf(*page, view);
+  std::size_t most_letters = 0;
+  for (const std::string& line : page->caption) most_letters = std::max(most_letters, line.size());
+  page->text_size_mm = std::min(kTextSizeMm * scale,
+                                free.width / (kLetterWidth * static_cast<double>(most_letters)));
+  page->first_baseline_y_mm = page->bar.y + page->bar.height + kTextGapMm * scale;
+}
+
+}  // namespace
+
+CameraView ViewOfTarget(const model::Camera& camera, double distance_mm) {
+  const double image_distance_mm = model::ImageDistanceMm(camera.lens, distance_mm);
+  const double magnification =
+      std::abs(model::ChiefRayMagnification(camera.lens, image_distance_mm, distance_mm));
+  const double px_mm = camera.sensor.pixel_pitch_mm / magnification;
+  return {distance_mm, px_mm, px_mm * camera.sensor.width_px, px_mm * camera.sensor.height_px,
+          camera.lens.front_focal_length_mm};
+}
+
+double TargetPage::EdgeX(double y_mm) const {
+  const double centre_x_mm = patch.x + patch.width / 2;
+  const double centre_y_mm = patch.y + patch.height / 2;
+  return centre_x_mm - (y_mm - centre_y_mm) * std::tan(edge_angle_deg * kPi / 180);
+}
+
+TargetPage LayOutTarget(const TargetRequest& request) {
+  const SheetSize sheet = SheetFor(request.sheet, request.view);
+  TargetPage page;
+  page.width_mm = sheet.width_mm;
+  page.height_mm = sheet.height_mm;
+  page.pattern = PatternFor(sheet, request.view);
+  const Feature feature = ChooseFeature(request, page.pattern);
+  RequirePossibleTexture(page.pattern, feature.size_mm);
+  page.patch = PatchOf(page.pattern);
+  page.edge_angle_deg = request.edge_angle_deg;
+  page.feature_mm = feature.size_mm;
+  page.two_tone = request.two_tone;
+  page.seed = request.seed;
+  page.choice =
+      fmt::format("smallest feature {:g} mm ({}); pattern {:.1f} x {:.1f} mm ({})", feature.size_mm,
+                  feature.why, page.pattern.width, page.pattern.height,
+                  request.view ? fmt::format("the field of {:.1f} x {:.1f} mm and 15 %",
+                                             request.view->width_mm, request.view->height_mm)
+                               : "what the sheet holds");
+  AddCaption(sheet, request.view, &page);
+  return page;
+}
+
+}  // namespace thicklens::tools

@@ -1,0 +1,75 @@
+#ifndef THICKLENS_TOOLS_REPORT_TARGET_PAGE_H_
+#define THICKLENS_TOOLS_REPORT_TARGET_PAGE_H_
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/camera.h"
+
+namespace thicklens::tools {
+
+// Size of a sheet of paper.
+struct SheetSize {
+  double width_mm = 0;
+  double height_mm = 0;
+  bool may_turn = false;  // portrait or landscape, whichever holds the pattern
+};
+
+// The field that the camera sees of a target at a distance.
+struct CameraView {
+  double distance_mm = 0;
+  double px_mm = 0;  // size of one px on the target
+  double width_mm = 0;
+  double height_mm = 0;
+  double focal_length_mm = 0;
+};
+// Returns the view of the camera focused on a target at `distance_mm` from its aperture. Throws
+// Error if it cannot be focused there.
+CameraView ViewOfTarget(const model::Camera& camera, double distance_mm);
+
+struct TargetRequest {
+  SheetSize sheet;
+  std::optional<double> feature_mm;  // diameter of the smallest disc; absent: chosen automatically
+  double finest_mm = 0.1;            // smallest feature that the print method resolves
+  double edge_angle_deg = 5;         // from the vertical; positive: the upper end leans right
+  bool two_tone = false;             // only black and white
+  std::uint64_t seed = 1;
+  std::optional<CameraView> view;
+};
+
+// A rectangle on the sheet, mm from its top left corner, y down.
+struct Rectangle {
+  double x = 0, y = 0, width = 0, height = 0;
+};
+
+// A calibration target before it is drawn: a texture, a patch with an edge in its middle, and below
+// it a bar of exact length and a few lines that describe the sheet.
+struct TargetPage {
+  double width_mm = 0;
+  double height_mm = 0;
+  Rectangle pattern;
+  Rectangle patch;  // black on the left of the edge, white on its right
+  double edge_angle_deg = 0;
+  Rectangle bar;
+  std::vector<std::string> caption;
+  double text_size_mm = 0;         // size of the letters' em square
+  double first_baseline_y_mm = 0;  // lines are kLineHeight text sizes apart
+  double feature_mm = 0;
+  bool two_tone = false;
+  std::uint64_t seed = 0;
+  std::string choice;  // the choices and their reasons, in one line
+
+  // Position of the edge at the height y: x = centre - (y - centre) tan(angle), mm.
+  double EdgeX(double y_mm) const;
+};
+constexpr double kLineHeight = 1.4;
+
+// Throws Error with the reason if no such page exists: the field does not fit the sheet, the print
+// method does not resolve the features, or the sheet has no room.
+TargetPage LayOutTarget(const TargetRequest& request);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_REPORT_TARGET_PAGE_H_

@@ -1,0 +1,27 @@
+#ifndef THICKLENS_TOOLS_REPORT_TARGET_TEXTURE_H_
+#define THICKLENS_TOOLS_REPORT_TARGET_TEXTURE_H_
+
+#include <vector>
+
+#include "tools/report/target_page.h"
+
+namespace thicklens::tools {
+
+struct Leaf {
+  double x_mm = 0, y_mm = 0;  // on the sheet
+  double radius_mm = 0;
+  int grey = 0;  // 0 to 255, as stored
+};
+
+// The texture of a target: dead leaves, discs that occlude each other, from the back to the front.
+// The radii are distributed as r^-3, so that every octave of sizes takes the same part of the area:
+// whatever the blur, some of the texture stays visible, and nothing repeats. Occluded leaves are
+// left out. The same page gives the same leaves on every machine.
+std::vector<Leaf> DeadLeaves(const TargetPage& page);
+
+// The grey value where no leaf lies, on less than a thousandth of the area.
+int GreyBehindLeaves(const TargetPage& page);
+
+}  // namespace thicklens::tools
+
+#endif  // THICKLENS_TOOLS_REPORT_TARGET_TEXTURE_H_

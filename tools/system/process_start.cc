@@ -1,0 +1,113 @@
+// This file sees to what must be in order before the program begins. Its first part runs before any
+// library is initialised, so that this file is part of the program itself and not of its library.
+#include "tools/system/process_start.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include "thicklens/base/error.h"
+#include "tools/system/sanitized.h"
+
+// OpenBLAS starts a thread for each processor when it is loaded, before main() and although the
+// program lets it use one. Where memory is short such a thread asks for some for ever, and a fork
+// waits for its end; where there is none to be had, OpenBLAS ends the program. This is OpenBLAS's
+// own function for what OPENBLAS_NUM_THREADS says; the one of the program is found first.
+extern "C" __attribute__((visibility("default"))) int openblas_num_threads_env();
+extern "C" int openblas_num_threads_env() { return 1; }
+
+namespace thicklens::tools {
+namespace {
+
+#if defined(__ELF__) && defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
+
+// Nothing of a library may be called here.
+bool BeginsWith(const char* text, const char* start) {
+  while (*start != '\0' && *text == *start) {
+    ++text;
+    ++start;
+  }
+  return *start == '\0';
+}
+
+bool IsOneOf(const char* text, const char* const* words) {
+  for (; *words != nullptr; ++words) {
+    const char* word = *words;
+    const char* at = text;
+    while (*word != '\0' && *at == *word) {
+      ++at;
+      ++word;
+    }
+    if (*word == '\0' && *at == '\0') return true;
+  }
+  return false;
+}
+
+// Compiled kernels are code: those of the current folder may be anybody's, and the standard for
+// these folders has relative ones ignored.
+constexpr int kFolderCount = 2;
+constexpr const char* kFolders[kFolderCount] = {"XDG_CACHE_HOME=", "POCL_CACHE_DIR="};
+const char* forgotten_folders[kFolderCount] = {};  // their values; the text itself stays
+
+bool IsRelativeCache(const char* variable) {
+  for (int i = 0; i < kFolderCount; ++i) {
+    if (!BeginsWith(variable, kFolders[i])) continue;
+    while (*variable != '=') ++variable;
+    if (variable[1] == '\0' || variable[1] == '/') return false;
+    forgotten_folders[i] = variable + 1;
+    return true;
+  }
+  return false;
+}
+
+// OpenCV ends a program, before its main() runs, whose environment has a value that it cannot read
+// (OPENCV_DUMP_ERRORS=abc), writes files into the current folder (OPENCV_TRACE=1) and refuses
+// images (OPENCV_IO_MAX_IMAGE_PIXELS=1). None of its variables is a setting of thicklens, but the
+// one without which some versions read no EXR.
+bool IsSettingToForget(const char* variable) {
+  static const char* const kTruths[] = {"0",     "1",    "true",  "false", "True",
+                                        "False", "TRUE", "FALSE", nullptr};
+  static const char kExr[] = "OPENCV_IO_ENABLE_OPENEXR=";
+  if (IsRelativeCache(variable)) return true;
+  if (!BeginsWith(variable, "OPENCV_")) return false;
+  return !BeginsWith(variable, kExr) || !IsOneOf(variable + sizeof kExr - 1, kTruths);
+}
+
+void ForgetSettings(int /*argc*/, char** /*argv*/, char** environment) {
+  char** kept = environment;
+  for (char** variable = environment; *variable != nullptr; ++variable) {
+    if (!IsSettingToForget(*variable)) *kept++ = *variable;
+  }
+  *kept = nullptr;
+}
+
+__attribute__((section(".preinit_array"),
+               used)) void (*const forget_settings)(int, char**, char**) = ForgetSettings;
+
+#endif
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> ForgottenCaches() {
+  std::vector<std::pair<std::string, std::string>> caches;
+#if defined(__ELF__) && defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
+  for (int i = 0; i < kFolderCount; ++i) {
+    if (forgotten_folders[i] == nullptr) continue;
+    const std::string name = kFolders[i];
+    caches.emplace_back(name.substr(0, name.size() - 1), forgotten_folders[i]);
+  }
+#endif
+  return caches;
+}
+
+void RequireStack() {
+  constexpr rlim_t kNeededKib = 512;  // a calibration fails with 128 and works with 256
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY ||
+      limit.rlim_cur >= kNeededKib * 1024) {
+    return;
+  }
+  throw Error(fmt::format("ulimit -s: the stack is limited to {} KiB; {} KiB at least are needed",
+                          limit.rlim_cur / 1024, kNeededKib));
+}
+
+}  // namespace thicklens::tools
