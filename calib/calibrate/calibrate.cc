@@ -26,6 +26,7 @@
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/validity.h"
 #include "thicklens/calib/edge_blur.h"
 #include "thicklens/calib/sharpness.h"
 #include "thicklens/model/pupil_law.h"
@@ -504,14 +505,10 @@ bool HasEnoughFrames(const FocusSweep& sweep, std::string* why) {
 }
 
 bool CalibrationOptions::IsValid(std::string* why) const {
-  const auto fail = [why](const std::string& message) {
-    if (why != nullptr) *why = message;
-    return false;
-  };
-  if (threads < 0) return fail(fmt::format("threads must be >= 0, found {}", threads));
+  if (threads < 0) return Fail(why, fmt::format("threads must be >= 0, found {}", threads));
   if (!(gates.max_saturated_fraction >= 0)) {
-    return fail(fmt::format("gates.max_saturated_fraction must be >= 0, found {}",
-                            gates.max_saturated_fraction));
+    return Fail(why, fmt::format("gates.max_saturated_fraction must be >= 0, found {}",
+                                 gates.max_saturated_fraction));
   }
   return true;
 }

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/validity.h"
 #include "thicklens/model/thick_lens.h"
 
 namespace thicklens::calib {
@@ -301,8 +302,7 @@ class Verifier {
 
 bool VerificationOptions::IsValid(std::string* why) const {
   const auto fails = [why](const char* name, double value, const char* range) {
-    *why = fmt::format("{} is {}: it must be {}", name, value, range);
-    return false;
+    return Fail(why, fmt::format("{} is {}: it must be {}", name, value, range));
   };
   if (!(significance > 0 && significance < 1)) {
     return fails("significance", significance, "above 0 and below 1");

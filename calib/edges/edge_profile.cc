@@ -7,12 +7,12 @@
 #include <cmath>
 #include <complex>
 
+#include "thicklens/base/pi.h"
 #include "thicklens/model/blur_transfer.h"
 
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // Minimum width of the pixel's box. Dividing the second difference by a narrower box would lose the
 // digits; this width blurs by less than 1e-9 px^2.
 constexpr double kNarrowestBoxPx = 1e-4;

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <vector>
 
+#include "thicklens/base/pi.h"
+
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kEdgeReach = 5;  // sigmas
 constexpr int kEdgeSteps = 200;
 

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "thicklens/base/pi.h"
+
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // Below this limit a slope of the illumination has an effect; above the next one the interpolation
 // has.
 constexpr double kLowestCyclesPerTile = 2.2;

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "thicklens/base/pi.h"
 #include "thicklens/model/blur_transfer.h"
 
 namespace thicklens::calib {
 namespace {
 
 constexpr int kModeStep = 2;
-constexpr double kPi = 3.14159265358979323846;
 
 // One axis of the separable sum: the pixels that the window covers, and w cos and w sin of every
 // step-th order there.

@@ -4,11 +4,11 @@
 #include <complex>
 
 #include "calib/spectrum/relative_spectrum.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kPlottedRings = 16;
 
 }  // namespace

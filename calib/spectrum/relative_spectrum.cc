@@ -9,11 +9,11 @@
 
 #include "calib/spectrum/spectral_transfer.h"
 #include "thicklens/base/cancel.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 constexpr int kMostSteps = 30;
 // Factor by which neighbouring modes widen the variances of independent ones. They share a sixth of

@@ -6,11 +6,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kFewestFrames = 5;
 // Ratio of the window to the largest blur in it: large where enough frames remain, otherwise
 // smaller.

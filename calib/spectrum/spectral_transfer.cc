@@ -2,10 +2,11 @@
 
 #include <cmath>
 
+#include "thicklens/base/pi.h"
+
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 
 // [D78] A disc's transfer function of v = (R/2)^2, its variance per axis, and d ln/dv. It is

@@ -6,12 +6,12 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/pi.h"
 #include "thicklens/model/blur_transfer.h"
 
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kTwoPiSquared = 2 * kPi * kPi;
 constexpr int kLeakageNodes = 12;
 constexpr double kLeakageBand = 4;  // H below exp(-4): no frame uses such a mode

@@ -11,14 +11,10 @@
 
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::calib {
 namespace {
-
-bool Fail(std::string* why, const std::string& message) {
-  if (why != nullptr) *why = message;
-  return false;
-}
 
 using DecodeTable = std::vector<float>;
 

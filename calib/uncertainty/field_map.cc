@@ -13,11 +13,11 @@
 #include "calib/uncertainty/evenly_spread.h"
 #include "calib/uncertainty/systematic_advice.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::calib {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kWholeField = 0.98;
 constexpr double kSmallField = 240;  // px; three tiles per side below, five above
 constexpr int kModesPerRing = 48;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "thicklens/base/pi.h"
 #include "thicklens/base/statistics.h"
 
 namespace thicklens::calib {
@@ -17,7 +18,6 @@ constexpr double kUnknownFloorFromPx = 0;
 constexpr double kUnknownFloorToPx = 1.0;
 constexpr double kSoftestLensPx = 3.0;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kRings = 14;
 constexpr double kLowestFrequency = 0.03, kHighestFrequency = 0.33;  // cycles per px
 // The range where a soft image has noise alone; remaining detail of a sharp image makes the bound

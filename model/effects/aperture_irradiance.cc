@@ -3,13 +3,9 @@
 #include <cmath>
 
 #include "model/optics/ray_irradiance.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
-namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-}  // namespace
 
 Aperture ApertureOf(const EffectOptics& optics, const EffectSet& effects) {
   if (!effects.Has(Effect::kDefocus)) return Aperture::kPinhole;

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "thicklens/base/pi.h"
+
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 double Range(const EffectPlace& place) { return std::max(0.0, place.bright - place.dark); }
 

@@ -12,6 +12,7 @@
 #include "model/effects/effect_bounds.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::model {
 namespace {
@@ -64,10 +65,7 @@ bool EffectTolerance::IsValid(std::string* why) const {
       {{"grey_levels", grey_levels}, {"px", px.value_or(1)}}};
   for (const auto& [unit, limit] : limits) {
     if (limit > 0 && std::isfinite(limit)) continue;
-    if (why != nullptr) {
-      *why = fmt::format("tolerance in {} is {}: it must be finite and > 0", unit, limit);
-    }
-    return false;
+    return Fail(why, fmt::format("tolerance in {} is {}: it must be finite and > 0", unit, limit));
   }
   return true;
 }

@@ -11,6 +11,7 @@
 #include "model/effects/effect_bounds.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::model {
 namespace {
@@ -91,31 +92,28 @@ EffectFinding FindImpact(Effect effect, const EffectConditions& conditions,
 }
 
 bool EffectConditions::IsValid(std::string* why) const {
-  const auto fail = [why](std::string reason) {
-    if (why != nullptr) *why = std::move(reason);
-    return false;
-  };
   std::string inner;
-  if (!camera.IsValid(&inner)) return fail("camera: " + inner);
+  if (!camera.IsValid(&inner)) return Fail(why, "camera: " + inner);
   for (const bool known : {camera.calibration && camera.calibration->image_distance_mm,
                            camera.calibration && camera.calibration->blur_ratio}) {
     if (!known) {
-      return fail(fmt::format("camera '{}': image_distance_mm and blur_ratio must be calibrated",
+      return Fail(why,
+                  fmt::format("camera '{}': image_distance_mm and blur_ratio must be calibrated",
                               camera.name));
     }
   }
   if (!(wavelength_mm > 0) || !std::isfinite(wavelength_mm)) {
-    return fail(fmt::format("wavelength_mm is {}: it must be finite and > 0", wavelength_mm));
+    return Fail(why, fmt::format("wavelength_mm is {}: it must be finite and > 0", wavelength_mm));
   }
   if (planes && (!std::isfinite(planes->uv_depth_mm) || planes->plane_spacing_mm == 0 ||
                  !std::isfinite(planes->plane_spacing_mm))) {
-    return fail(
-        fmt::format("planes: UV at {} mm, ST {} mm beyond it: both must be finite, and the "
-                    "planes not the same",
-                    planes->uv_depth_mm, planes->plane_spacing_mm));
+    return Fail(why,
+                fmt::format("planes: UV at {} mm, ST {} mm beyond it: both must be finite, and the "
+                            "planes not the same",
+                            planes->uv_depth_mm, planes->plane_spacing_mm));
   }
   if (!(bits >= 1 && bits <= 32)) {
-    return fail(fmt::format("bits is {}: it must be from 1 to 32", bits));
+    return Fail(why, fmt::format("bits is {}: it must be from 1 to 32", bits));
   }
   std::vector<std::pair<const char*, double>> amounts = {
       {"stored_noise_grey_levels", stored_noise_grey_levels},
@@ -126,13 +124,13 @@ bool EffectConditions::IsValid(std::string* why) const {
                                    {"bench.drift_sigma_px", bench->drift_sigma_px},
                                    {"bench.reading_sigma_mm", bench->reading_sigma_mm}});
     if (!(std::abs(bench->tilt_deg) < 90)) {
-      return fail(
-          fmt::format("bench.tilt_deg is {}: it must be between -90 and 90", bench->tilt_deg));
+      return Fail(
+          why, fmt::format("bench.tilt_deg is {}: it must be between -90 and 90", bench->tilt_deg));
     }
   }
   for (const auto& [field, value] : amounts) {
     if (!(value >= 0) || !std::isfinite(value)) {
-      return fail(fmt::format("{} is {}: it must be finite and >= 0", field, value));
+      return Fail(why, fmt::format("{} is {}: it must be finite and >= 0", field, value));
     }
   }
   return true;

@@ -3,11 +3,10 @@
 #include <cmath>
 
 #include "model/effects/effect_bounds.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 Eigen::Vector2d FromAxisPx(const EffectOptics& optics, const EffectPlace& place) {
   return place.position_px - optics.camera().sensor.principal_point_px;

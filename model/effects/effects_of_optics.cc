@@ -5,11 +5,10 @@
 
 #include "model/effects/aperture_irradiance.h"
 #include "model/effects/effect_bounds.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 double SigmaPx(const EffectOptics& optics, const EffectPlace& place) {
   return std::max(std::abs(optics.DefocusPx(place.depth_mm)),

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::model {
 namespace {
@@ -155,8 +156,7 @@ std::vector<T> CutOut(const std::vector<T>& values, int width_px, int channels,
 bool LightField::IsValid(std::string* why) const {
   std::string complaint = Complaint(*this);
   if (complaint.empty()) return true;
-  if (why != nullptr) *why = std::move(complaint);
-  return false;
+  return Fail(why, std::move(complaint));
 }
 
 LightField MakeLightField(int s_count, int t_count, int u_count, int v_count, int channels) {

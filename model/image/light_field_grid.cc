@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <utility>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::model {
 namespace {
@@ -13,17 +13,11 @@ namespace {
 // Returns true if the crossings with the two planes determine a ray.
 bool ArePlanesPossible(const LightFieldPlanes& planes, std::string* why) {
   if (!std::isfinite(planes.uv_depth_mm)) {
-    if (why != nullptr) {
-      *why = fmt::format("uv_depth_mm (zl) is {}: it must be finite", planes.uv_depth_mm);
-    }
-    return false;
+    return Fail(why, fmt::format("uv_depth_mm (zl) is {}: it must be finite", planes.uv_depth_mm));
   }
   if (!std::isfinite(planes.plane_spacing_mm) || planes.plane_spacing_mm == 0) {
-    if (why != nullptr) {
-      *why = fmt::format("plane_spacing_mm (d0) is {}: it must be finite and not 0",
-                         planes.plane_spacing_mm);
-    }
-    return false;
+    return Fail(why, fmt::format("plane_spacing_mm (d0) is {}: it must be finite and not 0",
+                                 planes.plane_spacing_mm));
   }
   return true;
 }
@@ -258,10 +252,6 @@ ApertureSamples SampleAperture(Psf psf, double blur_ratio, double aperture_radiu
 }
 
 bool LightFieldGrid::IsValid(std::string* why) const {
-  const auto fail = [why](std::string reason) {
-    if (why != nullptr) *why = std::move(reason);
-    return false;
-  };
   const struct {
     const char* name;
     int value;
@@ -269,34 +259,33 @@ bool LightFieldGrid::IsValid(std::string* why) const {
       {"s_count", s_count}, {"t_count", t_count}, {"u_count", u_count}, {"v_count", v_count}};
   for (const auto& count : counts) {
     if (count.value < 1) {
-      return fail(fmt::format("{} is {}: it must be >= 1", count.name, count.value));
+      return Fail(why, fmt::format("{} is {}: it must be >= 1", count.name, count.value));
     }
   }
   if (!ArePlanesPossible(planes, why)) return false;
   const double st_depth_mm = planes.uv_depth_mm + planes.plane_spacing_mm;
   if (!(st_depth_mm > 0)) {
-    return fail(fmt::format(
-        "the ST plane lies at depth {} mm (uv_depth_mm {} plus plane_spacing_mm {}): it must be in "
-        "front of the aperture, > 0",
-        st_depth_mm, planes.uv_depth_mm, planes.plane_spacing_mm));
+    return Fail(why, fmt::format("the ST plane lies at depth {} mm (uv_depth_mm {} plus "
+                                 "plane_spacing_mm {}): it must be in front of the aperture, > 0",
+                                 st_depth_mm, planes.uv_depth_mm, planes.plane_spacing_mm));
   }
   if (!(s_step_mm > 0) || !std::isfinite(s_step_mm)) {
-    return fail(fmt::format("s_step_mm is {}: it must be finite and > 0", s_step_mm));
+    return Fail(why, fmt::format("s_step_mm is {}: it must be finite and > 0", s_step_mm));
   }
   if (!(t_step_mm > 0) || !std::isfinite(t_step_mm)) {
-    return fail(fmt::format("t_step_mm is {}: it must be finite and > 0", t_step_mm));
+    return Fail(why, fmt::format("t_step_mm is {}: it must be finite and > 0", t_step_mm));
   }
   // A step of 0 is valid: one view, or an aperture without blur. A negative step is valid too: if
   // ST is nearer than UV (d0 < 0), u and the aperture position have opposite directions.
   if (!std::isfinite(u_step_mm)) {
-    return fail(fmt::format("u_step_mm is {}: it must be finite", u_step_mm));
+    return Fail(why, fmt::format("u_step_mm is {}: it must be finite", u_step_mm));
   }
   if (!std::isfinite(v_step_mm)) {
-    return fail(fmt::format("v_step_mm is {}: it must be finite", v_step_mm));
+    return Fail(why, fmt::format("v_step_mm is {}: it must be finite", v_step_mm));
   }
   if (!st_origin_index.allFinite()) {
-    return fail(fmt::format("st_origin_index is ({}, {}): it must be finite", st_origin_index.x(),
-                            st_origin_index.y()));
+    return Fail(why, fmt::format("st_origin_index is ({}, {}): it must be finite",
+                                 st_origin_index.x(), st_origin_index.y()));
   }
   return true;
 }

@@ -2,10 +2,11 @@
 
 #include <cmath>
 
+#include "thicklens/base/pi.h"
+
 namespace thicklens::model {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFirstDark = 3.8317059702075125;  // first zero of J1
 constexpr double kFarthest = 50;                   // Airy radii
 

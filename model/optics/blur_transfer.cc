@@ -4,10 +4,10 @@
 
 #include <cmath>
 
+#include "thicklens/base/pi.h"
+
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 double Sinc(double x) {
   const double t = kPi * x;

@@ -5,16 +5,9 @@
 #include <cmath>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::model {
-namespace {
-
-bool Fail(std::string* why, const std::string& message) {
-  if (why != nullptr) *why = message;
-  return false;
-}
-
-}  // namespace
 
 std::string PsfName(Psf psf) { return psf == Psf::kGaussian ? "gaussian" : "disc"; }
 

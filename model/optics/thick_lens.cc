@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "thicklens/base/error.h"
+#include "thicklens/base/validity.h"
 
 namespace thicklens::model {
 namespace {
@@ -53,8 +54,7 @@ void CheckFocusDepth(const ThickLens& lens, double focus_depth_mm) {
 
 bool IsPositive(const char* field, double value, std::string* why) {
   if (value > 0 && std::isfinite(value)) return true;
-  if (why != nullptr) *why = fmt::format("{} is {}: it must be finite and > 0", field, value);
-  return false;
+  return Fail(why, fmt::format("{} is {}: it must be finite and > 0", field, value));
 }
 
 }  // namespace
@@ -63,10 +63,7 @@ bool ThickLens::IsValid(std::string* why) const {
   if (!IsPositive("front_focal_length_mm", front_focal_length_mm, why)) return false;
   if (!IsPositive("rear_focal_length_mm", rear_focal_length_mm, why)) return false;
   if (!std::isfinite(lens_thickness_mm)) {
-    if (why != nullptr) {
-      *why = fmt::format("lens_thickness_mm is {}: it must be finite", lens_thickness_mm);
-    }
-    return false;
+    return Fail(why, fmt::format("lens_thickness_mm is {}: it must be finite", lens_thickness_mm));
   }
   return IsPositive("aperture_radius_mm", aperture_radius_mm, why);
 }

@@ -1,13 +1,13 @@
 #include "thicklens/model/camera_file.h"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "model/schema/former_blur_ratio.h"
-#include "thicklens/base/error.h"
+#include "model/schema/yaml_fields.h"
+#include "model/schema/yaml_writer.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/yaml_reader.h"
 
@@ -51,27 +51,14 @@ void ReadSensor(const YamlNode& node, Camera* camera) {
   const auto point = node.At("principal_point_px").ElementsExactly(2);
   sensor.principal_point_px = {ValueNode(point[0], camera).Number(),
                                ValueNode(point[1], camera).Number()};
-  const YamlNode transfer = node.At("transfer");
-  try {
-    sensor.transfer = TransferCurve::FromName(transfer.Text());
-  } catch (const Error& e) {
-    throw transfer.ErrorHere(e.what());
-  }
+  sensor.transfer = ReadTransfer(node.At("transfer"));
 }
 
-using NumberOf = double (YamlNode::*)() const;
-
-// `number` reads and checks the value: any, positive or not negative.
-std::optional<Estimate> ReadEstimate(const YamlNode& parent, const std::string& key,
-                                     NumberOf number) {
+std::optional<Estimate> FindEstimate(const YamlNode& parent, const std::string& key,
+                                     double (YamlNode::*number)() const) {
   const auto node = parent.Find(key);
   if (!node) return std::nullopt;
-  if (!node->IsMap()) return Estimate{((*node).*number)(), 0};
-  node->RequireKeys({"value", "sigma"});
-  Estimate estimate;
-  estimate.value = (node->At("value").*number)();
-  if (const auto sigma = node->Find("sigma")) estimate.sigma = sigma->NonNegativeNumber();
-  return estimate;
+  return ReadEstimate(*node, number);
 }
 
 Evidence ReadEvidence(const YamlNode& node) {
@@ -88,7 +75,7 @@ Evidence ReadEvidence(const YamlNode& node) {
   }
   if (const auto chi2 = node.Find("chi2_per_dof"))
     evidence.chi2_per_dof = chi2->NonNegativeNumber();
-  evidence.focus_depth_mm = ReadEstimate(node, "focus_depth_mm", &YamlNode::PositiveNumber);
+  evidence.focus_depth_mm = FindEstimate(node, "focus_depth_mm", &YamlNode::PositiveNumber);
   if (const auto family = node.Find("blur_family"))
     evidence.blur_family = family->OneOf({"gaussian", "disc"});
   if (const auto band = node.Find("blur_band")) evidence.blur_band = band->PositiveNumber();
@@ -128,134 +115,136 @@ CameraCalibration ReadCalibration(const YamlNode& node) {
   node.RequireKeys({"image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm",
                     "covariance", "evidence"});
   CameraCalibration calibration;
-  calibration.image_distance_mm = ReadEstimate(node, "image_distance_mm", &YamlNode::Number);
-  calibration.blur_ratio = ReadEstimate(node, "blur_ratio", &YamlNode::NonNegativeNumber);
-  calibration.blur_floor_px = ReadEstimate(node, "blur_floor_px", &YamlNode::NonNegativeNumber);
-  calibration.bench_offset_mm = ReadEstimate(node, "bench_offset_mm", &YamlNode::Number);
+  calibration.image_distance_mm = FindEstimate(node, "image_distance_mm", &YamlNode::Number);
+  calibration.blur_ratio = FindEstimate(node, "blur_ratio", &YamlNode::NonNegativeNumber);
+  calibration.blur_floor_px = FindEstimate(node, "blur_floor_px", &YamlNode::NonNegativeNumber);
+  calibration.bench_offset_mm = FindEstimate(node, "bench_offset_mm", &YamlNode::Number);
   if (const auto covariance = node.Find("covariance")) ReadCovariance(*covariance, &calibration);
   calibration.evidence = ReadEvidence(node.At("evidence"));
   return calibration;
 }
 
-// YAML::Emitter quotes texts where needed. Numbers are passed to it as text in their shortest form.
-class Writer {
+class CameraWriter {
  public:
-  explicit Writer(const Camera& camera) : camera_(camera) {}
+  explicit CameraWriter(const Camera& camera) : camera_(camera) {}
 
   std::string Write() {
-    out_ << YAML::BeginMap;
-    Text("schema", kSchema);
-    Text("name", camera_.name);
-    out_ << YAML::Key << "lens" << YAML::Value << YAML::BeginMap;
+    out_.Text("name", camera_.name);
+    out_.BeginMap("lens");
     Stated("lens.", "front_focal_length_mm", camera_.lens.front_focal_length_mm);
     Stated("lens.", "rear_focal_length_mm", camera_.lens.rear_focal_length_mm);
     Stated("lens.", "lens_thickness_mm", camera_.lens.lens_thickness_mm);
     Stated("lens.", "aperture_radius_mm", camera_.lens.aperture_radius_mm);
-    out_ << YAML::EndMap;
+    out_.EndMap();
     WriteSensor();
-    Text("psf", PsfName(camera_.psf));
+    out_.Text("psf", PsfName(camera_.psf));
     if (camera_.calibration) WriteCalibration(*camera_.calibration);
-    out_ << YAML::EndMap;
-    return std::string(out_.c_str()) + "\n";
+    return out_.Finish();
   }
 
  private:
-  void Text(const char* key, const std::string& value) {
-    out_ << YAML::Key << key << YAML::Value << value;
-  }
-  void Number(const char* key, double value) { Text(key, YamlNumber(value)); }
-
-  void StatedValue(const std::string& field, double value) {
+  const Statement* StatementOf(const std::string& field) const {
     const auto statement = camera_.statements.find(field);
-    if (statement == camera_.statements.end()) {
-      out_ << YamlNumber(value);
-      return;
-    }
-    out_ << YAML::Flow << YAML::BeginMap;
-    Number("value", value);
-    if (statement->second.tolerance != 0) Number("tolerance", statement->second.tolerance);
-    if (statement->second.assumed) Text("assumed", "true");
-    out_ << YAML::EndMap;
+    return statement == camera_.statements.end() ? nullptr : &statement->second;
+  }
+
+  // Writes the entries of the map {value: .., tolerance: .., assumed: ..} that is open, and ends
+  // it.
+  void FinishStated(double value, const Statement& statement) {
+    out_.Number("value", value);
+    if (statement.tolerance != 0) out_.Number("tolerance", statement.tolerance);
+    if (statement.assumed) out_.Text("assumed", "true");
+    out_.EndMap();
   }
 
   void Stated(const std::string& section, const std::string& key, double value) {
-    out_ << YAML::Key << key << YAML::Value;
-    StatedValue(section + key, value);
+    if (const Statement* statement = StatementOf(section + key)) {
+      out_.BeginMapInLine(key);
+      FinishStated(value, *statement);
+    } else {
+      out_.Number(key, value);
+    }
+  }
+
+  void StatedElement(const std::string& field, double value) {
+    if (const Statement* statement = StatementOf(field)) {
+      out_.BeginMapInLine();
+      FinishStated(value, *statement);
+    } else {
+      out_.Element(value);
+    }
   }
 
   void WriteSensor() {
     const Sensor& sensor = camera_.sensor;
-    out_ << YAML::Key << "sensor" << YAML::Value << YAML::BeginMap;
+    out_.BeginMap("sensor");
     Stated("sensor.", "width_px", sensor.width_px);
     Stated("sensor.", "height_px", sensor.height_px);
     Stated("sensor.", "pixel_pitch_mm", sensor.pixel_pitch_mm);
-    out_ << YAML::Key << "principal_point_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-    StatedValue("sensor.principal_point_px[0]", sensor.principal_point_px.x());
-    StatedValue("sensor.principal_point_px[1]", sensor.principal_point_px.y());
-    out_ << YAML::EndSeq;
-    Text("transfer", sensor.transfer.Name());
-    out_ << YAML::EndMap;
+    out_.BeginListInLine("principal_point_px");
+    StatedElement("sensor.principal_point_px[0]", sensor.principal_point_px.x());
+    StatedElement("sensor.principal_point_px[1]", sensor.principal_point_px.y());
+    out_.EndList();
+    out_.Text("transfer", sensor.transfer.Name());
+    out_.EndMap();
   }
 
-  void Measured(const char* key, const std::optional<Estimate>& estimate) {
-    if (!estimate) return;
-    out_ << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap;
-    Number("value", estimate->value);
-    Number("sigma", estimate->sigma);
-    out_ << YAML::EndMap;
+  void MeasuredIfAny(const char* key, const std::optional<Estimate>& estimate) {
+    if (estimate) out_.Measured(key, *estimate);
   }
 
   void WriteCalibration(const CameraCalibration& calibration) {
-    out_ << YAML::Key << "calibration" << YAML::Value << YAML::BeginMap;
-    Measured("image_distance_mm", calibration.image_distance_mm);
-    Measured("blur_ratio", calibration.blur_ratio);
-    Measured("blur_floor_px", calibration.blur_floor_px);
-    Measured("bench_offset_mm", calibration.bench_offset_mm);
+    out_.BeginMap("calibration");
+    MeasuredIfAny("image_distance_mm", calibration.image_distance_mm);
+    MeasuredIfAny("blur_ratio", calibration.blur_ratio);
+    MeasuredIfAny("blur_floor_px", calibration.blur_floor_px);
+    MeasuredIfAny("bench_offset_mm", calibration.bench_offset_mm);
     if (!calibration.covariance_order.empty()) WriteCovariance(calibration);
     WriteEvidence(calibration.evidence);
-    out_ << YAML::EndMap;
+    out_.EndMap();
   }
 
   void WriteCovariance(const CameraCalibration& calibration) {
-    out_ << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap;
-    out_ << YAML::Key << "order" << YAML::Value << YAML::Flow << calibration.covariance_order;
-    out_ << YAML::Key << "rows" << YAML::Value << YAML::BeginSeq;
+    out_.BeginMap("covariance");
+    out_.List("order", calibration.covariance_order);
+    out_.BeginList("rows");
     for (Eigen::Index i = 0; i < calibration.covariance.rows(); ++i) {
-      out_ << YAML::Flow << YAML::BeginSeq;
+      out_.BeginListInLine();
       for (Eigen::Index j = 0; j < calibration.covariance.cols(); ++j) {
-        out_ << YamlNumber(calibration.covariance(i, j));
+        out_.Element(calibration.covariance(i, j));
       }
-      out_ << YAML::EndSeq;
+      out_.EndList();
     }
-    out_ << YAML::EndSeq << YAML::EndMap;
+    out_.EndList();
+    out_.EndMap();
   }
 
   void WriteEvidence(const Evidence& evidence) {
-    out_ << YAML::Key << "evidence" << YAML::Value << YAML::BeginMap;
-    Text("method", evidence.method);
-    Text("frames_used", std::to_string(evidence.frames_used));
+    out_.BeginMap("evidence");
+    out_.Text("method", evidence.method);
+    out_.Text("frames_used", std::to_string(evidence.frames_used));
     if (!evidence.frames_rejected.empty()) {
-      out_ << YAML::Key << "frames_rejected" << YAML::Value << YAML::BeginSeq;
+      out_.BeginList("frames_rejected");
       for (const RejectedFrame& frame : evidence.frames_rejected) {
-        out_ << YAML::Flow << YAML::BeginMap;
-        Text("image", frame.image);
-        Text("reason", frame.reason);
-        out_ << YAML::EndMap;
+        out_.BeginMapInLine();
+        out_.Text("image", frame.image);
+        out_.Text("reason", frame.reason);
+        out_.EndMap();
       }
-      out_ << YAML::EndSeq;
+      out_.EndList();
     }
-    if (evidence.chi2_per_dof) Number("chi2_per_dof", *evidence.chi2_per_dof);
-    Measured("focus_depth_mm", evidence.focus_depth_mm);
-    if (!evidence.blur_family.empty()) Text("blur_family", evidence.blur_family);
-    if (evidence.blur_band) Number("blur_band", *evidence.blur_band);
-    if (!evidence.data_sha256.empty()) Text("data_sha256", evidence.data_sha256);
-    if (!evidence.version.empty()) Text("version", evidence.version);
-    if (!evidence.date.empty()) Text("date", evidence.date);
-    out_ << YAML::EndMap;
+    out_.NumberIfAny("chi2_per_dof", evidence.chi2_per_dof);
+    MeasuredIfAny("focus_depth_mm", evidence.focus_depth_mm);
+    out_.TextIfAny("blur_family", evidence.blur_family);
+    out_.NumberIfAny("blur_band", evidence.blur_band);
+    out_.TextIfAny("data_sha256", evidence.data_sha256);
+    out_.TextIfAny("version", evidence.version);
+    out_.TextIfAny("date", evidence.date);
+    out_.EndMap();
   }
 
   const Camera& camera_;
-  YAML::Emitter out_;
+  YamlWriter out_{kSchema};
 };
 
 }  // namespace
@@ -288,6 +277,6 @@ Camera ParseCamera(const std::string& text, const std::string& source_name) {
 
 Camera ReadCamera(const std::string& path) { return ParseCamera(ReadTextFile(path), path); }
 
-std::string CameraToYaml(const Camera& camera) { return Writer(camera).Write(); }
+std::string CameraToYaml(const Camera& camera) { return CameraWriter(camera).Write(); }
 
 }  // namespace thicklens::model

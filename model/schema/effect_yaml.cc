@@ -38,13 +38,12 @@ void ReadEffectChoice(const YamlNode& root, EffectChoice* choice) {
   }
 }
 
-void EmitEffects(const EffectRecord& record, YAML::Emitter* out) {
-  *out << YAML::Key << "effects" << YAML::Value << YAML::Flow << record.on;
-  *out << YAML::Key << "left_out_grey_levels" << YAML::Value << YAML::Flow << YAML::BeginMap;
-  for (const auto& [name, grey_levels] : record.left_out_grey_levels) {
-    *out << YAML::Key << name << YAML::Value << YamlNumber(grey_levels);
-  }
-  *out << YAML::EndMap;
+void WriteEffects(const EffectRecord& record, YamlWriter* out) {
+  out->List("effects", record.on);
+  out->BeginMapInLine("left_out_grey_levels");
+  for (const auto& [name, grey_levels] : record.left_out_grey_levels)
+    out->Number(name, grey_levels);
+  out->EndMap();
 }
 
 }  // namespace thicklens::model

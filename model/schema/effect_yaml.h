@@ -1,8 +1,7 @@
 #ifndef THICKLENS_MODEL_SCHEMA_EFFECT_YAML_H_
 #define THICKLENS_MODEL_SCHEMA_EFFECT_YAML_H_
 
-#include <yaml-cpp/yaml.h>
-
+#include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/effect_choice.h"
 
@@ -14,7 +13,7 @@ namespace thicklens::model {
 void ReadEffectChoice(const YamlNode& root, EffectChoice* choice);
 
 // Writes the keys `effects` and `left_out_grey_levels` into the open map of `out`.
-void EmitEffects(const EffectRecord& record, YAML::Emitter* out);
+void WriteEffects(const EffectRecord& record, YamlWriter* out);
 
 }  // namespace thicklens::model
 

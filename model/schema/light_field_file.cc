@@ -1,13 +1,14 @@
 #include "thicklens/model/light_field_file.h"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
 
+#include "model/schema/yaml_fields.h"
+#include "model/schema/yaml_writer.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/yaml_reader.h"
@@ -22,11 +23,6 @@ constexpr int kMaxImageSizePx = 100000;
 constexpr int kMaxViews = 1000;  // along u, and along v
 constexpr int kMaxIterations = 1000000000;
 constexpr double kWeightSumTolerance = 1e-6;
-
-Eigen::Vector2d ReadPoint(const YamlNode& node) {
-  const auto elements = node.ElementsExactly(2);
-  return {elements[0].Number(), elements[1].Number()};
-}
 
 void ReadSizes(const YamlNode& root, LightField* light_field) {
   const auto views = root.At("views").ElementsExactly(2);
@@ -89,7 +85,7 @@ void ReadGrid(const YamlNode& root, LightField* light_field) {
   grid.t_step_mm = steps.At("t_step_mm").PositiveNumber();
   grid.u_step_mm = steps.At("u_step_mm").Number();
   grid.v_step_mm = steps.At("v_step_mm").Number();
-  grid.st_origin_index = ReadPoint(root.At("st_origin_index"));
+  grid.st_origin_index = ReadPair(root.At("st_origin_index"));
   std::string why;
   if (!grid.IsValid(&why)) throw planes.ErrorHere(why);
   light_field->grid = grid;
@@ -156,121 +152,110 @@ LightFieldOrigin ReadOrigin(const YamlNode& node) {
   return origin;
 }
 
-// YAML::Emitter quotes texts where needed. Numbers are passed to it as text in their shortest form.
-class Writer {
+class DescriptionWriter {
  public:
-  explicit Writer(const LightFieldDescription& description)
+  explicit DescriptionWriter(const LightFieldDescription& description)
       : description_(description), light_field_(description.light_field) {}
 
   std::string Write() {
-    out_ << YAML::BeginMap;
-    Text("schema", kSchema);
-    List("views", {std::to_string(light_field_.u_count), std::to_string(light_field_.v_count)});
-    List("size", {std::to_string(light_field_.s_count), std::to_string(light_field_.t_count)});
-    Text("channels", std::to_string(light_field_.channels));
-    Text("view_format", description_.view_format);
-    if (description_.has_confidence) Text("confidence_format", kConfidenceFormat);
-    Text("transfer", light_field_.transfer.Name());
-    Text("disparity", kDisparityIs);
+    out_.List("views",
+              {std::to_string(light_field_.u_count), std::to_string(light_field_.v_count)});
+    out_.List("size", {std::to_string(light_field_.s_count), std::to_string(light_field_.t_count)});
+    out_.Text("channels", std::to_string(light_field_.channels));
+    out_.Text("view_format", description_.view_format);
+    if (description_.has_confidence) out_.Text("confidence_format", kConfidenceFormat);
+    out_.Text("transfer", light_field_.transfer.Name());
+    out_.Text("disparity", kDisparityIs);
     Point("landing_step_px", light_field_.landing_step_px);
     WriteWeights();
     WriteMissingViews();
-    if (!description_.camera_file.empty()) Text("camera", description_.camera_file);
+    if (!description_.camera_file.empty()) out_.Text("camera", description_.camera_file);
     if (light_field_.grid) WriteGrid(*light_field_.grid);
     WriteOrigin();
-    out_ << YAML::EndMap;
-    return std::string(out_.c_str()) + "\n";
+    return out_.Finish();
   }
 
  private:
   // Throws Error for a number that the reader would not accept.
-  static std::string NumberText(const char* key, double value) {
+  static double Checked(const char* key, double value) {
     if (!std::isfinite(value))
       throw Error(fmt::format("light field: {} is {}: it must be finite", key, value));
-    return YamlNumber(value);
+    return value;
   }
 
-  void Text(const char* key, const std::string& value) {
-    out_ << YAML::Key << key << YAML::Value << value;
-  }
-  void TextIfAny(const char* key, const std::string& value) {
-    if (!value.empty()) Text(key, value);
-  }
-  void Number(const char* key, double value) { Text(key, NumberText(key, value)); }
+  void Number(const char* key, double value) { out_.Number(key, Checked(key, value)); }
   void NumberIfAny(const char* key, const std::optional<double>& value) {
     if (value) Number(key, *value);
   }
-  void List(const char* key, const std::vector<std::string>& values) {
-    out_ << YAML::Key << key << YAML::Value << YAML::Flow << values;
-  }
   void Point(const char* key, const Eigen::Vector2d& point) {
-    List(key, {NumberText(key, point.x()), NumberText(key, point.y())});
+    out_.List(key, {YamlNumber(Checked(key, point.x())), YamlNumber(Checked(key, point.y()))});
   }
 
   void WriteWeights() {
-    out_ << YAML::Key << "weights" << YAML::Value << YAML::BeginSeq;
+    out_.BeginList("weights");
     for (Eigen::Index l = 0; l < light_field_.weights.rows(); ++l) {
-      out_ << YAML::Flow << YAML::BeginSeq;
+      out_.BeginListInLine();
       for (Eigen::Index k = 0; k < light_field_.weights.cols(); ++k)
-        out_ << NumberText("weights", light_field_.weights(l, k));
-      out_ << YAML::EndSeq;
+        out_.Element(Checked("weights", light_field_.weights(l, k)));
+      out_.EndList();
     }
-    out_ << YAML::EndSeq;
+    out_.EndList();
   }
 
   void WriteMissingViews() {
     const auto& present = light_field_.present;
     if (std::all_of(present.begin(), present.end(), [](bool there) { return there; })) return;
-    out_ << YAML::Key << "missing_views" << YAML::Value << YAML::BeginSeq;
+    out_.BeginList("missing_views");
     for (int l = 0; l < light_field_.v_count; ++l) {
       for (int k = 0; k < light_field_.u_count; ++k) {
         if (light_field_.IsPresent(k, l)) continue;
-        out_ << YAML::Flow << std::vector<std::string>{std::to_string(k), std::to_string(l)};
+        out_.Element({std::to_string(k), std::to_string(l)});
       }
     }
-    out_ << YAML::EndSeq;
+    out_.EndList();
   }
 
   void WriteGrid(const LightFieldGrid& grid) {
-    out_ << YAML::Key << "planes" << YAML::Value << YAML::BeginMap;
+    out_.BeginMap("planes");
     Number("uv_depth_mm", grid.planes.uv_depth_mm);
     Number("plane_spacing_mm", grid.planes.plane_spacing_mm);
-    out_ << YAML::EndMap << YAML::Key << "steps" << YAML::Value << YAML::BeginMap;
+    out_.EndMap();
+    out_.BeginMap("steps");
     Number("s_step_mm", grid.s_step_mm);
     Number("t_step_mm", grid.t_step_mm);
     Number("u_step_mm", grid.u_step_mm);
     Number("v_step_mm", grid.v_step_mm);
-    out_ << YAML::EndMap;
+    out_.EndMap();
     Point("st_origin_index", grid.st_origin_index);
   }
 
   void WriteOrigin() {
     const LightFieldOrigin& origin = light_field_.origin;
-    out_ << YAML::Key << "origin" << YAML::Value << YAML::BeginMap;
-    TextIfAny("method", origin.method);
-    TextIfAny("prior", origin.prior);
+    out_.BeginMap("origin");
+    out_.TextIfAny("method", origin.method);
+    out_.TextIfAny("prior", origin.prior);
     NumberIfAny("strength", origin.strength);
     NumberIfAny("noise_sigma", origin.noise_sigma);
-    TextIfAny("block_solver", origin.block_solver);
-    TextIfAny("stencil", origin.stencil);
-    TextIfAny("splat", origin.splat);
-    TextIfAny("device", origin.device);
-    if (origin.block_px) Text("block_px", std::to_string(*origin.block_px));
+    out_.TextIfAny("block_solver", origin.block_solver);
+    out_.TextIfAny("stencil", origin.stencil);
+    out_.TextIfAny("splat", origin.splat);
+    out_.TextIfAny("device", origin.device);
+    if (origin.block_px) out_.Text("block_px", std::to_string(*origin.block_px));
     NumberIfAny("gamma", origin.gamma);
     NumberIfAny("ridge", origin.ridge);
     NumberIfAny("seconds", origin.seconds);
-    if (origin.iterations) Text("iterations", std::to_string(*origin.iterations));
+    if (origin.iterations) out_.Text("iterations", std::to_string(*origin.iterations));
     NumberIfAny("relative_residual", origin.relative_residual);
     NumberIfAny("rcond_min", origin.rcond_min);
-    if (!origin.effects.empty()) List("effects", origin.effects);
-    TextIfAny("version", origin.version);
-    TextIfAny("date", origin.date);
-    out_ << YAML::EndMap;
+    if (!origin.effects.empty()) out_.List("effects", origin.effects);
+    out_.TextIfAny("version", origin.version);
+    out_.TextIfAny("date", origin.date);
+    out_.EndMap();
   }
 
   const LightFieldDescription& description_;
   const LightField& light_field_;
-  YAML::Emitter out_;
+  YamlWriter out_{kSchema};
 };
 
 }  // namespace
@@ -292,19 +277,13 @@ LightFieldDescription ParseLightFieldDescription(const std::string& text,
     format->OneOf({kConfidenceFormat});
     description.has_confidence = true;
   }
-  const YamlNode transfer = root.At("transfer");
-  try {
-    light_field.transfer = TransferCurve::FromName(transfer.Text());
-  } catch (const Error& e) {
-    throw transfer.ErrorHere(e.what());
-  }
+  light_field.transfer = ReadTransfer(root.At("transfer"));
   const YamlNode disparity = root.At("disparity");
   if (disparity.Text() != kDisparityIs) {
     throw disparity.ErrorHere(
         fmt::format("'{}' is expected, found '{}'", kDisparityIs, disparity.Text()));
   }
-  if (const auto step = root.Find("landing_step_px"))
-    light_field.landing_step_px = ReadPoint(*step);
+  if (const auto step = root.Find("landing_step_px")) light_field.landing_step_px = ReadPair(*step);
   ReadWeights(root.At("weights"), &light_field);
   if (const auto missing = root.Find("missing_views")) ReadMissingViews(*missing, &light_field);
   ReadCameraAndGrid(root, &description);
@@ -317,7 +296,7 @@ LightFieldDescription ReadLightFieldDescription(const std::string& path) {
 }
 
 std::string LightFieldDescriptionToYaml(const LightFieldDescription& description) {
-  return Writer(description).Write();
+  return DescriptionWriter(description).Write();
 }
 
 }  // namespace thicklens::model

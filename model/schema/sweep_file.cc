@@ -1,12 +1,13 @@
 #include "thicklens/model/sweep_file.h"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <set>
 
 #include "model/schema/sweep_frames.h"
+#include "model/schema/yaml_fields.h"
+#include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
 
 namespace thicklens::model {
@@ -26,15 +27,8 @@ bool IsUnknown(const YamlNode& node) { return node.IsScalar() && node.Text() == 
 
 void ReadOffset(const YamlNode& root, SweepFile* sweep) {
   const auto node = root.Find("offset_mm");
-  if (!node) return;
-  if (node->IsMap()) {
-    node->RequireKeys({"value", "sigma"});
-    Estimate offset{node->At("value").Number(), 0};
-    if (const auto sigma = node->Find("sigma")) offset.sigma = sigma->NonNegativeNumber();
-    sweep->offset_mm = offset;
-  } else if (!IsUnknown(*node)) {
-    sweep->offset_mm = Estimate{node->Number(), 0};
-  }
+  if (!node || IsUnknown(*node)) return;
+  sweep->offset_mm = ReadEstimate(*node, &YamlNode::Number);
 }
 
 void ReadFloor(const YamlNode& root, SweepFile* sweep) {
@@ -63,9 +57,7 @@ void ReadFloor(const YamlNode& root, SweepFile* sweep) {
                                         *sweep->floor.from_px, *sweep->floor.to_px));
     }
   } else {
-    Estimate floor{node->At("value").NonNegativeNumber(), 0};
-    if (const auto sigma = node->Find("sigma")) floor.sigma = sigma->NonNegativeNumber();
-    sweep->floor.given_px = floor;
+    sweep->floor.given_px = ReadEstimate(*node, &YamlNode::NonNegativeNumber);
   }
 }
 
@@ -170,52 +162,40 @@ SweepFile SweepFromFolder(const std::string& folder, const std::string& readings
 }
 
 std::string SweepToYaml(const SweepFile& sweep) {
-  YAML::Emitter out;
-  const auto text = [&](const char* key, const std::string& value) {
-    out << YAML::Key << key << YAML::Value << value;
-  };
-  const auto number = [&](const char* key, double value) { text(key, YamlNumber(value)); };
-  const auto estimate = [&](const char* key, const Estimate& value) {
-    out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginMap;
-    number("value", value.value);
-    number("sigma", value.sigma);
-    out << YAML::EndMap;
-  };
-  out << YAML::BeginMap;
-  text("schema", kSchema);
-  text("camera", sweep.camera_path);
-  if (sweep.reading_sigma_stated) number("reading_sigma_mm", sweep.reading_sigma_mm);
+  YamlWriter out(kSchema);
+  out.Text("camera", sweep.camera_path);
+  if (sweep.reading_sigma_stated) out.Number("reading_sigma_mm", sweep.reading_sigma_mm);
   if (sweep.offset_mm) {
-    estimate("offset_mm", *sweep.offset_mm);
+    out.Measured("offset_mm", *sweep.offset_mm);
   } else {
-    text("offset_mm", "unknown");
+    out.Text("offset_mm", "unknown");
   }
-  text("direction", BenchDirectionName(sweep.direction));
-  text("target", SweepTargetName(sweep.target));
-  if (sweep.target_period_mm) number("target_period_mm", *sweep.target_period_mm);
+  out.Text("direction", BenchDirectionName(sweep.direction));
+  out.Text("target", SweepTargetName(sweep.target));
+  out.NumberIfAny("target_period_mm", sweep.target_period_mm);
   if (sweep.floor.given_px) {
-    estimate("blur_floor_px", *sweep.floor.given_px);
+    out.Measured("blur_floor_px", *sweep.floor.given_px);
   } else if (sweep.floor.from_px) {
-    out << YAML::Key << "blur_floor_px" << YAML::Value << YAML::Flow << YAML::BeginMap;
-    number("from", *sweep.floor.from_px);
-    number("to", *sweep.floor.to_px);
-    out << YAML::EndMap;
+    out.BeginMapInLine("blur_floor_px");
+    out.Number("from", *sweep.floor.from_px);
+    out.Number("to", *sweep.floor.to_px);
+    out.EndMap();
   } else {
-    text("blur_floor_px", "unknown");
+    out.Text("blur_floor_px", "unknown");
   }
   if (sweep.roi.width > 0) {
-    out << YAML::Key << "roi_px" << YAML::Value << YAML::Flow
-        << std::vector<int>{sweep.roi.x, sweep.roi.y, sweep.roi.width, sweep.roi.height};
+    out.List("roi_px", {std::to_string(sweep.roi.x), std::to_string(sweep.roi.y),
+                        std::to_string(sweep.roi.width), std::to_string(sweep.roi.height)});
   }
-  out << YAML::Key << "frames" << YAML::Value << YAML::BeginSeq;
+  out.BeginList("frames");
   for (const SweepFrame& frame : sweep.frames) {
-    out << YAML::Flow << YAML::BeginMap;
-    text("image", frame.image);
-    number("reading_mm", frame.reading_mm);
-    out << YAML::EndMap;
+    out.BeginMapInLine();
+    out.Text("image", frame.image);
+    out.Number("reading_mm", frame.reading_mm);
+    out.EndMap();
   }
-  out << YAML::EndSeq << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
+  out.EndList();
+  return out.Finish();
 }
 
 }  // namespace thicklens::model

@@ -1,7 +1,7 @@
 // Reader and writer of the file with the parameters of a simulated sweep.
-#include <yaml-cpp/yaml.h>
-
 #include "model/schema/effect_yaml.h"
+#include "model/schema/yaml_fields.h"
+#include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/pupil_law.h"
 #include "thicklens/model/sweep_file.h"
@@ -10,12 +10,6 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kTruthSchema[] = "thicklens/sweep-truth/1";
-
-std::string ReadPupilLawName(const YamlNode& node) {
-  std::vector<std::string> names;
-  for (const PupilLaw law : AllPupilLaws()) names.push_back(PupilLawName(law));
-  return node.OneOf(names);
-}
 
 }  // namespace
 
@@ -32,7 +26,9 @@ SweepTruth ReadSweepTruth(const std::string& path) {
   truth.blur_floor_px = root.At("blur_floor_px").NonNegativeNumber();
   truth.bench_offset_mm = root.At("bench_offset_mm").Number();
   if (const auto tilt = root.Find("tilt_deg")) truth.tilt_deg = tilt->Number();
-  if (const auto law = root.Find("pupil_law")) truth.pupil_law = ReadPupilLawName(*law);
+  if (const auto law = root.Find("pupil_law")) {
+    truth.pupil_law = PupilLawName(ReadNamed(*law, AllPupilLaws(), PupilLawName));
+  }
   for (const YamlNode& node : root.At("frames").Elements()) {
     node.RequireKeys({"image", "depth_mm", "reading_mm", "blur_sigma_px"});
     truth.frames.push_back({node.At("image").Text(), node.At("depth_mm").Number(),
@@ -43,29 +39,26 @@ SweepTruth ReadSweepTruth(const std::string& path) {
 }
 
 std::string SweepTruthToYaml(const SweepTruth& truth) {
-  YAML::Emitter out;
-  const auto number = [&](const char* key, double value) {
-    out << YAML::Key << key << YAML::Value << YamlNumber(value);
-  };
-  out << YAML::BeginMap << YAML::Key << "schema" << YAML::Value << kTruthSchema;
-  number("image_distance_mm", truth.image_distance_mm);
-  number("focus_depth_mm", truth.focus_depth_mm);
-  number("blur_ratio", truth.blur_ratio);
-  number("blur_floor_px", truth.blur_floor_px);
-  number("bench_offset_mm", truth.bench_offset_mm);
-  if (truth.tilt_deg != 0) number("tilt_deg", truth.tilt_deg);
-  if (!truth.pupil_law.empty()) out << YAML::Key << "pupil_law" << YAML::Value << truth.pupil_law;
-  EmitEffects(truth.effects, &out);
-  out << YAML::Key << "frames" << YAML::Value << YAML::BeginSeq;
+  YamlWriter out(kTruthSchema);
+  out.Number("image_distance_mm", truth.image_distance_mm);
+  out.Number("focus_depth_mm", truth.focus_depth_mm);
+  out.Number("blur_ratio", truth.blur_ratio);
+  out.Number("blur_floor_px", truth.blur_floor_px);
+  out.Number("bench_offset_mm", truth.bench_offset_mm);
+  if (truth.tilt_deg != 0) out.Number("tilt_deg", truth.tilt_deg);
+  out.TextIfAny("pupil_law", truth.pupil_law);
+  WriteEffects(truth.effects, &out);
+  out.BeginList("frames");
   for (const SweepTruth::Frame& frame : truth.frames) {
-    out << YAML::Flow << YAML::BeginMap << YAML::Key << "image" << YAML::Value << frame.image;
-    number("depth_mm", frame.depth_mm);
-    number("reading_mm", frame.reading_mm);
-    number("blur_sigma_px", frame.blur_sigma_px);
-    out << YAML::EndMap;
+    out.BeginMapInLine();
+    out.Text("image", frame.image);
+    out.Number("depth_mm", frame.depth_mm);
+    out.Number("reading_mm", frame.reading_mm);
+    out.Number("blur_sigma_px", frame.blur_sigma_px);
+    out.EndMap();
   }
-  out << YAML::EndSeq << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
+  out.EndList();
+  return out.Finish();
 }
 
 }  // namespace thicklens::model

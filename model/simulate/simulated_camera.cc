@@ -4,29 +4,27 @@
 
 #include <cmath>
 
+#include "thicklens/base/validity.h"
+
 namespace thicklens::model {
 
 bool IsSimulatable(const Camera& camera, std::string* why) {
-  const auto fail = [why](const std::string& reason) {
-    if (why != nullptr) *why = reason;
-    return false;
-  };
   std::string inner;
-  if (!camera.IsValid(&inner)) return fail("camera: " + inner);
+  if (!camera.IsValid(&inner)) return Fail(why, "camera: " + inner);
   const auto missing = [&](const char* field) {
-    return fail(fmt::format("camera '{}': {} is missing: a simulation needs it as the truth",
-                            camera.name, field));
+    return Fail(why, fmt::format("camera '{}': {} is missing: a simulation needs it as the truth",
+                                 camera.name, field));
   };
   if (!camera.calibration || !camera.calibration->image_distance_mm) {
     return missing("image_distance_mm");
   }
   if (!camera.calibration->blur_ratio) return missing("blur_ratio");
   if (!std::isfinite(camera.focus_depth_mm())) {
-    return fail(
-        fmt::format("camera '{}' is focused at infinity: a simulation needs a finite plane "
-                    "of focus, where views have their samples, and a bench its scale and "
-                    "light",
-                    camera.name));
+    return Fail(why,
+                fmt::format("camera '{}' is focused at infinity: a simulation needs a finite plane "
+                            "of focus, where views have their samples, and a bench its scale "
+                            "and light",
+                            camera.name));
   }
   return true;
 }

@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thicklens/base/pi.h"
+
 namespace thicklens::model {
-namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-}  // namespace
 
 // The mean is the difference of the antiderivative, which is a triangle wave.
 double SquareWaveMean(double x, double period, double width) {

@@ -23,6 +23,7 @@
 #include "thicklens/estimator/blas.h"
 #include "thicklens/io/scene_pixels.h"
 #include "thicklens/kernels/device.h"
+#include "tools/bench/bench_loop.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_parts.h"
 #include "tools/bench/bench_report.h"
@@ -203,26 +204,19 @@ void RunRow(const SampledPicture& picture, const Backends& backends, PriceRow* r
   }
 }
 
-// Round by round, so that what else the machine does falls on all alike.
 void Measure(const BenchAccuracyOptions& options, const SampledPicture& picture,
              const Backends& backends, std::vector<PriceRow>* rows) {
   // Of what takes so long, fewer runs tell as much as more.
   constexpr double kEnoughSeconds = 20;
   ProgressLine progress("measuring", options.common.quiet);
   std::vector<double> spent(rows->size());
-  int done = 0;
-  for (int round = 0; round < options.repeat; ++round) {
-    for (std::size_t i = 0; i < rows->size(); ++i) {
-      ThrowIfCancelled();
-      PriceRow& row = (*rows)[i];
-      if (row.failure.empty() && spent[i] < kEnoughSeconds) {
-        const Clock::time_point start = Clock::now();
-        RunRow(picture, backends, &row);
-        spent[i] += SecondsSince(start);
-      }
-      progress.Show(++done, options.repeat * static_cast<int>(rows->size()));
-    }
-  }
+  MeasureInRounds(options.repeat, rows->size(), &progress, [&](int, std::size_t i) {
+    PriceRow& row = (*rows)[i];
+    if (!row.failure.empty() || !(spent[i] < kEnoughSeconds)) return;
+    const Clock::time_point start = Clock::now();
+    RunRow(picture, backends, &row);
+    spent[i] += SecondsSince(start);
+  });
 }
 
 std::vector<PriceRow> MeasureScene(const BenchAccuracyOptions& options, const Scene& scene,

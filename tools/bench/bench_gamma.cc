@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "thicklens/estimator/render.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/stored_values.h"
+#include "tools/bench/bench_loop.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_parts.h"
 #include "tools/bench/bench_scene.h"
@@ -136,16 +138,11 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
   }
   {
     ProgressLine progress("measuring", options.common.quiet);
-    int done = 0;
     RunPlan(SourcePlan(estimator::DefaultBlockSolver()), scene.input, options.common.threads,
             backend.get());  // not counted, so that no row has a cold start
-    for (int round = 0; round < options.repeat; ++round) {
-      for (GammaRow& row : rows) {
-        ThrowIfCancelled();
-        if (row.failure.empty()) Run(scene, options, backend.get(), &row);
-        progress.Show(++done, options.repeat * static_cast<int>(rows.size()));
-      }
-    }
+    MeasureInRounds(options.repeat, rows.size(), &progress, [&](int, std::size_t i) {
+      if (rows[i].failure.empty()) Run(scene, options, backend.get(), &rows[i]);
+    });
   }
   std::string text = fmt::format(
       "gamma of the source's functional, by blocks of 16 px ({}) of {} x {} px, {} x {} views, "

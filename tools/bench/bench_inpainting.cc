@@ -20,6 +20,7 @@
 #include "thicklens/estimator/inpaint.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/stored_values.h"
+#include "tools/bench/bench_loop.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/bench_solvers.h"
@@ -171,18 +172,13 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
   }
   {
     ProgressLine progress("measuring", options.common.quiet);
-    int done = 0;
     // Not counted, so that no row has a cold start.
     for (const LightFieldSolver& solver : solvers) {
       solver.estimate(MiddleOf(scene, kWarmPx, kWarmPx).input);
     }
-    for (int round = 0; round < options.repeat; ++round) {
-      for (std::size_t i = 0; i < solvers.size(); ++i) {
-        ThrowIfCancelled();
-        Run(solvers[i], scene, regions, threads, &rows[2 * i], &rows[2 * i + 1]);
-        progress.Show(++done, options.repeat * static_cast<int>(solvers.size()));
-      }
-    }
+    MeasureInRounds(options.repeat, solvers.size(), &progress, [&](int, std::size_t i) {
+      Run(solvers[i], scene, regions, threads, &rows[2 * i], &rows[2 * i + 1]);
+    });
   }
   std::string text = fmt::format(
       "{0} x {0} px, {1} x {1} views, {2} thread(s), medians of {3}; PSNR against the true views, "

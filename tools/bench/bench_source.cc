@@ -20,6 +20,7 @@
 #include "thicklens/base/stopwatch.h"
 #include "thicklens/kernels/device.h"
 #include "thicklens/model/thick_lens.h"
+#include "tools/bench/bench_loop.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/bench_source_rows.h"
@@ -60,33 +61,25 @@ model::Camera ThickBenchCamera(int width_px, int height_px) {
   return camera;
 }
 
-// Round by round, so that what else the machine does falls on all alike.
 void Measure(const BenchSourceOptions& options, std::vector<SourceContender>* contenders,
              std::vector<SourceRow>* rows) {
   ProgressLine progress("measuring", options.common.quiet);
-  const int total = options.repeat * static_cast<int>(contenders->size());
-  int done = 0;
   std::vector<double> spent(contenders->size(), 0.0);
-  for (int round = 0; round < options.repeat; ++round) {
-    for (std::size_t i = 0; i < contenders->size(); ++i) {
-      ThrowIfCancelled();
-      SourceContender& contender = (*contenders)[i];
-      // Of what takes so long, fewer runs tell as much as more.
-      constexpr double kEnoughSeconds = 60;
-      if (spent[i] < kEnoughSeconds && contender.row.failure.empty()) {
-        const Clock::time_point start = Clock::now();
-        try {
-          contender.row.seconds.push_back(contender.run(&contender.row));
-        } catch (const Interrupted&) {
-          throw;
-        } catch (const Error& error) {  // one row, and not those beside it
-          contender.row.failure = error.what();
-        }
-        spent[i] += SecondsSince(start);
-      }
-      progress.Show(++done, total);
+  MeasureInRounds(options.repeat, contenders->size(), &progress, [&](int, std::size_t i) {
+    SourceContender& contender = (*contenders)[i];
+    // Of what takes so long, fewer runs tell as much as more.
+    constexpr double kEnoughSeconds = 60;
+    if (!contender.row.failure.empty() || !(spent[i] < kEnoughSeconds)) return;
+    const Clock::time_point start = Clock::now();
+    try {
+      contender.row.seconds.push_back(contender.run(&contender.row));
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error& error) {  // one row, and not those beside it
+      contender.row.failure = error.what();
     }
-  }
+    spent[i] += SecondsSince(start);
+  });
   for (SourceContender& contender : *contenders) rows->push_back(std::move(contender.row));
 }
 

@@ -1,6 +1,7 @@
 // thicklens bench: what the solvers cost on this machine, and what they give for it.
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@
 #include "tools/bench/bench_conditioning.h"
 #include "tools/bench/bench_gamma.h"
 #include "tools/bench/bench_inpainting.h"
+#include "tools/bench/bench_loop.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/bench_parts.h"
 #include "tools/bench/bench_scene.h"
@@ -112,31 +114,25 @@ void JudgeSolver(const SampledPicture& picture, const model::LightField& estimat
   if (is_whole) row->psnr_whole_db = PsnrOfWholeDb(picture.whole, estimate, threads);
 }
 
-// Round by round, so that what else the machine does falls on all alike; a first run of each, on
-// the part, is not counted.
+// A first run of each solver, on the part, is not counted.
 void Measure(const BenchOptions& options, const SampledPicture& picture, int threads,
              std::vector<Contender>* contenders) {
   ProgressLine progress("measuring", options.common.quiet);
-  const int total = options.repeat * static_cast<int>(contenders->size());
-  int done = 0;
-  for (int round = 0; round < options.repeat; ++round) {
-    for (Contender& contender : *contenders) {
-      ThrowIfCancelled();
-      const bool is_sampled = contender.by_blocks && picture.sample.has_value();
-      const BenchScene& scene = is_sampled ? picture.parts.front() : picture.whole;
-      if (round == 0) {
-        WarmUpWhole(picture,
-                    [&](const estimator::EstimateInput& input) { contender.way.estimate(input); });
-      }
-      const Clock::time_point start = Clock::now();
-      const model::LightField estimate = contender.way.estimate(scene.input);
-      contender.row.time.seconds.push_back(SecondsSince(start) *
-                                           (is_sampled ? picture.pixels_per_part_pixel : 1));
-      contender.row.time.is_extrapolated = is_sampled;
-      if (round == 0) JudgeSolver(picture, estimate, !is_sampled, threads, &contender.row);
-      progress.Show(++done, total);
+  MeasureInRounds(options.repeat, contenders->size(), &progress, [&](int round, std::size_t i) {
+    Contender& contender = (*contenders)[i];
+    const bool is_sampled = contender.by_blocks && picture.sample.has_value();
+    const BenchScene& scene = is_sampled ? picture.parts.front() : picture.whole;
+    if (round == 0) {
+      WarmUpWhole(picture,
+                  [&](const estimator::EstimateInput& input) { contender.way.estimate(input); });
     }
-  }
+    const Clock::time_point start = Clock::now();
+    const model::LightField estimate = contender.way.estimate(scene.input);
+    contender.row.time.seconds.push_back(SecondsSince(start) *
+                                         (is_sampled ? picture.pixels_per_part_pixel : 1));
+    contender.row.time.is_extrapolated = is_sampled;
+    if (round == 0) JudgeSolver(picture, estimate, !is_sampled, threads, &contender.row);
+  });
 }
 
 CommandResult BenchSolvers(const BenchOptions& options) {

@@ -6,11 +6,10 @@
 #include <utility>
 
 #include "model/optics/airy.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Maximum distance of the landing points for the Gaussian, in sigmas, and for the Airy pattern, in
 // radii.

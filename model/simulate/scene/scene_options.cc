@@ -9,17 +9,13 @@
 #include "model/simulate/scene/scene_geometry.h"
 #include "model/simulate/simulated_camera.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/validity.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::model {
 namespace {
 
 constexpr int kMaxViews = 99;
-
-bool Fail(std::string* why, const std::string& message) {
-  if (why != nullptr) *why = message;
-  return false;
-}
 
 std::string TextureComplaint(const TextureOptions& texture) {
   if (!(texture.colour.array() >= 0).all() || !(texture.colour.array() <= 1).all()) {

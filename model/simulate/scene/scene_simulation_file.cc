@@ -1,7 +1,5 @@
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
-#include <Eigen/Core>
 #include <limits>
 #include <optional>
 #include <string>
@@ -9,9 +7,10 @@
 #include <vector>
 
 #include "model/schema/effect_yaml.h"
+#include "model/schema/yaml_fields.h"
+#include "model/schema/yaml_writer.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera_file.h"
-#include "thicklens/model/light_field.h"
 #include "thicklens/model/scene_simulator.h"
 
 namespace thicklens::model {
@@ -19,16 +18,6 @@ namespace {
 
 constexpr char kSchema[] = "thicklens/simulate-scene/1";
 constexpr char kTruthSchema[] = "thicklens/scene-truth/1";
-
-// A missing key keeps the default value of `field`.
-void ReadNumber(const YamlNode& node, const char* key, double* field) {
-  if (const auto found = node.Find(key)) *field = found->Number();
-}
-
-Eigen::Vector2d ReadPair(const YamlNode& node) {
-  const auto numbers = node.ElementsExactly(2);
-  return {numbers[0].Number(), numbers[1].Number()};
-}
 
 // The truth of the simulation is the camera's calibration with the values of `truth` in place of
 // its own. The evidence of the calibration no longer applies.
@@ -40,37 +29,9 @@ void ReadTruth(const YamlNode& node, Camera* camera) {
     truth.blur_ratio = camera->calibration->blur_ratio;
     truth.blur_floor_px = camera->calibration->blur_floor_px;
   }
-  if (const auto focus = node.Find("focus_depth_mm")) {
-    const double focus_depth_mm = focus->PositiveNumber();
-    const double focal_mm = camera->lens.front_focal_length_mm;
-    if (!(focus_depth_mm > focal_mm)) {
-      throw focus->ErrorHere(
-          fmt::format("must be above the lens's front_focal_length_mm {}, found "
-                      "{}",
-                      focal_mm, focus_depth_mm));
-    }
-    truth.image_distance_mm = Estimate{ImageDistanceMm(camera->lens, focus_depth_mm), 0};
-  }
-  if (const auto ratio = node.Find("blur_ratio")) {
-    truth.blur_ratio = Estimate{ratio->NonNegativeNumber(), 0};
-  }
-  if (const auto floor = node.Find("blur_floor_px")) {
-    truth.blur_floor_px = Estimate{floor->NonNegativeNumber(), 0};
-  }
+  ReadTruthValues(node, camera->lens, &truth);
   truth.evidence.method = "simulated";
   camera->calibration = std::move(truth);
-}
-
-// The crop is the middle of the sensor. An odd difference leaves the extra row or column below or
-// on the right.
-Camera Crop(const YamlNode& node, const Camera& camera) {
-  const auto sides = node.ElementsExactly(2);
-  PixelRect rect;
-  rect.width = sides[0].Integer(1, camera.sensor.width_px);
-  rect.height = sides[1].Integer(1, camera.sensor.height_px);
-  rect.x = (camera.sensor.width_px - rect.width) / 2;
-  rect.y = (camera.sensor.height_px - rect.height) / 2;
-  return CropCamera(camera, rect);
 }
 
 PlaneOptions ReadPlane(const YamlNode& node) {
@@ -131,16 +92,12 @@ OutlineOptions ReadOutline(const YamlNode& node) {
 }
 
 TextureKind ReadKind(const YamlNode& node) {
-  const TextureKind kinds[] = {TextureKind::kUniform,     TextureKind::kSine,
-                               TextureKind::kEdge,        TextureKind::kCheckerboard,
-                               TextureKind::kSiemensStar, TextureKind::kDeadLeaves,
-                               TextureKind::kNoise,       TextureKind::kPicture};
-  std::vector<std::string> names;
-  for (const TextureKind kind : kinds) names.push_back(TextureKindName(kind));
-  const std::string name = node.OneOf(names);
-  std::size_t i = 0;
-  while (names[i] != name) ++i;
-  return kinds[i];
+  return ReadNamed<TextureKind>(
+      node,
+      {TextureKind::kUniform, TextureKind::kSine, TextureKind::kEdge, TextureKind::kCheckerboard,
+       TextureKind::kSiemensStar, TextureKind::kDeadLeaves, TextureKind::kNoise,
+       TextureKind::kPicture},
+      TextureKindName);
 }
 
 // Each kind accepts only the keys that apply to it.
@@ -222,7 +179,7 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
   SceneSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
-  if (const auto size = root.Find("size_px")) options.camera = Crop(*size, options.camera);
+  if (const auto size = root.Find("size_px")) options.camera = ReadCrop(*size, options.camera);
   for (const YamlNode& layer : root.At("layers").Elements()) {
     options.layers.push_back(ReadLayer(layer));
   }
@@ -252,22 +209,18 @@ SceneSimulationOptions ReadSceneSimulation(const std::string& path) {
 }
 
 std::string SceneTruthToYaml(const SceneTruth& truth) {
-  YAML::Emitter out;
-  const auto number = [&](const char* key, double value) {
-    out << YAML::Key << key << YAML::Value << YamlNumber(value);
-  };
-  out << YAML::BeginMap << YAML::Key << "schema" << YAML::Value << kTruthSchema;
-  number("image_distance_mm", truth.image_distance_mm);
-  number("focus_depth_mm", truth.focus_depth_mm);
-  number("blur_ratio", truth.blur_ratio);
-  number("blur_floor_px", truth.blur_floor_px);
-  number("nearest_depth_mm", truth.nearest_depth_mm);
-  number("farthest_depth_mm", truth.farthest_depth_mm);
-  number("largest_blur_sigma_px", truth.largest_blur_sigma_px);
-  EmitEffects(truth.effects, &out);
-  number("sampling_error_grey_levels", truth.sampling_error_grey_levels);
-  out << YAML::Key << "seed" << YAML::Value << truth.seed << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
+  YamlWriter out(kTruthSchema);
+  out.Number("image_distance_mm", truth.image_distance_mm);
+  out.Number("focus_depth_mm", truth.focus_depth_mm);
+  out.Number("blur_ratio", truth.blur_ratio);
+  out.Number("blur_floor_px", truth.blur_floor_px);
+  out.Number("nearest_depth_mm", truth.nearest_depth_mm);
+  out.Number("farthest_depth_mm", truth.farthest_depth_mm);
+  out.Number("largest_blur_sigma_px", truth.largest_blur_sigma_px);
+  WriteEffects(truth.effects, &out);
+  out.Number("sampling_error_grey_levels", truth.sampling_error_grey_levels);
+  out.Text("seed", std::to_string(truth.seed));
+  return out.Finish();
 }
 
 }  // namespace thicklens::model

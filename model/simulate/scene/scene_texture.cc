@@ -15,11 +15,10 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // The largest leaf, as a fraction of the shorter side of the visible part.
 constexpr double kLargestLeaf = 1.0 / 6;

@@ -5,11 +5,10 @@
 #include <complex>
 
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Number of rows that are transformed together: enough to share the set-up of the transform, few
 // enough for the cache.

@@ -4,12 +4,11 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "thicklens/base/pi.h"
 #include "thicklens/model/blur_transfer.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // A box this narrow blurs by less than 1e-11/sigma^2, and the division by it does not lose
 // significant digits.

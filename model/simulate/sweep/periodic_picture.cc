@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thicklens/base/pi.h"
 #include "thicklens/model/blur_transfer.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // The evaluation is a non-uniform fast Fourier transform along each axis in turn: an FFT onto a
 // grid that is kOversampling times finer than the band requires, then kTaps taps of a Kaiser-Bessel

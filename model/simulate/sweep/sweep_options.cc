@@ -9,17 +9,12 @@
 #include "model/simulate/simulated_camera.h"
 #include "model/simulate/sweep/tilted_target.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/pi.h"
+#include "thicklens/base/validity.h"
 #include "thicklens/model/sweep_simulator.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-bool Fail(std::string* why, const std::string& message) {
-  if (why != nullptr) *why = message;
-  return false;
-}
 
 bool IsValidTarget(const TargetOptions& target, std::string* why) {
   if (!(target.contrast > 0 && target.contrast <= 1)) {

@@ -1,7 +1,7 @@
-#include <Eigen/Core>
 #include <limits>
 
 #include "model/schema/effect_yaml.h"
+#include "model/schema/yaml_fields.h"
 #include "thicklens/base/yaml_reader.h"
 #include "thicklens/model/camera_file.h"
 #include "thicklens/model/sweep_simulator.h"
@@ -10,11 +10,6 @@ namespace thicklens::model {
 namespace {
 
 constexpr char kSchema[] = "thicklens/simulate-sweep/1";
-
-// A missing key keeps the default value of `field`.
-void ReadNumber(const YamlNode& node, const char* key, double* field) {
-  if (const auto found = node.Find(key)) *field = found->Number();
-}
 
 // The truth of the simulation is the camera's calibration with the values of `truth` in place of
 // its own.
@@ -25,53 +20,21 @@ void ReadTruth(const YamlNode& node, Camera* camera) {
     camera->calibration->evidence.method = "assumed";
   }
   CameraCalibration& calibration = *camera->calibration;
-  const auto focus = node.Find("focus_depth_mm");
   const auto distance = node.Find("image_distance_mm");
-  if (focus && distance) {
+  if (distance && node.Find("focus_depth_mm")) {
     throw distance->ErrorHere("focus_depth_mm says the same: give one of them");
   }
-  if (focus) {
-    const double focus_depth_mm = focus->PositiveNumber();
-    if (!(focus_depth_mm > camera->lens.front_focal_length_mm)) {
-      throw focus->ErrorHere("must be above the lens's front_focal_length_mm " +
-                             YamlNumber(camera->lens.front_focal_length_mm) + ", found " +
-                             YamlNumber(focus_depth_mm));
-    }
-    calibration.image_distance_mm = Estimate{ImageDistanceMm(camera->lens, focus_depth_mm), 0};
-  }
   if (distance) calibration.image_distance_mm = Estimate{distance->PositiveNumber(), 0};
-  if (const auto ratio = node.Find("blur_ratio")) {
-    calibration.blur_ratio = Estimate{ratio->NonNegativeNumber(), 0};
-  }
-  if (const auto floor = node.Find("blur_floor_px")) {
-    calibration.blur_floor_px = Estimate{floor->NonNegativeNumber(), 0};
-  }
-}
-
-// The crop is a centred part of the sensor; the axis keeps its position on the chip. An odd
-// difference leaves the extra row or column below or on the right.
-void CropSensor(const YamlNode& node, Sensor* sensor) {
-  const auto sides = node.ElementsExactly(2);
-  const int width_px = sides[0].Integer(1, sensor->width_px);
-  const int height_px = sides[1].Integer(1, sensor->height_px);
-  const Eigen::Vector2i corner((sensor->width_px - width_px) / 2,
-                               (sensor->height_px - height_px) / 2);
-  sensor->principal_point_px -= corner.cast<double>();
-  sensor->width_px = width_px;
-  sensor->height_px = height_px;
+  ReadTruthValues(node, camera->lens, &calibration);
 }
 
 TargetKind ReadKind(const YamlNode& node) {
-  const TargetKind kinds[] = {TargetKind::kDeadLeaves,  TargetKind::kPinkNoise,
-                              TargetKind::kWhiteNoise,  TargetKind::kCheckerboard,
-                              TargetKind::kSiemensStar, TargetKind::kPicture,
-                              TargetKind::kPrintedEdge, TargetKind::kKnifeEdge};
-  std::vector<std::string> names;
-  for (const TargetKind kind : kinds) names.push_back(TargetKindName(kind));
-  const std::string name = node.OneOf(names);
-  std::size_t i = 0;
-  while (names[i] != name) ++i;
-  return kinds[i];
+  return ReadNamed<TargetKind>(
+      node,
+      {TargetKind::kDeadLeaves, TargetKind::kPinkNoise, TargetKind::kWhiteNoise,
+       TargetKind::kCheckerboard, TargetKind::kSiemensStar, TargetKind::kPicture,
+       TargetKind::kPrintedEdge, TargetKind::kKnifeEdge},
+      TargetKindName);
 }
 
 TargetOptions ReadTarget(const YamlNode& node) {
@@ -134,7 +97,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   SweepSimulationOptions options;
   options.camera = ReadCamera(root.ResolvePath(root.At("camera").Text()));
   if (const auto truth = root.Find("truth")) ReadTruth(*truth, &options.camera);
-  if (const auto size = root.Find("size_px")) CropSensor(*size, &options.camera.sensor);
+  if (const auto size = root.Find("size_px")) options.camera = ReadCrop(*size, options.camera);
   options.target = ReadTarget(root.At("target"));
   ReadBench(root.At("bench"), &options);
   if (const auto light = root.Find("light")) ReadLight(*light, &options);
@@ -142,9 +105,7 @@ SweepSimulationOptions ReadSweepSimulation(const std::string& path) {
   if (const auto noise = root.Find("noise")) ReadNoise(*noise, &options);
   if (const auto bits = root.Find("bits")) options.bits = bits->Integer(8, 16);
   if (const auto law = root.Find("pupil_law")) {
-    std::vector<std::string> names;
-    for (const PupilLaw each : AllPupilLaws()) names.push_back(PupilLawName(each));
-    options.pupil_law = PupilLawFromName(law->OneOf(names));
+    options.pupil_law = ReadNamed(*law, AllPupilLaws(), PupilLawName);
   }
   ReadEffectChoice(root, &options.effects);
   if (const auto seed = root.Find("seed")) {

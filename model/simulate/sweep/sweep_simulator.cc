@@ -18,11 +18,11 @@
 #include "model/simulate/sweep/tilted_target.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // Minimum nearness of a drawn part of a tilted target: its depth is five times that of the middle.
 constexpr double kLeastNearness = 0.2;
 // Sigma, px, above which a profile's transfer function is not tabulated up to one cycle per px. A

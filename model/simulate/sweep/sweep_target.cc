@@ -10,11 +10,10 @@
 #include "model/simulate/square_wave.h"
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
+#include "thicklens/base/pi.h"
 
 namespace thicklens::model {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Default sizes, in px near the plane of focus.
 constexpr double kLeafRadiusPx = 2;

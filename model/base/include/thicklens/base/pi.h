@@ -1,0 +1,10 @@
+#ifndef THICKLENS_BASE_PI_H_
+#define THICKLENS_BASE_PI_H_
+
+namespace thicklens {
+
+inline constexpr double kPi = 3.14159265358979323846;
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_BASE_PI_H_
