@@ -8,10 +8,6 @@
 
 namespace thicklens {
 
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 double ResidentBytes() {
   std::ifstream file("/proc/self/statm");
   double total_pages = 0;

@@ -20,7 +20,6 @@
 namespace thicklens::estimator {
 namespace {
 
-using testing::DifferenceMatrix;
 using testing::ExpectStepsAreReported;
 using testing::GaussianWeights;
 using ::testing::HasSubstr;
@@ -28,6 +27,7 @@ using testing::NoiseInput;
 using testing::PhotographMatrix;
 using testing::ViewMatrix;
 using testing::WithSolverCamera;
+using thicklens::testing::DifferenceMatrix;
 using thicklens::testing::ErrorOf;
 
 constexpr double kPi = 3.14159265358979323846;

@@ -21,13 +21,13 @@
 namespace thicklens::io {
 namespace {
 
-using tools::Encoded;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using thicklens::testing::ErrorOf;
 using thicklens::testing::TemporaryFolder;
+using tools::Encoded;
 
 // 1, 2, 3 in the lower row, 4, 5, 6 in the upper one; big endian.
 const std::string kBigEndianValues(

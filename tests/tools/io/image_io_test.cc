@@ -19,10 +19,10 @@
 namespace thicklens::io {
 namespace {
 
-using tools::Encoded;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
+using tools::Encoded;
 
 std::string MessageOf(const std::string& bytes) {
   try {

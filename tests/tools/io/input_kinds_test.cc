@@ -19,7 +19,10 @@ namespace thicklens::io {
 namespace {
 
 using tools::ChildProgram;
+using tools::MakeWithProgram;
 using tools::ProgramResult;
+using tools::ProgramRun;
+using tools::ShellCommand;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;

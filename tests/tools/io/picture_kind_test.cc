@@ -15,11 +15,11 @@
 namespace thicklens::io {
 namespace {
 
-using tools::Encoded;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using thicklens::testing::ErrorOf;
+using tools::Encoded;
 
 struct Case {
   std::string extension;

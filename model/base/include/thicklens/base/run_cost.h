@@ -1,15 +1,14 @@
 #ifndef THICKLENS_BASE_RUN_COST_H_
 #define THICKLENS_BASE_RUN_COST_H_
 
-#include <chrono>
 #include <optional>
+
+#include "thicklens/base/stopwatch.h"
 
 namespace thicklens {
 
 // Time and memory that a run has used so far, for its summary and its limit.
 constexpr double kBytesPerMib = 1024.0 * 1024.0;
-using Clock = std::chrono::steady_clock;
-double SecondsSince(Clock::time_point start);
 double ResidentBytes();  // resident memory of the whole process, now
 // Returns freed memory that is kept for later use to the system, where the system supports it and
 // the process holds more than StayingBytes. Getting it back takes time.
