@@ -22,6 +22,7 @@ using tools::ChildProgram;
 using tools::MakeWithProgram;
 using tools::ProgramResult;
 using tools::ProgramRun;
+using tools::RunProgram;
 using tools::ShellCommand;
 namespace fs = std::filesystem;
 using ::testing::AllOf;
