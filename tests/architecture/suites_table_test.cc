@@ -81,7 +81,7 @@ bool Matches(const std::string& pattern, const std::string& name) {
 bool Selects(const std::string& pattern, const std::string& name) {
   if (Matches(pattern, name)) return true;
   if (name.back() != '/') return false;
-  // Of a pattern that goes into the parameter, the part before it.
+  // A pattern that goes into the parameter is compared up to it.
   const auto dot = pattern.find('.');
   const auto slash = pattern.rfind('/');
   if (dot == std::string::npos || slash == std::string::npos || slash < dot) return false;
