@@ -144,24 +144,24 @@ def lines_of(paths):
 
 
 def added_lines():
-    """(path, number) of the lines that are not committed; if there are none, of the last commit."""
-    for base in (['HEAD'], ['HEAD~1', 'HEAD']):
-        diff = subprocess.run(['git', 'diff', '-U0', '--no-color', '--no-ext-diff', *base, '--'],
-                              capture_output=True, text=True, errors='replace')
-        if diff.returncode:
-            break
-        added, path, number = set(), '', 0
-        for line in diff.stdout.splitlines():
-            if line.startswith('+++ '):
-                path = line[6:]
-            elif line.startswith('@@'):
-                number = int(re.search(r'\+(\d+)', line).group(1))
-            elif line.startswith('+'):
-                added.add((path, number))
-                number += 1
-        if added:
-            return added
-    return set()
+    """(path, number) of the lines that are new since origin/main, or else since the last commit."""
+    def git(*arguments):
+        run = subprocess.run(['git', *arguments], capture_output=True, text=True, errors='replace')
+        return run.stdout if run.returncode == 0 else ''
+
+    base = git('merge-base', 'origin/main', 'HEAD').strip()
+    if base in ('', git('rev-parse', 'HEAD').strip()):
+        base = git('rev-parse', '--verify', '--quiet', 'HEAD~1').strip() or 'HEAD'
+    added, path, number = set(), '', 0
+    for line in git('diff', '-U0', '--no-color', '--no-ext-diff', base, '--').splitlines():
+        if line.startswith('+++ '):
+            path = line[6:]
+        elif line.startswith('@@'):
+            number = int(re.search(r'\+(\d+)', line).group(1))
+        elif line.startswith('+'):
+            added.add((path, number))
+            number += 1
+    return added
 
 
 def spelling(paths, allowed):
