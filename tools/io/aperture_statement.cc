@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Weights of files are rounded.
+// The weights in files are rounded.
 constexpr double kRoundedWeight = 1e-6;
 
 Eigen::ArrayXXd SharesOfPresent(Eigen::ArrayXXd weights, const model::LightField& light_field) {
@@ -57,12 +57,12 @@ void RequireStatedAperture(const std::string& light_field_path,
   const Eigen::ArrayXXd wanted = ShapeOfPresentViews(shape, light_field);
   Eigen::Index l = 0, k = 0;
   if ((stated - wanted).abs().maxCoeff(&l, &k) <= kRoundedWeight) return;
-  throw Error(fmt::format(
-      "{}: weights: this light field states its aperture as {} (view ({}, {}) has a share of "
-      "{:.6g}), and {} gives that view {:.6g}: they must be equal; without --aperture-shape the "
-      "stated weights are used",
-      PrintableUtf8((fs::path(light_field_path) / kLightFieldMarker).string()),
-      OwnApertureInWords(light_field), k, l, stated(l, k), asked, wanted(l, k)));
+  throw Error(
+      fmt::format("{}: weights: this light field states its aperture as {} (view ({}, {}) has a "
+                  "share of {:.6g}), but {} gives that view {:.6g}: they must be equal; without "
+                  "--aperture-shape the stated weights are used",
+                  PrintableUtf8((fs::path(light_field_path) / kLightFieldMarker).string()),
+                  OwnApertureInWords(light_field), k, l, stated(l, k), asked, wanted(l, k)));
 }
 
 std::optional<std::string> DifferentApertures(const std::string& path,
@@ -73,14 +73,14 @@ std::optional<std::string> DifferentApertures(const std::string& path,
   const auto shape = estimator::ShapeOfWeights(light_field);
   const auto other_shape = estimator::ShapeOfWeights(other);
   if (!shape || !other_shape) return std::nullopt;
-  // Few views may have the weights of several shapes.
+  // With few views, several shapes may give the same weights.
   const Eigen::ArrayXXd one = ShapeOfPresentViews(*shape, light_field);
   const Eigen::ArrayXXd two = ShapeOfPresentViews(*other_shape, other);
   if (one.rows() == two.rows() && one.cols() == two.cols() &&
       ((one - two).abs() <= kRoundedWeight).all()) {
     return std::nullopt;
   }
-  if (*shape == *other_shape) return std::nullopt;  // of other views
+  if (*shape == *other_shape) return std::nullopt;  // the views differ
   return fmt::format(
       "{} states a {} aperture, {} a {} one: views from the same places are compared, but an "
       "estimate must be made for the aperture that the photograph was taken through",

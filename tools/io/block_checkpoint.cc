@@ -26,13 +26,13 @@ using nlohmann::json;
 
 constexpr char kKind[] = "thicklens-blocks/1";
 
-// What a block's record begins with; a float for each channel and ray follows. Numbers lie as the
-// machine has them: on another one nothing would fit.
+// The head of a block's record; a float for each channel and ray follows. Numbers have the byte
+// order of this machine: on a machine with another order the hashes would not match.
 struct Head {
   std::int32_t block = 0, x = 0, y = 0, width_px = 0, height_px = 0, unknowns = 0;
   std::int32_t iterations = 0, channels = 0;
   std::int64_t entries = 0, rays = 0;
-  double rcond = 0;  // NaN: none
+  double rcond = 0;  // NaN if there is none
   double relative_residual = 0;
 };
 static_assert(sizeof(Head) == 64 && std::is_trivially_copyable_v<Head>);
@@ -102,7 +102,7 @@ void AddInPieces(std::string_view bytes, Sha256* hash) {
   }
 }
 
-// Another build may round otherwise. Empty where the system does not show the program.
+// Another build may round differently. The hash is empty if the system does not show the program.
 std::string HashOfThisProgram() {
   std::ifstream program("/proc/self/exe", std::ios::binary);
   if (!program) return "";
@@ -115,7 +115,7 @@ std::string HashOfThisProgram() {
   return hash.Hex();
 }
 
-// A list of pairs, so that the order in which differences are told is kept.
+// A list of pairs and not a map, so that differences are reported in this order.
 json DescriptionOf(const std::string& version, const estimator::BlockRun& run) {
   json description = json::array();
   description.push_back({"version", PrintableUtf8(version)});
@@ -131,7 +131,7 @@ json DescriptionOf(const std::string& version, const estimator::BlockRun& run) {
   return description;
 }
 
-// A name and a value, or two empty texts.
+// Returns a name and a value, or two empty texts.
 std::pair<std::string, std::string> PairOf(const json& entry) {
   if (!entry.is_array() || entry.size() != 2 || !entry[0].is_string() || !entry[1].is_string()) {
     return {};
@@ -143,15 +143,15 @@ bool IsHash(const std::string& value) {
   return value.size() == 64 && value.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-// The first difference, in words; empty: none.
+// Describes the first difference; an empty text if there is none.
 std::string Difference(const json& there, const json& here) {
-  if (!there.is_array()) return "what it is of cannot be read";
+  if (!there.is_array()) return "its description of the estimate cannot be read";
   for (std::size_t i = 0; i < here.size(); ++i) {
     const auto [name, value] = PairOf(here[i]);
     const auto [other_name, other_value] = PairOf(i < there.size() ? there[i] : json(nullptr));
-    if (name != other_name) return fmt::format("it says nothing of '{}'", name);
+    if (name != other_name) return fmt::format("it does not state '{}'", name);
     if (value == other_value) continue;
-    if (IsHash(value) || name == "version") return fmt::format("the {} is another", name);
+    if (IsHash(value) || name == "version") return fmt::format("the {} differs", name);
     return fmt::format("{} is {} there and {} here", name, PrintableUtf8(other_value), value);
   }
   return "";
@@ -171,7 +171,7 @@ BlockCheckpoint::BlockCheckpoint(const std::string& path, std::string version,
       version_(std::move(version)),
       warn_(std::move(warn)),
       there_(std::make_unique<Description>()) {
-  // Without a block it holds nothing that would be lost.
+  // Without a block the file holds nothing that could be lost.
   if (journal_.size() < 2) {
     journal_.Clear();
     return;
@@ -206,7 +206,7 @@ std::optional<int> BlockCheckpoint::block_px() const {
 std::optional<std::string> BlockCheckpoint::device() const {
   const std::string value = Setting("device");
   if (value == "cpu") return value;
-  // "opencl:0:0", and what else is at work behind a comma.
+  // "opencl:0:0", with whatever else is used after a comma.
   if (value.rfind("opencl:", 0) == 0) return value.substr(0, value.find_first_of(", "));
   return std::nullopt;
 }
@@ -226,12 +226,12 @@ void BlockCheckpoint::Begin(const estimator::BlockRun& run) {
   const std::string difference = Difference(there_->fields, here);
   if (!difference.empty()) {
     throw Error(
-        fmt::format("{}: holds blocks of another estimate: {}; go on with what it was begun with, "
-                    "name another file, or remove this one",
+        fmt::format("{}: holds blocks of another estimate: {}; continue with the original "
+                    "settings, name another file, or remove this one",
                     path(), difference));
   }
   if (journal_.bytes_left_out() > 0 && warn_) {
-    warn_(fmt::format("{}: {} bytes of it are no whole blocks, and left out", path(),
+    warn_(fmt::format("{}: {} bytes at its end are not complete blocks and are ignored", path(),
                       journal_.bytes_left_out()));
   }
   is_begun_ = true;

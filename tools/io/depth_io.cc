@@ -31,7 +31,7 @@ bool StartsWith(const std::string& bytes, const std::string& start) {
 
 bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-// The next word of the header; `at` is left behind it.
+// Returns the next word of the header; `at` is then behind it.
 std::string NextWord(const std::string& bytes, std::size_t* at) {
   constexpr std::size_t kLongest = 40;
   while (*at < bytes.size() && IsSpace(bytes[*at])) ++*at;
@@ -64,7 +64,7 @@ float FloatFromBytes(const char* bytes, bool little_endian) {
   return value;
 }
 
-// The magnitude of the scale is the unit of the picture's light; for depth it means nothing.
+// The magnitude of the scale is the unit of the picture's light; it has no meaning for depth.
 model::RawDepthMap DecodePfm(const std::string& bytes, const std::string& name) {
   std::size_t at = 2;  // behind "Pf"
   model::RawDepthMap map;
@@ -133,11 +133,12 @@ cv::Mat Decode(const std::string& bytes, const std::string& name) {
 model::RawDepthMap ReadDepthMap(const std::string& path) {
   const std::string bytes = ReadWholeFile(path);
   if (StartsWith(bytes, "PF") && bytes.size() > 2 && IsSpace(bytes[2]))
-    throw Error(fmt::format("{}: a PFM of three channels; a depth map has one", path));
+    throw Error(
+        fmt::format("{}: a PFM file with three channels; a depth map has one channel", path));
   if (StartsWith(bytes, "Pf")) return DecodePfm(bytes, path);
   const std::optional<PictureKind> kind = KindOfPicture(bytes);
   if (!kind || std::find(kDepthKinds.begin(), kDepthKinds.end(), *kind) == kDepthKinds.end()) {
-    throw Error(fmt::format("{}: no depth map: a PFM, PNG, TIFF or EXR file is expected", path));
+    throw Error(fmt::format("{}: not a depth map: a PFM, PNG, TIFF or EXR file is expected", path));
   }
   const cv::Mat picture = Decode(bytes, path);
   if (!IsAsExpected(picture, *kind, bytes)) {

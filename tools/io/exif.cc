@@ -14,7 +14,7 @@
 namespace thicklens::io {
 namespace {
 
-// Non-square pixels beyond this are no rounding of the EXIF fractions.
+// A larger mismatch of the two pitches is not explained by the rounding of the EXIF fractions.
 constexpr double kMaxPitchMismatch = 0.01;
 
 std::optional<double> PositiveValue(const Exiv2::ExifData& exif, const char* key) {
@@ -26,7 +26,7 @@ std::optional<double> PositiveValue(const Exiv2::ExifData& exif, const char* key
   return value;
 }
 
-// EXIF 2.3, FocalPlaneResolutionUnit: 2 inch (the default), 3 cm; 4 mm and 5 um are in use too.
+// EXIF 2.3, FocalPlaneResolutionUnit: 2 inch (the default), 3 cm; files also use 4 mm and 5 um.
 double ResolutionUnitMm(const Exiv2::ExifData& exif) {
   const double unit = PositiveValue(exif, "Exif.Photo.FocalPlaneResolutionUnit").value_or(2);
   if (unit == 3) return 10;
@@ -42,7 +42,7 @@ std::optional<int> WholePixels(const Exiv2::ExifData& exif, const char* key) {
   return static_cast<int>(*value);
 }
 
-// EXIF 2.3: metres; all bits of the numerator set: infinity; 0: unknown.
+// EXIF 2.3: the unit is metres; all bits of the numerator set mean infinity, and 0 means unknown.
 std::optional<double> SubjectDistanceMm(const Exiv2::ExifData& exif) {
   constexpr char kKey[] = "Exif.Photo.SubjectDistance";
   constexpr double kMmPerMetre = 1000;
@@ -69,8 +69,8 @@ void TakePicture(const Exiv2::ExifData& exif, PhotoExif* photo) {
   }
 }
 
-// The resolution is that of the picture as the camera made it: of a picture that was made smaller
-// or cut since, nobody knows which, it says nothing.
+// The resolution refers to the picture as the camera made it. It says nothing about a picture that
+// was scaled or cropped afterwards, because how is unknown.
 void TakePitch(const Exiv2::ExifData& exif, int width_px, int height_px, PhotoExif* photo) {
   const auto x_per_unit = PositiveValue(exif, "Exif.Photo.FocalPlaneXResolution");
   const auto y_per_unit = PositiveValue(exif, "Exif.Photo.FocalPlaneYResolution");
@@ -86,8 +86,8 @@ void TakePitch(const Exiv2::ExifData& exif, int width_px, int height_px, PhotoEx
       PositiveValue(exif, "Exif.Photo.PixelYDimension").value_or(height_px);
   if (made_width_px != width_px || made_height_px != height_px) {
     photo->why_no_pitch =
-        fmt::format("the pictures are {} x {} px, EXIF speaks of {} x {}: scaled or cut", width_px,
-                    height_px, made_width_px, made_height_px);
+        fmt::format("the pictures are {} x {} px, EXIF states {} x {}: they were scaled or cropped",
+                    width_px, height_px, made_width_px, made_height_px);
     return;
   }
   if (y_per_unit && std::abs(*y_per_unit / *x_per_unit - 1) > kMaxPitchMismatch) {
@@ -110,7 +110,8 @@ PhotoExif ReadPhotoExif(const std::string& path, int width_px, int height_px) {
   Exiv2::LogMsg::setLevel(Exiv2::LogMsg::mute);
   PhotoExif photo;
   try {
-    // Not by its name, which Exiv2 may take for an address in a network or for standard input.
+    // The file is not opened by its name, which Exiv2 may take for a network address or for
+    // standard input.
     const std::string bytes = ReadWholeFile(path);
     const auto image = Exiv2::ImageFactory::open(
         reinterpret_cast<const Exiv2::byte*>(bytes.data()),  // NOLINT: bytes

@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::size_t kStripBytes = 1 << 18;
 
-// Keeps what libtiff would print.
+// Keeps the message that libtiff would print.
 int KeepMessage(TIFF* /*tiff*/, void* message, const char* /*module*/, const char* format,
                 std::va_list arguments) {
   char text[512];
@@ -44,7 +44,7 @@ TiffFile OpenForWriting(const std::string& path, std::string* message) {
   return tiff;
 }
 
-// False where libtiff fails.
+// Returns false if libtiff fails.
 bool Write(const model::LinearPicture& picture, TIFF* tiff) {
   const auto width = static_cast<std::uint32_t>(picture.width_px);
   const auto height = static_cast<std::uint32_t>(picture.height_px);
@@ -68,7 +68,7 @@ bool Write(const model::LinearPicture& picture, TIFF* tiff) {
   for (std::uint32_t y = 0; done && y < height; y += strip_rows) {
     ThrowIfCancelled();
     const std::size_t rows = std::min(strip_rows, height - y);
-    // Only read: the values are in the order of bytes of this machine, as is the file.
+    // libtiff only reads them: the values are in the byte order of this machine, as is the file.
     float* values = const_cast<float*>(picture.values.data()) + y * row_values;  // NOLINT
     const auto bytes = static_cast<tmsize_t>(rows * row_values * sizeof(float));
     done = TIFFWriteEncodedStrip(tiff, y / strip_rows, values, bytes) == bytes;
@@ -83,10 +83,10 @@ void WriteFloatTiff(const model::LinearPicture& picture, const std::string& path
   constexpr std::size_t kRoomForDirectory = 1 << 20;
   const std::size_t bytes = picture.values.size() * sizeof(float);
   if (bytes > std::numeric_limits<std::uint32_t>::max() - kRoomForDirectory) {
-    throw Error(
-        fmt::format("{}: {}x{} px take {} bytes: a TIFF file holds at most 4 GiB; --format png is "
-                    "smaller",
-                    shown_name, picture.width_px, picture.height_px, bytes));
+    throw Error(fmt::format(
+        "{}: {}x{} px take {} bytes, but a TIFF file holds at most 4 GiB; --format png is "
+        "smaller",
+        shown_name, picture.width_px, picture.height_px, bytes));
   }
   errno = 0;
   std::string message;

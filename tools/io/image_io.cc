@@ -39,9 +39,9 @@ cv::Mat DecodePicture(const std::string& bytes, const std::string& name) {
                             why.empty() ? "a PNG, TIFF, JPEG, BMP or PNM file is expected" : why));
   }
   if (picture.depth() != CV_8U && picture.depth() != CV_16U) {
-    throw Error(
-        fmt::format("{}: a picture of 8 or 16 bits a channel is expected, found one of {} bits{}",
-                    name, 8 * picture.elemSize1(), picture.depth() >= CV_32F ? ", float" : ""));
+    throw Error(fmt::format(
+        "{}: a picture with 8 or 16 bits per channel is expected, found one of {} bits{}", name,
+        8 * picture.elemSize1(), picture.depth() >= CV_32F ? ", float" : ""));
   }
   const int channels = picture.channels();
   if (channels != 1 && channels != 3 && channels != 4) {
@@ -81,16 +81,16 @@ std::string EncodePng(const model::StoredPicture& picture) {
                      const_cast<std::uint16_t*>(picture.values.data()));  // NOLINT: only read
   cv::Mat values = wide;
   if (picture.bits == 8) wide.convertTo(values, CV_8U);
-  // To try every filter takes three times as long and makes pictures of 16 bits no smaller; those
-  // of 8 bits have repetitions.
+  // Trying every filter takes three times as long and does not make pictures of 16 bits smaller;
+  // pictures of 8 bits have repetitions.
   return EncodePngPixels(values, picture.bits == 8 ? PngPacking::kRepetitions : PngPacking::kFast);
 }
 
 std::string EncodeBytesPng(const std::vector<std::uint8_t>& bytes, int width_px) {
   const auto width = static_cast<std::size_t>(width_px);
   if (width_px < 1 || bytes.empty() || bytes.size() % width != 0) {
-    throw Error(
-        fmt::format("a picture of bytes: {} bytes are not rows of {} px", bytes.size(), width_px));
+    throw Error(fmt::format("a picture of bytes: {} bytes are not a whole number of rows of {} px",
+                            bytes.size(), width_px));
   }
   const cv::Mat values(static_cast<int>(bytes.size() / width), width_px, CV_8U,
                        const_cast<std::uint8_t*>(bytes.data()));  // NOLINT: only read

@@ -32,14 +32,14 @@ Error Failure(const std::string& path, const std::string& what, int error) {
 }
 
 Error NoRegularFile(const std::string& path, const struct stat& info) {
-  return Error(
-      fmt::format("{}: is no regular file but {}; name another", path, KindOfFile(info.st_mode)));
+  return Error(fmt::format("{}: is not a regular file but {}; name another", path,
+                           KindOfFile(info.st_mode)));
 }
 
 bool IsTaken(int error) { return error == EEXIST || error == ENOENT || error == ELOOP; }
 
-// The file that a path leads to, which may have to be made: a journal may be a link to another
-// disk, which stays when its file has served its purpose.
+// Returns the file that a path leads to, which may not exist yet. A journal may be a link to
+// another disk; the link stays when the file is removed.
 std::string FollowedPath(const std::string& path) {
   std::error_code failure;
   const auto followed = std::filesystem::canonical(path, failure);
@@ -50,8 +50,9 @@ std::string FollowedPath(const std::string& path) {
   return (std::filesystem::path(path).parent_path() / target).string();
 }
 
-// An existing file is looked at before it is opened; a new one is made where nothing is. No link is
-// followed but the given path. -1: it was made or removed between the two.
+// An existing file is checked before it is opened; a new one is created only if nothing is there.
+// No link is followed except the given path. Returns -1 if the file was created or removed in
+// between.
 int OpenOrMake(const std::string& path) {
   constexpr int kAlways = O_RDWR | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW;
   constexpr char kWhat[] = "cannot be opened; name a file in a folder that can be written to";
@@ -102,7 +103,7 @@ JournalFile::~JournalFile() {
 
 void JournalFile::Open() {
   if (path_ == "-") {
-    throw Error("-: what is kept for the next run cannot go to standard output; name a file");
+    throw Error("-: the checkpoint cannot be written to standard output; name a file");
   }
   constexpr int kMostTries = 100;
   for (int i = 0; i < kMostTries; ++i) {
@@ -110,16 +111,17 @@ void JournalFile::Open() {
     if (file_ < 0) continue;
     if (::flock(file_, LOCK_EX | LOCK_NB) != 0) {
       if (errno != EWOULDBLOCK) throw Failure(path_, "cannot be locked", errno);
-      throw Error(fmt::format(
-          "{}: another run is at work with it; wait for it or name another file", path_));
+      throw Error(
+          fmt::format("{}: another run is using it; wait for it or name another file", path_));
     }
-    // Its holder may have removed it between the two. A link is not what is to be removed once.
+    // The run that held the lock may have removed the file in between. The identity counts, not the
+    // link, which is kept.
     std::error_code failure;
     followed_ = std::filesystem::canonical(path_, failure).string();
     if (!failure && IsNamed(file_, followed_)) return;
     ::close(std::exchange(file_, -1));
   }
-  throw Error(fmt::format("{}: cannot be opened: it is removed again and again", path_));
+  throw Error(fmt::format("{}: cannot be opened: it is repeatedly removed", path_));
 }
 
 void JournalFile::ReadRecords(const std::function<void()>& stop) {
@@ -129,10 +131,10 @@ void JournalFile::ReadRecords(const std::function<void()>& stop) {
   const std::string begin =
       ReadAt(0, static_cast<std::size_t>(std::min<std::uint64_t>(first_line_.size(), file_bytes)));
   if (first_line_.compare(0, begin.size(), begin) != 0) {
-    throw Error(fmt::format(
-        "{}: is another kind of file (its first line must be '{}'), and would be overwritten; "
-        "name another file",
-        path_, first_line_.substr(0, first_line_.size() - 1)));
+    throw Error(
+        fmt::format("{}: is another kind of file (its first line must be '{}') and would be "
+                    "overwritten; name another file",
+                    path_, first_line_.substr(0, first_line_.size() - 1)));
   }
   if (begin.size() == first_line_.size()) {
     end_ = first_line_.size();
@@ -146,7 +148,7 @@ void JournalFile::ReadRecords(const std::function<void()>& stop) {
     }
   }
   bytes_left_out_ += file_bytes - end_;
-  // More than what a run that was killed in its first moment leaves.
+  // A run that is killed right after its start leaves at most this many bytes.
   constexpr std::uint64_t kMostWithoutWorth = 1 << 16;
   if (records_.empty() && bytes_left_out_ > kMostWithoutWorth) {
     throw Error(fmt::format(
@@ -170,7 +172,7 @@ JournalFile::Found JournalFile::FindRecord(std::uint64_t offset, std::uint64_t f
     return Found::kNone;
   }
   const std::uint64_t start = offset + length + 1;
-  // The newline after it, too; before any memory is taken.
+  // The newline after the record must fit as well. This is checked before memory is allocated.
   if (bytes >= file_bytes - start) return Found::kNone;
   *place = {start, static_cast<std::size_t>(bytes)};
   const std::string record = ReadAt(start, place->bytes + 1);
@@ -188,7 +190,7 @@ std::string JournalFile::ReadAt(std::uint64_t offset, std::size_t bytes) const {
         ::pread(file_, found.data() + done, bytes - done, static_cast<off_t>(offset + done));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) throw Failure(path_, "cannot be read", errno);
-    if (n == 0) break;  // somebody cut it
+    if (n == 0) break;  // the file was truncated
     done += static_cast<std::size_t>(n);
   }
   found.resize(done);
@@ -233,7 +235,7 @@ void JournalFile::Append(const std::vector<std::string>& records) {
     WriteAt(0, first_line_);
     end_ = first_line_.size();
   }
-  // What was begun there is no record, and what is longer must not stand out behind the new one.
+  // An incomplete record must not remain, and no older bytes may follow the new record.
   if (::ftruncate(file_, static_cast<off_t>(end_)) != 0) {
     throw Failure(path_, "cannot be written", errno);
   }

@@ -44,20 +44,20 @@ constexpr char kHciStem[] = "input_Cam";
 constexpr int kMaxHciNumber = 999999;
 constexpr char kHciSignature[] = "# Written by thicklens.\n";
 
-// What --threads says; RunCommand has told it to OpenCV.
+// Returns the value of --threads, which RunCommand has passed to OpenCV.
 int Threads() { return std::max(1, cv::getNumThreads()); }
 
-// A light field without its values, and where to get them.
+// A light field without its values, and how to read them.
 struct ViewSource {
   std::string folder;
   model::LightField frame;
-  // The view (k, l) of the frame in linear light; called from several threads.
+  // Reads the view (k, l) of the frame in linear light; called from several threads.
   std::function<model::LinearPicture(int k, int l)> read;
 };
 
 std::string NameOf(ViewFormat format) { return format == ViewFormat::kPng ? "png" : "tiff"; }
 
-// "view (3, 0): " in front of what went wrong with it.
+// Puts "view (3, 0): " in front of a message about that view.
 Error ViewError(int k, int l, const std::string& what) {
   return Error(fmt::format("view ({}, {}): {}", k, l, what));
 }
@@ -103,7 +103,7 @@ Error MissingViews(const std::string& folder, const std::vector<std::string>& na
                            folder, Listed(names)));
 }
 
-// ---- Our own layout.
+// ---- The layout of thicklens.
 
 std::string ViewFile(int k, int l, const std::string& format) {
   return fmt::format("{}/{}.{}", kViewsFolder, model::ViewFileStem(k, l), format);
@@ -113,7 +113,7 @@ std::string ConfidenceFile(int k, int l) {
   return fmt::format("{}/{}.png", kConfidenceFolder, model::ViewFileStem(k, l));
 }
 
-// Also those of views that nobody asks for: the light field as a whole is the input.
+// Includes the views that were not requested: the light field as a whole is the input.
 void TellFilesOf(const std::string& folder, const model::LightFieldDescription& description) {
   const model::LightField& frame = description.light_field;
   for (int l = 0; l < frame.v_count; ++l) {
@@ -167,7 +167,7 @@ ViewSource OpenOwn(const std::string& folder, bool sparse) {
 
 std::string HciFile(int number) { return fmt::format("{}{:03}.png", kHciStem, number); }
 
-// The numbers of the views that are in the folder.
+// Returns the numbers of the views that are in the folder.
 std::vector<int> HciNumbers(const std::string& folder) {
   std::vector<int> numbers;
   std::error_code failure;
@@ -189,7 +189,7 @@ std::string Trimmed(const std::string& text) {
   return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
 }
 
-// num_cams_x of the benchmark's parameters.cfg, an INI file; 0 where there is no such file.
+// Returns num_cams_x of the benchmark's parameters.cfg, an INI file, or 0 if there is no such file.
 int HciRowLength(const std::string& folder) {
   const std::string path = (fs::path(folder) / kHciMarker).string();
   std::error_code ignored;
@@ -209,7 +209,7 @@ int HciRowLength(const std::string& folder) {
     }
     return static_cast<int>(value);
   }
-  throw Error(fmt::format("{}: num_cams_x is missing; --grid N says the same", path));
+  throw Error(fmt::format("{}: num_cams_x is missing; add it, or give --grid N", path));
 }
 
 int InferredRowLength(const std::string& folder, const std::vector<int>& numbers) {
@@ -217,16 +217,16 @@ int InferredRowLength(const std::string& folder, const std::vector<int>& numbers
   const auto count = static_cast<int>(numbers.size());
   const auto edge = static_cast<int>(std::lround(std::sqrt(count)));
   if (edge * edge == count && numbers.back() == count - 1) return edge;
-  throw Error(fmt::format(
-      "{}: {} views from {} to {} are no full square, and there is no {}: --grid N must say how "
-      "many views the numbering counts in a row",
-      folder, count, HciFile(numbers.front()), HciFile(numbers.back()), kHciMarker));
+  throw Error(
+      fmt::format("{}: {} views from {} to {} do not form a full square, and there is no {}: "
+                  "--grid N must state how many views the numbering counts per row",
+                  folder, count, HciFile(numbers.front()), HciFile(numbers.back()), kHciMarker));
 }
 
 ViewSource OpenHci(const std::string& folder, int grid, bool sparse) {
   const std::vector<int> numbers = HciNumbers(folder);
   if (numbers.empty()) {
-    throw Error(fmt::format("{}: no light field: neither {} nor {}, {}, ... are in it", folder,
+    throw Error(fmt::format("{}: not a light field: neither {} nor {}, {}, ... are in it", folder,
                             kLightFieldMarker, HciFile(0), HciFile(1)));
   }
   for (const int number : numbers) TellInput((fs::path(folder) / HciFile(number)).string());
@@ -267,9 +267,9 @@ ViewSource OpenHci(const std::string& folder, int grid, bool sparse) {
   return source;
 }
 
-// ---- Both.
+// ---- Both layouts.
 
-// Reads views of a frame whose (0, 0) is the source's (first_k, first_l).
+// Reads views of a frame whose view (0, 0) is the view (first_k, first_l) of the files.
 class ViewReader {
  public:
   ViewReader(const ViewSource& source, int first_k, int first_l)
@@ -286,7 +286,7 @@ class ViewReader {
     }
   }
 
-  // The same, of the size and channels of the frame.
+  // Reads a view likewise, and requires the size and channels of the frame.
   model::LinearPicture ReadLike(const model::LightField& frame, int k, int l) const {
     model::LinearPicture picture = Read(k, l);
     RequireLike(frame, k, l, picture);
@@ -321,7 +321,7 @@ std::pair<int, int> FirstPresent(const model::LightField& frame) {
   return {0, 0};
 }
 
-// The folder's name in front of what does not fit what was asked for.
+// Puts the folder's name in front of a message about a request that the light field does not fit.
 template <typename Work>
 auto NamingTheFolder(const std::string& folder, const Work& work) {
   try {
@@ -333,11 +333,11 @@ auto NamingTheFolder(const std::string& folder, const Work& work) {
   }
 }
 
-// Throws Error unless files can hold such views.
+// Throws Error unless image files can store such views.
 void RequireStorable(int channels) {
   if (channels != 1 && channels != 3) {
-    throw Error(fmt::format("light field: channels is {}: files of views hold 1 (grey) or 3 (RGB)",
-                            channels));
+    throw Error(fmt::format(
+        "light field: channels is {}: image files of views have 1 (grey) or 3 (RGB)", channels));
   }
 }
 
@@ -347,7 +347,7 @@ void RequireValid(const model::LightField& light_field) {
   RequireStorable(light_field.channels);
 }
 
-// Calls write(k, l, picture) for every view that there is, on several threads.
+// Calls write(k, l, picture) for every view that is present, on several threads.
 void ForEachView(const model::LightField& light_field,
                  const std::function<void(int, int, const model::LinearPicture&)>& write) {
   ParallelFor(light_field.u_count * light_field.v_count, Threads(), [&](int i) {
@@ -358,10 +358,11 @@ void ForEachView(const model::LightField& light_field,
   });
 }
 
-// What the benchmark's tools compute with, where it is known. Their cameras are pinholes, for which
-// d = baseline_mm focal_length_mm (1/z - 1/zf) image_resolution_px/sensor_size_mm: with the focal
-// length K = f1 zf/(zf - f1), the scale of chief rays, and the step between views on the aperture
-// as the baseline, this is d(z) = da K (1/z - 1/zf)/p. Derived here [D22].
+// Writes the parameters that the benchmark's tools use, as far as they are known. Their cameras are
+// pinholes, for which d = baseline_mm focal_length_mm (1/z - 1/zf)
+// image_resolution_px/sensor_size_mm. The focal length is K = f1 zf/(zf - f1), the scale of chief
+// rays, and the baseline is the step between views on the aperture, so that this is d(z) = da K
+// (1/z - 1/zf)/p. Derived here [D22].
 std::string HciParameters(const model::LightField& light_field) {
   const double larger_side_px = std::max(light_field.s_count, light_field.t_count);
   std::string intrinsics, extrinsics;
@@ -406,7 +407,7 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
                           (source.frame.v_count - frame.v_count) / 2);
   const std::pair<int, int> first_place = FirstPresent(frame);
   model::LinearPicture first = reader.Read(first_place.first, first_place.second);
-  if (frame.s_count == 0) {  // only the views themselves tell
+  if (frame.s_count == 0) {  // the size is known only from the views themselves
     frame.s_count = first.width_px;
     frame.t_count = first.height_px;
     frame.channels = first.channels;
@@ -414,10 +415,11 @@ model::LightField ReadLightField(const std::string& folder, const LightFieldRead
   model::LightField light_field =
       reading.crop ? NamingTheFolder(folder, [&] { return CropViews(frame, *reading.crop); })
                    : frame;
-  // Not before a view is as large as is said: memory for what is not there may be all there is.
+  // Memory is allocated only after a view was found to have the stated size: a wrong size could
+  // exhaust the memory.
   reader.RequireLike(frame, first_place.first, first_place.second, first);
   light_field.values.assign(light_field.ViewStart(light_field.channels, 0, 0), 0.0F);
-  // Bits of one vector cannot be set by several threads.
+  // Several threads cannot set bits of one std::vector<bool>.
   const std::vector<bool> present = std::exchange(light_field.present, {});
   ParallelFor(frame.u_count * frame.v_count, Threads(), [&](int i) {
     const int k = i % frame.u_count;
@@ -454,7 +456,7 @@ LightFieldWriter::LightFieldWriter(const model::TransferCurve& transfer, ViewFor
 }
 
 double LightFieldWriter::BytesForView(double values) const {
-  constexpr double kPngBytes = 10;  // stored values, rows of them, and the file as it grows
+  constexpr double kPngBytes = 10;  // stored values, their rows, and the growing file
   return format_ == ViewFormat::kTiff ? 0 : values * kPngBytes;
 }
 
@@ -521,7 +523,7 @@ OutputFolder ClaimHciFolder(const std::string& path) {
   if (fs::exists(parameters, ignored) &&
       ReadOwnFile(parameters.string(), kMaxTextBytes).rfind(kHciSignature, 0) != 0) {
     throw Error(
-        fmt::format("{}: this folder holds a light field that thicklens did not write, and is not "
+        fmt::format("{}: this folder holds a light field that thicklens did not write and is not "
                     "replaced; choose another name",
                     path));
   }

@@ -17,16 +17,16 @@ namespace {
 constexpr char kLibrary[] = THICKLENS_OPENCV_CODECS;
 constexpr char kEntry[] = "ThicklensOpenCvCodecs";
 
-// Beside the program, or where it is installed: the program's own search path says where. Only its
-// absolute folders count, lest a library of this name in the current folder is taken. Empty: in
-// none of them.
+// Looks beside the program and where it is installed, as the program's own search path states. Only
+// absolute folders of that path are used, so that a library of this name in the current folder is
+// never loaded. Returns an empty path if no folder has the library.
 std::string LibraryPath() {
   void* const program = dlopen(nullptr, RTLD_LAZY);
   if (program == nullptr) return "";
   Dl_serinfo size{};
   std::string found;
   if (dlinfo(program, RTLD_DI_SERINFOSIZE, &size) == 0) {
-    // Its length is known when it runs: the array at its end is longer than the type says.
+    // The length is known only at run time: the array at its end is longer than its type states.
     std::vector<std::max_align_t> room(size.dls_size / sizeof(std::max_align_t) + 1);
     auto* const paths = reinterpret_cast<Dl_serinfo*>(room.data());  // NOLINT: as dlinfo has it
     *paths = size;
@@ -45,17 +45,17 @@ std::string LibraryPath() {
 }
 
 const OpenCvCodecs* Load() {
-  // Never closed: what OpenCV brings along is not made to be unloaded.
+  // The library is never closed: the libraries that OpenCV loads do not support unloading.
   const std::string path = LibraryPath();
   void* const library = path.empty() ? nullptr : dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   using Entry = const OpenCvCodecs* (*)();
   const auto entry = library == nullptr ? nullptr : reinterpret_cast<Entry>(dlsym(library, kEntry));
   if (entry != nullptr) return entry();
   const char* const why = path.empty() ? "it is in no folder of the search path" : dlerror();
-  throw Error(
-      fmt::format("what reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG, {}, cannot be "
-                  "loaded{}{}: is it where thicklens was built or installed?",
-                  kLibrary, why == nullptr ? "" : ": ", why == nullptr ? "" : why));
+  throw Error(fmt::format(
+      "the library that reads JPEG, TIFF, EXR, BMP and PNM files and writes JPEG, {}, cannot be "
+      "loaded{}{}: it must be in the build folder or where thicklens was installed",
+      kLibrary, why == nullptr ? "" : ": ", why == nullptr ? "" : why));
 }
 
 }  // namespace

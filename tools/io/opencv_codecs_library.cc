@@ -1,4 +1,4 @@
-// The library that opencv_codecs.h speaks of. Nothing else of the program may include imgcodecs.
+// The library that opencv_codecs.h describes. No other part of the program may include imgcodecs.
 #include <cstddef>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -10,8 +10,8 @@
 namespace thicklens::io {
 namespace {
 
-// OpenCV keeps colours as BGR; the project as RGB. Of depths that nobody asked for it is not known
-// how to; they are told by their type.
+// OpenCV stores colours as BGR, the project as RGB. Pixel types that are not swapped here are
+// rejected later by their type.
 cv::Mat SwapRedAndBlue(const cv::Mat& picture) {
   const int channels = picture.channels(), depth = picture.depth();
   const bool has_colours = channels == 3 || channels == 4;
@@ -28,13 +28,13 @@ cv::Mat Decode(const std::string& bytes, std::string* why) {
     return {};
   }
   try {
-    // Unchanged also means not turned by an EXIF orientation: the principal point belongs to the
-    // pixels as the sensor gave them.
+    // "Unchanged" also means that an EXIF orientation is not applied: the principal point refers to
+    // the pixels as the sensor stored them.
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U,
                          const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
     return SwapRedAndBlue(cv::imdecode(buffer, cv::IMREAD_UNCHANGED));
   } catch (const cv::Exception& error) {
-    *why = error.err;  // e.g. that OpenCV was built, or started, without EXR
+    *why = error.err;  // for example, OpenCV was built, or started, without EXR
     return {};
   }
 }

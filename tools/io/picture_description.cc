@@ -30,7 +30,7 @@ std::string WithDescription(const std::string& png, const std::string& text) {
     return {reinterpret_cast<const char*>(bytes.pData_),  // NOLINT: bytes
             static_cast<std::size_t>(bytes.size_)};
   } catch (const Exiv2::AnyError& error) {
-    throw Error(fmt::format("a description of a PNG: {}", error.what()));
+    throw Error(fmt::format("the description of a PNG file: {}", error.what()));
   }
 }
 

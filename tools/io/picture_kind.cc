@@ -29,14 +29,14 @@ using namespace std::string_literals;
 struct StatedSize {
   double width_px = 0, height_px = 0;
   double bytes_per_px = 1;
-  double most_of_a_byte = 1;  // what a byte of the file becomes at most
+  double most_of_a_byte = 1;  // at most so many decoded bytes per byte of the file
 };
 
 bool StartsWith(const std::string& bytes, const std::string& start) {
   return bytes.compare(0, start.size(), start) == 0;
 }
 
-// Zeros beyond the end.
+// Reads zeros beyond the end.
 std::uint32_t BigEndian(const std::string& bytes, std::size_t at, std::size_t count) {
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -60,11 +60,11 @@ std::optional<StatedSize> SizeOfPng(const std::string& bytes) {
                     static_cast<double>(BigEndian(bytes, 20, 4)), bits * channels / 8, kDeflate};
 }
 
-// From segment to segment, up to the start of frame.
+// Goes from segment to segment up to the start of frame.
 std::optional<StatedSize> SizeOfJpeg(const std::string& bytes) {
   std::size_t at = 2;
   while (at + 9 < bytes.size()) {
-    // As libjpeg does: to the next marker, whatever is between.
+    // Skips to the next marker, as libjpeg does.
     if (BigEndian(bytes, at, 1) != 0xFF) {
       ++at;
       continue;
@@ -73,20 +73,20 @@ std::optional<StatedSize> SizeOfJpeg(const std::string& bytes) {
     const bool is_frame =
         marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
     if (is_frame) {
-      // A bit for each 8 x 8 px, and no more where all are alike (progressive).
+      // Each 8 x 8 px take at least one bit, but none if all blocks are alike (progressive).
       const bool is_arithmetic = marker >= 0xC9;
       const double most = is_arithmetic ? 1 << 16 : 512;
       return StatedSize{static_cast<double>(BigEndian(bytes, at + 7, 2)),
                         static_cast<double>(BigEndian(bytes, at + 5, 2)), 1, most};
     }
     const bool is_alone = marker == 0 || marker == 1 || (marker >= 0xD0 && marker <= 0xD8);
-    // 0xFF fills up before a marker.
+    // Bytes 0xFF may precede a marker as padding.
     at += marker == 0xFF ? 1 : is_alone ? 2 : 2 + BigEndian(bytes, at + 2, 2);
   }
   return std::nullopt;
 }
 
-// The bytes of a file for libtiff, which reads them from here.
+// The bytes of a file that libtiff reads from memory.
 struct BytesInMemory {
   const std::string* bytes = nullptr;
   std::size_t at = 0;
@@ -119,7 +119,8 @@ struct CloseTiff {
   void operator()(TIFF* tiff) const { TIFFClose(tiff); }
 };
 
-// Of a compression, in bytes; of those that are rare here, far more than it is.
+// Returns the maximum expansion of a compression in decoded bytes per byte; for rarely used ones
+// the value is a generous bound.
 double MostOfAByte(int compression) {
   switch (compression) {
     case COMPRESSION_NONE:
@@ -154,21 +155,21 @@ std::optional<StatedSize> SizeOfTiff(const std::string& bytes) {
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &channels);
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_COMPRESSION, &compression);
   TIFFGetField(tiff.get(), TIFFTAG_PHOTOMETRIC, &photometric);
-  if (photometric == PHOTOMETRIC_YCBCR) channels = 1;  // the others have fewer pixels
+  if (photometric == PHOTOMETRIC_YCBCR) channels = 1;  // the other channels have fewer pixels
   return StatedSize{static_cast<double>(width), static_cast<double>(height), bits / 8.0 * channels,
                     MostOfAByte(compression)};
 }
 
 struct ExrAttribute {
   std::string name;
-  double size = 0;  // of its value, as it is stated: it may be negative, or end beyond the file
+  double size = 0;  // size of its value as stated: it may be negative, or end beyond the file
   std::size_t value_at = 0;
 
   std::size_t end() const { return value_at + static_cast<std::size_t>(std::max(size, 0.0)); }
 };
 
-// Name, type, size, value: of the attribute that begins there. None at the end of a header, or
-// where the file ends before a value.
+// Reads the name, type, size and value of the attribute that begins there. Returns none at the end
+// of a header, or if the file ends before a value.
 std::optional<ExrAttribute> ExrAttributeAt(const std::string& bytes, std::size_t at) {
   if (at >= bytes.size() || bytes[at] == '\0') return std::nullopt;
   ExrAttribute attribute;
@@ -201,14 +202,14 @@ std::optional<StatedSize> SizeOfExr(const std::string& bytes) {
   return std::nullopt;
 }
 
-// OpenEXR takes the memory for an attribute before it reads it. A file of several parts has a
-// header for each, one after the other.
+// Checks the sizes of attributes, because OpenEXR allocates memory for an attribute before it reads
+// it. A file of several parts has one header per part, one after the other.
 void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name) {
   std::size_t at = kExrHeaderAt;
   while (at < bytes.size()) {
     const std::optional<ExrAttribute> attribute = ExrAttributeAt(bytes, at);
     if (attribute && (attribute->size < 0 || attribute->end() > bytes.size())) {
-      throw Error(fmt::format("{}: a broken picture: {:.0f} bytes of '{}' cannot be in {} bytes",
+      throw Error(fmt::format("{}: a broken picture: {:.0f} bytes of '{}' do not fit into {} bytes",
                               name, attribute->size, PrintableUtf8(attribute->name), bytes.size()));
     }
     constexpr std::size_t kFlagsAt = 5;  // the second byte of the version
@@ -216,15 +217,15 @@ void RequirePossibleExrHeaders(const std::string& bytes, const std::string& name
     const bool is_end = bytes[at] == '\0';
     if (!attribute && !(is_end && (bytes[kFlagsAt] & kSeveralParts) != 0)) return;
     at = attribute ? attribute->end() : at + 1;
-    // An empty header ends the headers.
+    // An empty header marks the end of the headers.
     if (is_end && at < bytes.size() && bytes[at] == '\0') return;
   }
 }
 
 std::optional<StatedSize> SizeOfBmp(const std::string& bytes) {
   constexpr double kRunLength = 1 << 16;
-  // The oldest header has sides of 16 bits and no compression; between it and the usual ones there
-  // is none that OpenCV reads.
+  // The oldest header has sides of 16 bits and no compression; OpenCV reads no header between it
+  // and the usual ones.
   constexpr double kOldest = 12, kLeastUsual = 36;
   const double header = LittleEndian(bytes, 14);
   if (header == kOldest) {
@@ -244,7 +245,7 @@ std::optional<StatedSize> SizeOfPnm(const std::string& bytes) {
   std::size_t at = 2;
   for (double& side : sides) {
     const auto is_digit = [&] { return bytes[at] >= '0' && bytes[at] <= '9'; };
-    // To the next digit, whatever is between.
+    // Skips to the next digit.
     while (at < bytes.size() && !is_digit()) {
       if (bytes[at] == '#') at = std::min(bytes.find_first_of("\r\n", at), bytes.size() - 1);
       ++at;
@@ -253,7 +254,7 @@ std::optional<StatedSize> SizeOfPnm(const std::string& bytes) {
     for (; at < bytes.size() && is_digit(); ++at) {
       side = std::min(10 * side + (bytes[at] - '0'), kMuch);
     }
-    ++at;  // OpenCV takes one more with the number, even where it begins a comment
+    ++at;  // OpenCV consumes one more byte with the number, even where it begins a comment
   }
   const bool is_bitmap = bytes[1] == '4';
   return StatedSize{sides[0], sides[1], is_bitmap ? 1.0 / 8 : 1, 1};
@@ -277,8 +278,9 @@ std::optional<StatedSize> SizeOf(const std::string& bytes, PictureKind kind) {
   return SizeOfPnm(bytes);
 }
 
-// A small file may unpack to more than there is memory for: told before, and by its name. Decoded
-// it has a byte or more for a value, and then it is copied to wider numbers.
+// A small file may need more memory than there is when decoded; this is reported beforehand, with
+// the file's name. A decoded picture has at least one byte per value, and is then copied to wider
+// numbers.
 void RequireMemory(const StatedSize& size, const std::string& name) {
   constexpr double kCopies = 3, kLittleMib = 64;
   const double needed_mib =
@@ -287,7 +289,7 @@ void RequireMemory(const StatedSize& size, const std::string& name) {
   const std::optional<double> left_mib = MemoryLeftMib();
   if (!left_mib || needed_mib <= *left_mib) return;
   throw Error(
-      fmt::format("{}: {:.0f}x{:.0f} px need {:.0f} MiB of memory at least, {:.0f} MiB are left",
+      fmt::format("{}: {:.0f}x{:.0f} px need at least {:.0f} MiB of memory, {:.0f} MiB are left",
                   name, size.width_px, size.height_px, needed_mib, *left_mib));
 }
 
@@ -296,12 +298,12 @@ void RequireMemory(const StatedSize& size, const std::string& name) {
 std::optional<PictureKind> KindOfPicture(const std::string& bytes) {
   if (StartsWith(bytes, "\x89PNG\r\n\x1A\n")) return PictureKind::kPng;
   if (StartsWith(bytes, "\xFF\xD8\xFF")) return PictureKind::kJpeg;
-  for (const std::string& start : {"II*\0"s, "MM\0*"s, "II+\0"s, "MM\0+"s}) {  // + for large ones
+  for (const std::string& start : {"II*\0"s, "MM\0*"s, "II+\0"s, "MM\0+"s}) {  // + for BigTIFF
     if (StartsWith(bytes, start)) return PictureKind::kTiff;
   }
   if (StartsWith(bytes, "\x76\x2F\x31\x01")) return PictureKind::kExr;
   if (StartsWith(bytes, "BM")) return PictureKind::kBmp;
-  // As strict as OpenCV, which would try others on it: one of them ends the program.
+  // As strict as OpenCV, which otherwise would try other decoders, one of which ends the program.
   const bool is_pnm = bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
                       std::isspace(static_cast<unsigned char>(bytes[2])) != 0;
   if (is_pnm) return PictureKind::kPnm;
@@ -312,14 +314,14 @@ void RequirePossibleSize(const std::string& bytes, PictureKind kind, const std::
   if (kind == PictureKind::kExr) RequirePossibleExrHeaders(bytes, name);
   const std::optional<StatedSize> size = SizeOf(bytes, kind);
   if (!size) return;
-  // Small pictures in a container of their own may be larger than they need to be.
+  // Small pictures may have a container that is larger than needed.
   constexpr double kLittle = 1 << 20;
   const double needed = size->width_px * size->height_px * size->bytes_per_px;
   if (needed <= kLittle + size->most_of_a_byte * static_cast<double>(bytes.size())) {
     RequireMemory(*size, name);
     return;
   }
-  throw Error(fmt::format("{}: a broken picture: {:.0f}x{:.0f} px cannot be in {} bytes", name,
+  throw Error(fmt::format("{}: a broken picture: {:.0f}x{:.0f} px do not fit into {} bytes", name,
                           size->width_px, size->height_px, bytes.size()));
 }
 

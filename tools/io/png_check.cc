@@ -29,7 +29,7 @@ std::uint32_t BigEndian(const std::string& bytes, std::size_t at) {
   return value;
 }
 
-// The CRC of ISO 3309, as PNG has it.
+// The CRC of ISO 3309, which PNG uses.
 std::array<std::uint32_t, 256> MakeCrcTable() {
   std::array<std::uint32_t, 256> table{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
@@ -48,8 +48,8 @@ std::uint32_t Crc(const std::string& bytes, std::size_t begin, std::size_t end) 
   return ~crc;
 }
 
-// The bytes of the content of the chunk that begins there; absent if the file ends before the
-// chunk.
+// Returns the size of the content of the chunk that begins there, or none if the file ends before
+// the chunk does.
 std::optional<std::size_t> ContentBytes(const std::string& bytes, std::size_t at) {
   const std::size_t left = bytes.size() - at;
   if (left < kFrame) return std::nullopt;
@@ -116,7 +116,7 @@ std::string WithPngResolution(const std::string& png, int pixels_per_metre) {
   const std::string checked = "pHYs" + content;
   const std::string chunk = BigEndianBytes(static_cast<std::uint32_t>(content.size())) + checked +
                             BigEndianBytes(Crc(checked, 0, checked.size()));
-  // It has to stand before the first IDAT; right behind IHDR is always possible.
+  // It must precede the first IDAT chunk; directly behind IHDR is always allowed.
   const std::size_t header_bytes =
       kLengthBytes + kTypeBytes + BigEndian(png, kSignatureBytes) + kCrcBytes;
   std::string with = png;

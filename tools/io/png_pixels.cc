@@ -16,7 +16,7 @@
 namespace thicklens::io {
 namespace {
 
-// What a picture may have at most; more is a broken header.
+// The maximum side of a picture; a larger one means a broken header.
 constexpr std::uint32_t kMostSidePx = 1 << 20;
 constexpr double kMostPixels = 1 << 30;
 
@@ -29,7 +29,7 @@ struct Free {
   void operator()(void* memory) const { std::free(memory); }  // libspng takes it by malloc
 };
 
-// What a file's pixels become.
+// The pixel format that a file is decoded to.
 struct Decoding {
   int format = SPNG_FMT_PNG;
   int flags = 0;
@@ -60,7 +60,7 @@ struct Effort {
   int filters, level, strategy;
 };
 
-// Of 16 bits noise is all that compression meets.
+// In 16-bit pictures compression meets only noise.
 Effort EffortOf(PngPacking packing) {
   switch (packing) {
     case PngPacking::kFast:
@@ -73,8 +73,8 @@ Effort EffortOf(PngPacking packing) {
   return {SPNG_FILTER_CHOICE_ALL, Z_BEST_COMPRESSION, Z_DEFAULT_STRATEGY};
 }
 
-// Decodes row by row, so that it may be stopped between two rows. An interlaced image has its rows
-// several times.
+// Decodes row by row, so that it can be cancelled between two rows. An interlaced image passes each
+// row several times.
 int DecodeRows(const Decoding& decoding, spng_ctx* context, cv::Mat* picture) {
   int code = spng_decode_image(context, nullptr, 0, decoding.format,
                                decoding.flags | SPNG_DECODE_PROGRESSIVE);
@@ -116,12 +116,12 @@ cv::Mat DecodePngPixels(const std::string& bytes, std::string* why) {
       works(spng_set_png_buffer(context.get(), pixels.data(), pixels.size())) &&
       works(spng_get_ihdr(context.get(), &header))) {
     if (static_cast<double>(header.width) * header.height > kMostPixels) {
-      *why = fmt::format("{}x{} px are more than the {:.0f} that a picture may have", header.width,
-                         header.height, kMostPixels);
+      *why = fmt::format("{}x{} px exceed the maximum of {:.0f} px", header.width, header.height,
+                         kMostPixels);
       return {};
     }
     spng_trns transparency{};
-    // Reads all that stands before the pixels.
+    // Reads all chunks before the pixels.
     const int found = spng_get_trns(context.get(), &transparency);
     if (works(found == SPNG_ECHUNKAVAIL ? SPNG_OK : found)) {
       const Decoding decoding = DecodingOf(header, found == SPNG_OK);

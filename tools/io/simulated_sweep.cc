@@ -21,7 +21,7 @@ model::SweepTarget SweepTargetOf(model::TargetKind kind) {
 
 }  // namespace
 
-// Picture files of unknown origin are taken as sRGB, as a screen would show them.
+// Picture files of unknown origin are assumed to be sRGB, as a screen would show them.
 model::LinearPicture ReadTargetPicture(const model::TargetOptions& target) {
   if (target.kind != model::TargetKind::kPicture) return {};
   const model::StoredPicture stored = ToStoredPicture(ReadPictureFile(target.picture_path));

@@ -113,7 +113,7 @@ TEST_F(BlockCheckpointTest, AnotherEstimateIsRecognisedByItsDifferences) {
   EXPECT_THAT(refusal(SomeRun("1", {1, 2, 3.0000002F})), HasSubstr("the picture is another"));
   estimator::BlockRun more = SomeRun("1", picture_);
   more.settings.insert(more.settings.begin() + 1, {"ridge", "3"});
-  EXPECT_THAT(refusal(more), HasSubstr("it says nothing of 'ridge'"));
+  EXPECT_THAT(refusal(more), HasSubstr("it does not state 'ridge'"));
   more = SomeRun("1", picture_);
   more.blocks = 4;
   EXPECT_THAT(refusal(more), HasSubstr("blocks is 3 there and 4 here"));

@@ -148,8 +148,8 @@ TEST_F(DepthFile, WhatIsNoDepthMapIsRefused) {
               HasSubstr("found 64-bit float"));
   EXPECT_THAT(Refusal(Encoded(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), ".jpg")),
               HasSubstr("PFM, PNG, TIFF or EXR"));
-  EXPECT_THAT(Refusal("a text"), HasSubstr("no depth map"));
-  EXPECT_THAT(Refusal(""), HasSubstr("no depth map"));
+  EXPECT_THAT(Refusal("a text"), HasSubstr("not a depth map"));
+  EXPECT_THAT(Refusal(""), HasSubstr("not a depth map"));
   EXPECT_THAT(ErrorOf([&] { ReadDepthMap(folder_ / "none.pfm"); }), HasSubstr("none.pfm"));
   EXPECT_THAT(ErrorOf([&] { ReadDepthMap(folder_.path()); }), HasSubstr("is a folder"));
 }

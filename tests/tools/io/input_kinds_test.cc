@@ -1,4 +1,4 @@
-// Every reader of a file refuses what is no regular file at once, and says what it is.
+// Every reader of a file refuses at once what is not a regular file, and names its kind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -174,7 +174,7 @@ TEST_F(InputKinds, ResumedEstimatesRefusePipesAndDevices) {
               HasSubstr("standard output"));
   fs::create_symlink("ring", work_ / "ring");
   EXPECT_THAT(ErrorOf([&] { BlockCheckpoint file(work_ / "ring", "a version"); }),
-              HasSubstr("no regular file but a symbolic link"));
+              HasSubstr("not a regular file but a symbolic link"));
 }
 
 }  // namespace

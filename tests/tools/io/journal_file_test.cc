@@ -185,7 +185,7 @@ TEST_F(JournalFileTest, OtherFilesAreLeftAlone) {
   EXPECT_THAT(ErrorOf([&] { JournalFile(folder_.path(), kSort); }), HasSubstr(folder_.path()));
   EXPECT_THAT(ErrorOf([&] { JournalFile(folder_ / "none/journal", kSort); }),
               HasSubstr("No such file"));
-  EXPECT_THAT(ErrorOf([] { JournalFile("/dev/null", kSort); }), HasSubstr("no regular file"));
+  EXPECT_THAT(ErrorOf([] { JournalFile("/dev/null", kSort); }), HasSubstr("not a regular file"));
 }
 
 TEST_F(JournalFileTest, AJournalBelongsToOneRun) {

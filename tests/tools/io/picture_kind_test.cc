@@ -73,7 +73,8 @@ TEST(PictureKind, SizesThatCannotBeAreRefused) {
     const auto kind = KindOfPicture(bytes);
     return kind ? ErrorOf([&] { RequirePossibleSize(bytes, *kind, "f"); }) : "(no kind)";
   };
-  const auto cannot_be = AllOf(StartsWith("f: a broken picture: "), HasSubstr("px cannot be in "));
+  const auto cannot_be =
+      AllOf(StartsWith("f: a broken picture: "), HasSubstr("px do not fit into "));
 
   const std::string png = EncodedAs(Cases()[0], small);
   EXPECT_EQ(refusal(png), "(no error)");
@@ -137,7 +138,7 @@ TEST(PictureKind, AttributesLargerThanTheFileAreRefused) {
   EXPECT_EQ(refusal(one), "(no error)");
   EXPECT_EQ(refusal(one + "\0"s), "(no error)");
   EXPECT_EQ(refusal(one + large),
-            "f: a broken picture: 1660944384 bytes of 'x' cannot be in 38 bytes");
+            "f: a broken picture: 1660944384 bytes of 'x' do not fit into 38 bytes");
   EXPECT_THAT(refusal(one + "x\0blob\0\xFF\xFF\xFF\xFF"s), HasSubstr("-1 bytes of 'x'"));
   EXPECT_EQ(refusal(one + "\0"s + large), "(no error)");  // pixels
   // Several parts: their headers follow one another, and an empty one ends them.
