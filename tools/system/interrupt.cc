@@ -27,25 +27,26 @@
 namespace thicklens::tools {
 namespace {
 
-// SIGXCPU warns of a limit of processor time, a second or more before the system ends the process.
+// SIGXCPU warns that a limit on processor time is near, a second or more before the system ends the
+// process.
 constexpr int kEndSignals[] = {SIGINT, SIGTERM, SIGHUP, SIGXCPU};
 constexpr int kInterruptedCode = 1;
 constexpr int kNobody = -1;
 constexpr double kCleaningSeconds = 0.3;
-// For main, which has begun to end the process, to say why.
+// The time that main has to report the reason, once it has begun to end the process.
 constexpr auto kLastMessage = std::chrono::milliseconds(200);
 
 CancelToken program_token;
 std::atomic<int> signal_count{0};
 std::atomic<bool> is_watched{false};
-sem_t arrived;                       // a count of signals, for the thread
-std::atomic<int> end_code{kNobody};  // of whoever ends the process
-std::timed_mutex words_mutex;        // of what follows
+sem_t arrived;                       // counts the signals for the thread
+std::atomic<int> end_code{kNobody};  // set by the thread that ends the process
+std::timed_mutex words_mutex;        // protects the following variables
 std::function<std::string()> last_words;
 
-// Nothing but what a signal handler may do.
+// Does only what a signal handler is allowed to do.
 void TakeSignal(int signal) {
-  // The system repeats this warning by itself: it is no second wish.
+  // The system repeats this warning by itself: a repetition is not a second request.
   if (signal == SIGXCPU && program_token.IsCancelled()) return;
   const int saved = errno;
   program_token.Cancel();
@@ -78,11 +79,12 @@ void WaitForAnother(double seconds) {
   }
 }
 
-// To standard error, past its buffers, which another thread may hold; not where nobody takes it.
+// Writes to standard error without its buffers, which another thread may hold; the text is dropped
+// if nobody reads it.
 void WriteMessage(const std::string& text) {
   pollfd ready{STDERR_FILENO, POLLOUT, 0};
   if (::poll(&ready, 1, 0) <= 0 || (ready.revents & POLLOUT) == 0) return;
-  // More than this might wait for the reader of a pipe.
+  // A longer message might block until the reader of a pipe has read it.
   const std::size_t size = std::min<std::size_t>(text.size(), PIPE_BUF);
   static_cast<void>(!::write(STDERR_FILENO, text.data(), size));
 }
@@ -107,7 +109,7 @@ void RemoveAndTell() {
   if (end_code.compare_exchange_strong(code, kInterruptedCode)) {
     try {
       RemoveAndTell();
-    } catch (const std::exception&) {  // no memory is left: the process ends without words
+    } catch (const std::exception&) {  // out of memory: the process ends without a message
     }
     ::_exit(kInterruptedCode);
   }
@@ -130,7 +132,8 @@ void CatchSignals() {
   ::sigemptyset(&action.sa_mask);
   for (const int signal : kEndSignals) ::sigaddset(&action.sa_mask, signal);
   for (const int signal : kEndSignals) {
-    // Whoever starts a command with one of them ignored wants it to go on: `nohup`, a shell's `&`.
+    // A signal that is ignored at the start stays ignored: the caller (`nohup`, a shell's `&`)
+    // wants the command to continue.
     struct sigaction before {};
     if (signal != SIGTERM && ::sigaction(signal, nullptr, &before) == 0 &&
         before.sa_handler == SIG_IGN) {
@@ -145,7 +148,7 @@ void CatchSignals() {
 void WatchSignals() {
   constexpr std::size_t kStackBytes = 1 << 18;
   if (::sem_init(&arrived, 0, 0) != 0) return;
-  // The thread takes no signals: those that arrive interrupt main, as they always did.
+  // The thread itself blocks all signals: they interrupt main, as before.
   sigset_t all, before;
   ::sigfillset(&all);
   ::pthread_sigmask(SIG_SETMASK, &all, &before);

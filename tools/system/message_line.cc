@@ -27,7 +27,7 @@ class MessageFormatter : public spdlog::formatter {
 }  // namespace
 
 std::string MessageLine(const std::string& text) {
-  // A message has the place at its beginning and what would be right at its end.
+  // A message begins with the place of the error and ends with what would be correct.
   constexpr std::size_t kBegin = 1500, kEnd = 500;
   std::string line = text;
   if (line.size() > 2 * (kBegin + kEnd)) {

@@ -9,7 +9,7 @@
 namespace thicklens::tools {
 namespace {
 
-// A line of /proc/self/status such as "VmHWM:     1234 kB".
+// Reads a value from a line of /proc/self/status such as "VmHWM:     1234 kB".
 std::optional<double> StatusMib(const std::string& name) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
@@ -21,7 +21,7 @@ std::optional<double> StatusMib(const std::string& name) {
 }  // namespace
 
 double PeakMemoryMib() {
-  // The one of getrusage() cannot be forgotten.
+  // The peak of getrusage() cannot be reset, so it is used only if this one is missing.
   if (const auto peak_mib = StatusMib("VmHWM")) return *peak_mib;
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -30,7 +30,7 @@ double PeakMemoryMib() {
 
 std::optional<double> ForgetPeakMemory() {
 #ifdef __GLIBC__
-  malloc_trim(0);  // what was freed and kept would hide what is needed next
+  malloc_trim(0);  // freed memory that is kept would hide what is needed next
 #endif
   std::ofstream file("/proc/self/clear_refs");
   file << "5" << std::flush;  // proc(5): resets the peak resident set size

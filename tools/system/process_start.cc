@@ -1,5 +1,5 @@
-// This file sees to what must be in order before the program begins. Its first part runs before any
-// library is initialised, so that this file is part of the program itself and not of its library.
+// Prepares what must be in order before the program begins. The first part runs before any library
+// is initialised, so this file is part of the program itself and not of its library.
 #include "tools/system/process_start.h"
 
 #include <fmt/format.h>
@@ -9,9 +9,10 @@
 #include "tools/system/sanitized.h"
 
 // OpenBLAS starts a thread for each processor when it is loaded, before main() and although the
-// program lets it use one. Where memory is short such a thread asks for some for ever, and a fork
-// waits for its end; where there is none to be had, OpenBLAS ends the program. This is OpenBLAS's
-// own function for what OPENBLAS_NUM_THREADS says; the one of the program is found first.
+// program lets it use only one. If memory is short, such a thread tries to allocate for ever and a
+// fork waits for its end; if no memory is left, OpenBLAS ends the program. This is OpenBLAS's own
+// function that returns the value of OPENBLAS_NUM_THREADS; the program's version of it is found
+// first.
 extern "C" __attribute__((visibility("default"))) int openblas_num_threads_env();
 extern "C" int openblas_num_threads_env() { return 1; }
 
@@ -20,7 +21,7 @@ namespace {
 
 #if defined(__ELF__) && defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
 
-// Nothing of a library may be called here.
+// No function of a library may be called here.
 bool BeginsWith(const char* text, const char* start) {
   while (*start != '\0' && *text == *start) {
     ++text;
@@ -42,11 +43,11 @@ bool IsOneOf(const char* text, const char* const* words) {
   return false;
 }
 
-// Compiled kernels are code: those of the current folder may be anybody's, and the standard for
-// these folders has relative ones ignored.
+// Compiled kernels are code. A relative path would take them from the current folder, which anybody
+// may have filled, and the standard for these folders requires that relative paths are ignored.
 constexpr int kFolderCount = 2;
 constexpr const char* kFolders[kFolderCount] = {"XDG_CACHE_HOME=", "POCL_CACHE_DIR="};
-const char* forgotten_folders[kFolderCount] = {};  // their values; the text itself stays
+const char* forgotten_folders[kFolderCount] = {};  // their values; the text itself remains
 
 bool IsRelativeCache(const char* variable) {
   for (int i = 0; i < kFolderCount; ++i) {
@@ -59,10 +60,10 @@ bool IsRelativeCache(const char* variable) {
   return false;
 }
 
-// OpenCV ends a program, before its main() runs, whose environment has a value that it cannot read
-// (OPENCV_DUMP_ERRORS=abc), writes files into the current folder (OPENCV_TRACE=1) and refuses
-// images (OPENCV_IO_MAX_IMAGE_PIXELS=1). None of its variables is a setting of thicklens, but the
-// one without which some versions read no EXR.
+// Variables in the environment can make OpenCV end a program before its main() runs, if it cannot
+// read the value (OPENCV_DUMP_ERRORS=abc), write files into the current folder (OPENCV_TRACE=1) or
+// refuse images (OPENCV_IO_MAX_IMAGE_PIXELS=1). None of its variables is a setting of thicklens,
+// except the one that some versions need to read EXR.
 bool IsSettingToForget(const char* variable) {
   static const char* const kTruths[] = {"0",     "1",    "true",  "false", "True",
                                         "False", "TRUE", "FALSE", nullptr};
@@ -106,7 +107,7 @@ void RequireStack() {
       limit.rlim_cur >= kNeededKib * 1024) {
     return;
   }
-  throw Error(fmt::format("ulimit -s: the stack is limited to {} KiB; {} KiB at least are needed",
+  throw Error(fmt::format("ulimit -s: the stack is limited to {} KiB; at least {} KiB are needed",
                           limit.rlim_cur / 1024, kNeededKib));
 }
 

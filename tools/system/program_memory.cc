@@ -1,4 +1,5 @@
-// Linked with programs themselves, not part of a library: it replaces operator new.
+// This file is linked with programs themselves and is not part of a library: it replaces operator
+// new.
 #include "tools/system/program_memory.h"
 
 #include <cstdlib>  // says whether it is glibc
@@ -21,15 +22,15 @@
 namespace {
 
 constexpr std::size_t kMib = std::size_t{1} << 20;
-// At fewer bytes than this nobody looks how far the heap has grown.
+// For smaller allocations the growth of the heap is not checked.
 constexpr std::size_t kLarge = 64 * 1024;
-// What has as many is not of the heap, and goes back to the system when it is freed.
+// An allocation of this size is outside the heap, and returns to the system when it is freed.
 constexpr std::size_t kOutsideHeap = 64 * kMib;
 
-// The part of the heap that is asked for in huge pages ends here. glibc does this by itself, but
-// only if its environment says so before the program starts (glibc.malloc.hugetlb).
+// The end of the part of the heap for which huge pages were requested. glibc can do this by itself,
+// but only if its environment says so before the program starts (glibc.malloc.hugetlb).
 std::mutex heap_mutex;
-std::atomic<std::uintptr_t> asked_until = 0;  // 0: nothing is asked for
+std::atomic<std::uintptr_t> asked_until = 0;  // 0: nothing was requested yet
 
 std::uintptr_t HeapEnd() { return reinterpret_cast<std::uintptr_t>(::sbrk(0)); }
 
@@ -38,20 +39,20 @@ std::uintptr_t PageAtOrAbove(std::uintptr_t place) {
   return (place + page - 1) / page * page;
 }
 
-// A wish: where it cannot be had, memory is what it is without.
+// This is only a request: if the system does not grant it, memory works as without it.
 void AskForHugePages(std::uintptr_t from, std::uintptr_t to) {
   if (from < to) ::madvise(reinterpret_cast<void*>(from), to - from, MADV_HUGEPAGE);
 }
 
-// Asks for what the heap has grown by since the last look. What shrank and grew again between two
-// looks is missed. Who finds another thread at it leaves it to that: nobody waits, a child after
-// fork() neither.
+// Requests huge pages for the part by which the heap has grown since the last call. A part that
+// shrank and grew again between two calls is missed. If another thread is doing this already, the
+// function returns at once: no thread waits, and neither does a child after fork().
 void FollowHeapEnd() {
   const std::unique_lock<std::mutex> lock(heap_mutex, std::try_to_lock);
   if (!lock || asked_until == 0) return;
   const std::uintptr_t end = HeapEnd();
   AskForHugePages(asked_until, end);
-  asked_until = std::min(end, HeapEnd());  // another thread may have given it back meanwhile
+  asked_until = std::min(end, HeapEnd());  // another thread may have released it meanwhile
 }
 
 void* TakeMemory(std::size_t bytes) {
@@ -93,10 +94,11 @@ namespace thicklens::tools {
 void KeepFreedMemory() {
   mallopt(M_MMAP_THRESHOLD, kOutsideHeap);
   mallopt(M_TRIM_THRESHOLD, 256 * kMib);
-  // One heap for all threads: what one of them has freed is there for the next.
+  // All threads share one heap, so that memory which one of them has freed is available to the
+  // next.
   mallopt(M_ARENA_MAX, 1);
-  // It grows by much more than a huge page; where memory is limited, by no more than is needed:
-  // glibc does not try again with less.
+  // The heap grows by much more than a huge page. If memory is limited, it grows only by what is
+  // needed, because glibc does not retry with less.
   if (!MemoryIsLimited()) mallopt(M_TOP_PAD, 64 * kMib);
   const std::lock_guard<std::mutex> lock(heap_mutex);
   asked_until = PageAtOrAbove(HeapEnd());

@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// In the folder of the run.
+// The names of the files in the folder of the run.
 constexpr char kOutFile[] = "stdout.txt", kErrFile[] = "stderr.txt";
 constexpr int kNewFile = O_WRONLY | O_CREAT | O_TRUNC;
 
@@ -38,14 +38,14 @@ constexpr int kNewFile = O_WRONLY | O_CREAT | O_TRUNC;
 constexpr double kLastSeconds = 0.2;
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
-// The programs that run, for EndChildPrograms.
+// The child programs that are running, for EndChildPrograms.
 class RunningPrograms {
  public:
   void Add(pid_t pid) {
     const std::lock_guard<std::mutex> lock(mutex_);
     pids_.insert(pid);
   }
-  // Before the system may give its number to somebody else's process.
+  // Called before the system may give the process number to another process.
   template <typename Wait>
   auto RemoveAfter(pid_t pid, const Wait& wait) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -57,9 +57,9 @@ class RunningPrograms {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (const pid_t pid : pids_) AskToEnd(pid);
   }
-  // The second signal means: at once, without waiting for a library that computes. Two of one kind
-  // may arrive as one, so that it is of another kind, which this process, and with it the child,
-  // does not ignore.
+  // The second signal requests an immediate end, without waiting for a library that computes. Two
+  // signals of one kind may arrive as one, so the second is of another kind, which neither this
+  // process nor the child ignores.
   static void AskToEnd(pid_t pid) {
     ::kill(pid, SIGTERM);
     for (const int second : {SIGINT, SIGHUP, SIGTERM}) {
@@ -76,7 +76,8 @@ class RunningPrograms {
 };
 
 RunningPrograms& Running() {
-  static RunningPrograms& running = *new RunningPrograms;  // the process may end meanwhile
+  static RunningPrograms& running =
+      *new RunningPrograms;  // never destroyed: the process may be ending
   return running;
 }
 
@@ -122,7 +123,7 @@ class Child {
       const pid_t done = ::waitpid(pid_, &status_, WNOHANG);
       return done < 0 && errno == EINTR ? 0 : done;
     });
-    is_lost_ = found < 0;  // the number may be somebody else's by now
+    is_lost_ = found < 0;  // the number may belong to another process by now
     ended_ = found != 0;
     return ended_;
   }
@@ -155,7 +156,7 @@ ProgramRun RunProgram(const std::string& program, const std::vector<std::string>
     std::this_thread::sleep_for(kPoll);
   }
   if (child.is_lost()) throw Error(fmt::format("{}: its process was lost", program));
-  ThrowIfCancelled();  // a person's Ctrl-C ends the child as well, and that may be seen first
+  ThrowIfCancelled();  // Ctrl-C ends the child as well, and its end may be seen first
   run.seconds = seconds();
   if (WIFEXITED(child.status())) run.exit_code = WEXITSTATUS(child.status());
   if (WIFSIGNALED(child.status())) run.signal = WTERMSIG(child.status());
@@ -169,7 +170,7 @@ std::string ThisProgram() {
   const fs::path program = fs::read_symlink("/proc/self/exe", failure);
   if (failure) {
     throw Error(
-        fmt::format("/proc/self/exe: does not say which program this is ({}); /proc must be "
+        fmt::format("/proc/self/exe: does not state which program this is ({}); /proc must be "
                     "mounted",
                     failure.message()));
   }

@@ -17,16 +17,17 @@ TemporaryFolder::TemporaryFolder(const std::string& purpose)
 std::string TemporaryFolder::NewFolder(const std::string& purpose) {
   std::error_code failure;
   fs::path parent = fs::temp_directory_path(failure);
-  // An absolute path leads to the same folder later, whatever the current one is then.
+  // An absolute path is valid later, even if the current folder has changed by then.
   if (!failure) parent = fs::canonical(parent, failure);
   std::string name = (parent / ("thicklens-" + purpose + "-XXXXXX")).string();
   if (failure || mkdtemp(name.data()) == nullptr) {
     const char* value = std::getenv("TMPDIR");  // NOLINT: nothing sets it meanwhile
-    throw Error(fmt::format(
-        "TMPDIR: no folder for temporary files can be made in '{}'; it must say where one can be",
-        !failure           ? parent.string()
-        : value == nullptr ? ""
-                           : value));
+    throw Error(
+        fmt::format("TMPDIR: no folder for temporary files can be created in '{}'; it must name a "
+                    "folder where this is possible",
+                    !failure           ? parent.string()
+                    : value == nullptr ? ""
+                                       : value));
   }
   return name;
 }

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One path each. Without it, the library takes its usual folder.
+// Variables with one path each. If one is not set, the library uses its usual folder.
 constexpr const char* kPaths[] = {
     "HOME",
     "TMPDIR",
@@ -38,11 +38,11 @@ constexpr const char* kPaths[] = {
     "PROJ_LIB",
     "PROJ_DATA"  // GDAL, of OpenCV
 };
-// Lists of paths, with colons between them.
+// Variables with lists of paths, separated by colons.
 constexpr const char* kPathLists[] = {"XDG_CONFIG_DIRS",         "XDG_DATA_DIRS",
                                       "FONTCONFIG_PATH",         "GDAL_DRIVER_PATH",
                                       "OPENCV_CORE_PLUGIN_PATH", "HWLOC_PLUGINS_PATH"};
-// A path, or the name of a library that is looked for where the system's are.
+// Variables with a path, or with the name of a library that the system searches for in its folders.
 constexpr const char* kPathsOrNames[] = {"OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "OPENCL_LAYERS",
                                          "OPENCV_OPENCL_RUNTIME"};
 
@@ -53,7 +53,7 @@ std::string ValueOf(const char* name) {
 
 bool IsRelative(const std::string& path) { return !path.empty() && path.front() != '/'; }
 
-// A list without its parts that are not absolute.
+// A list of paths without the parts that are not absolute.
 struct ListOfPaths {
   explicit ListOfPaths(const std::string& list) {
     std::istringstream parts(list);
@@ -67,7 +67,7 @@ struct ListOfPaths {
   std::vector<std::string> relative;
 };
 
-// A name is taken for that of a file in the current folder where there is one.
+// A name counts as a path if the current folder has a file of that name.
 bool IsFoundHere(const std::string& name) {
   std::error_code unreachable;
   return IsRelative(name) &&
@@ -79,16 +79,16 @@ void TakeOut(const char* name, std::vector<std::string>* told) {
   ::unsetenv(name);
 }
 
-// An empty part, which a line of a shell's start-up file such as X="$X:/opt/share" leaves, means
-// the current folder to some libraries. Nobody asked for that, and it is taken out without a word.
+// An empty part, which a line such as X="$X:/opt/share" in a shell's start-up file leaves, means
+// the current folder to some libraries. Nobody intends that, so it is removed without a warning.
 void KeepAbsoluteParts(const char* name, std::vector<std::string>* told) {
   const std::string value = ValueOf(name);
   const ListOfPaths list(value);
   for (const std::string& part : list.relative) {
-    told->push_back(fmt::format(
-        "{}: its part '{}' is left out of account, because it would be looked for in the current "
-        "folder; an absolute path is expected",
-        name, PrintableUtf8(part)));
+    told->push_back(
+        fmt::format("{}: its part '{}' is ignored, because it would be looked for in the current "
+                    "folder; an absolute path is expected",
+                    name, PrintableUtf8(part)));
   }
   if (list.absolute.empty()) {
     ::unsetenv(name);
@@ -97,7 +97,7 @@ void KeepAbsoluteParts(const char* name, std::vector<std::string>* told) {
   }
 }
 
-// PoCL's cache holds what it loads as code.
+// PoCL loads the content of its cache as code.
 void GivePoclAPrivateCache() {
   if (!ValueOf("POCL_CACHE_DIR").empty() || !ValueOf("XDG_CACHE_HOME").empty() ||
       !ValueOf("HOME").empty()) {
@@ -107,7 +107,7 @@ void GivePoclAPrivateCache() {
   const std::string home = user == nullptr || user->pw_dir == nullptr ? "" : user->pw_dir;
   std::error_code unreachable;
   const bool has_home = !home.empty() && !IsRelative(home) && fs::is_directory(home, unreachable);
-  // There PoCL can make no folder, finds no device, and says so.
+  // In such a folder PoCL cannot create anything; it finds no device and reports that.
   const std::string cache = has_home ? home + "/.cache/pocl/kcache" : "/dev/null/no-home-folder";
   ::setenv("POCL_CACHE_DIR", cache.c_str(), 1);
 }
@@ -116,8 +116,8 @@ void GivePoclAPrivateCache() {
 
 std::string RelativePathIsIgnored(const std::string& name, const std::string& value) {
   return fmt::format(
-      "{} is left out of account: an absolute path is expected, found '{}', which would "
-      "be looked for in the current folder",
+      "{} is ignored: an absolute path is expected, found '{}', which would be looked for in the "
+      "current folder",
       name, PrintableUtf8(value));
 }
 

@@ -279,7 +279,7 @@ TEST(MeasureProfile, AMissingTemporaryFolderIsReported) {
     MeasureProfile({EstimatePlan()}, ProfileRun());
     ADD_FAILURE() << "no refusal";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("TMPDIR: no folder for temporary files can be made in "
+    EXPECT_THAT(error.what(), HasSubstr("TMPDIR: no folder for temporary files can be created in "
                                         "'/no/such/folder'"));
   }
 }
