@@ -31,13 +31,13 @@ namespace fs = std::filesystem;
 constexpr int kMaxThreads = 1024;
 constexpr char kStandardOutput[] = "-";
 
-// File names may be any bytes, JSON may not: what is no UTF-8 is replaced.
+// File names may be any bytes, but JSON may not: bytes that are not UTF-8 are replaced.
 std::string JsonText(const nlohmann::json& summary) {
   return summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-// Whether why nothing came of a run may be written there. A person who has mixed up names may have
-// meant one of the inputs, and a run that is refused early does not know all of them.
+// Returns whether the reason of a refusal may be written to `path`. A user who has mixed up names
+// may have given one of the inputs, and a run that is refused early does not know all of them.
 bool MayTellRefusal(const std::string& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return true;
@@ -50,7 +50,7 @@ bool MayTellRefusal(const std::string& path) {
   }
 }
 
-// Where --json goes: a file that is claimed before anything is done, or standard output.
+// The destination of --json: a file that is claimed before any work begins, or standard output.
 class SummaryOutput {
  public:
   explicit SummaryOutput(const std::string& path) : path_(path) {
@@ -66,8 +66,9 @@ class SummaryOutput {
   }
   void WriteRefusal(const std::string& reason) {
     if (file_ && !MayTellRefusal(path_)) {
-      spdlog::warn("{}: holds no JSON and is left as it is; the reason is not written there",
-                   PrintableUtf8(path_));
+      spdlog::warn(
+          "{}: this file is not JSON and is not overwritten; the reason is not written there",
+          PrintableUtf8(path_));
       return;
     }
     Write({{"status", "refused"}, {"reason", reason}});
@@ -84,10 +85,10 @@ void AddCommonOptions(CLI::App* command, CommonOptions* options) {
   command
       ->add_option(
           "--json", options->json_path,
-          "Write the results to this file, as JSON; -: to standard output, in place of the text")
+          "Write the results to this file as JSON; -: to standard output, instead of the text")
       ->type_name("FILE");
   CLI::Option* quiet = command->add_flag("--quiet", options->quiet, "Print no results");
-  command->add_flag("--verbose", options->verbose, "Tell what is done")->excludes(quiet);
+  command->add_flag("--verbose", options->verbose, "Report each step")->excludes(quiet);
   command->add_option("--threads", options->threads, "Threads to use; 0: one per core")
       ->check(CLI::Range(0, kMaxThreads))
       ->type_name("N");
@@ -95,7 +96,7 @@ void AddCommonOptions(CLI::App* command, CommonOptions* options) {
 
 void RunCommand(const CommonOptions& options, const std::function<CommandResult()>& command) {
   if (options.verbose) spdlog::set_level(spdlog::level::debug);
-  // More than there are cores would not be faster, and the library below would complain.
+  // More threads than cores would not be faster, and the library below would complain.
   cv::setNumThreads(std::min(ResolveThreads(options.threads), ResolveThreads(0)));
   EnterRunOutput(options.json_path);
   SummaryOutput summary(options.json_path);

@@ -11,7 +11,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Throws UsageError with the option's name for what the parser says is wrong.
+// Runs `parse`, and turns its error into a UsageError that begins with the option's name.
 template <typename Parse>
 auto Parsed(const std::string& option, const Parse& parse) {
   try {
@@ -41,15 +41,18 @@ std::string CostText(model::Effect effect,
 void AddEffectOptions(CLI::App* command, EffectOptions* options) {
   command
       ->add_option("--effects", options->effects,
-                   "Effects of image formation: auto (those that matter here), all, none, or names "
-                   "between commas (thicklens explain lists them)")
+                   "Effects of image formation to simulate: auto (the relevant ones), all, none, "
+                   "or names separated by commas (thicklens explain lists them)")
       ->type_name("NAMES");
-  command->add_option("--without", options->without, "Effects to leave out in any case")
+  command
+      ->add_option("--without", options->without,
+                   "Effects to leave out always, names separated by commas")
       ->type_name("NAMES");
   if (options->tolerance_option.empty()) return;
   command
-      ->add_option(options->tolerance_option, options->tolerance,
-                   "What auto may leave out, all together: 0.5gl (grey levels of 255) or 0.1px")
+      ->add_option(
+          options->tolerance_option, options->tolerance,
+          "Largest total effect that auto may leave out: 0.5gl (grey levels of 255) or 0.1px")
       ->type_name("AMOUNT");
 }
 
@@ -60,14 +63,15 @@ void CheckEffectNames(const EffectOptions& options, const model::EffectSet& of_m
        {std::pair("--effects", named.given), std::pair("--without", named.without)}) {
     const model::EffectSet foreign = effects.Without(of_model);
     if (foreign.empty()) continue;
-    throw UsageError(fmt::format("{}: effect {} is not one of those there are here: {}", option,
+    throw UsageError(fmt::format("{}: effect {} is not available here, the effects are: {}", option,
                                  model::JoinedNames(foreign), model::JoinedNames(of_model)));
   }
 }
 
 void ApplyEffectOptions(const EffectOptions& options, model::EffectChoice* choice) {
   if (options.effects && options.effects->empty()) {
-    throw UsageError("--effects: auto, all, none or names between commas are expected, found ''");
+    throw UsageError(
+        "--effects: auto, all, none or names separated by commas are expected, found ''");
   }
   if (options.effects) {
     const model::EffectChoice given =
@@ -118,7 +122,7 @@ std::string EffectsText(const model::EffectDecision& decision) {
     left_out += fmt::format("{}{} ({})", left_out.empty() ? "" : ", ",
                             model::EffectName(finding.effect), BoundText(finding));
   }
-  return fmt::format("effects: {}; left out, with their bounds in grey levels: {}\n",
+  return fmt::format("effects: {}; left out, with bounds in grey levels: {}\n",
                      model::JoinedNames(decision.on), left_out.empty() ? "none" : left_out);
 }
 

@@ -23,7 +23,7 @@ struct ShapeAndSource {
   std::string from;
 };
 
-// Of an aperture of which no light field states the weights.
+// Returns the shape for an aperture whose weights no light field states.
 ShapeAndSource ShapeFor(const EstimateOptions& options, const model::Camera* camera) {
   if (!options.aperture_shape.empty()) {
     return {model::ApertureShapeFromName(options.aperture_shape), "option"};
@@ -45,8 +45,8 @@ model::LightField ReadViewsOfAperture(const EstimateOptions& options) {
 
 void TellAssumedShape(const EstimateOptions& options) {
   spdlog::warn(
-      "{}: nothing states through which aperture the photograph was taken, and a uniform one is "
-      "assumed; --aperture-shape gaussian or disc says that it was another",
+      "{}: neither the light field nor a camera states the aperture of the photograph, so a "
+      "uniform one is assumed; --aperture-shape gaussian or disc states another",
       PrintableUtf8(options.aperture_of));
 }
 
@@ -59,7 +59,7 @@ void WarnOfCameraPsf(const EstimateOptions& options, const model::LightField& li
           .all()) {
     return;
   }
-  spdlog::warn("{} states its aperture as {}, {} as {} (psf): that of the light field is used",
+  spdlog::warn("{} states its aperture as {}, {} as {} (psf): the one of the light field is used",
                PrintableUtf8(options.aperture_of), io::OwnApertureInWords(light_field),
                PrintableUtf8(options.camera_path), model::ApertureShapeName(of_camera));
 }
@@ -68,8 +68,8 @@ void WarnOfCameraPsf(const EstimateOptions& options, const model::LightField& li
 
 std::string EstimateAperture::InWords() const {
   std::string text = shape;
-  if (from == "camera") text += " (as the camera says)";
-  if (from == "light-field") text += " (as the light field says)";
+  if (from == "camera") text += " (from the camera)";
+  if (from == "light-field") text += " (from the light field)";
   if (from == "assumed") text += " (assumed)";
   return views_of.empty() ? text : fmt::format("{}, views of {}", text, views_of);
 }
@@ -117,7 +117,7 @@ EstimateAperture ApertureFor(const EstimateOptions& options, const model::Camera
 void WarnOfOtherSteps(const EstimateOptions& options, const EstimateAperture& aperture,
                       const model::LightFieldGrid& grid, const model::Camera& camera) {
   if (!aperture.step_mm) return;
-  constexpr double kTolerance = 0.05;  // as of views that are compared
+  constexpr double kTolerance = 0.05;  // the same as for views that are compared
   const Eigen::Vector2d here = model::ApertureStepsMm(grid, camera).cwiseAbs();
   const Eigen::Vector2d& there = *aperture.step_mm;
   for (const int axis : {0, 1}) {
@@ -126,9 +126,9 @@ void WarnOfOtherSteps(const EstimateOptions& options, const EstimateAperture& ap
       continue;
     }
     spdlog::warn(
-        "{}: its views are {:.4g} mm apart on the aperture along {}, those of the estimate {:.4g} "
-        "mm, so that camera {} and the weights give the calibrated blur: the views are seen from "
-        "other places",
+        "{}: its views are {:.4g} mm apart on the aperture along {}, but {:.4g} mm in the "
+        "estimate, so that camera {} and the weights give the calibrated blur: the views are seen "
+        "from other places",
         PrintableUtf8(options.aperture_of), there[axis], axis == 0 ? "u" : "v", here[axis],
         PrintableUtf8(options.camera_path));
     return;

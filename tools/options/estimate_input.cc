@@ -26,11 +26,11 @@ namespace {
 
 model::StoredPicture ReadPhoto(const std::string& path) {
   const model::StoredPicture picture = io::ToStoredPicture(io::ReadPictureFile(path));
-  if (picture.channels == 4) spdlog::warn("{}: its alpha channel is left out", path);
+  if (picture.channels == 4) spdlog::warn("{}: its alpha channel is ignored", path);
   return io::WithoutAlpha(picture);
 }
 
-// The camera behind a picture, which may be a part of its sensor, and of that the crop.
+// Returns the camera of a picture, which may be a part of its sensor, restricted to the crop.
 std::optional<model::Camera> CameraFor(const EstimateOptions& options, int width_px, int height_px,
                                        const std::optional<model::PixelRect>& crop,
                                        nlohmann::json* exif) {
@@ -52,39 +52,39 @@ std::optional<model::Camera> CameraFor(const EstimateOptions& options, int width
     camera = NamingTheFile("--sensor-origin: " + options.camera_path,
                            [&] { return model::CropCamera(camera, part); });
   } else if (camera.sensor.width_px != width_px || camera.sensor.height_px != height_px) {
-    throw Error(fmt::format(
-        "{}: the picture is {}x{} px, the sensor of {} has {}x{} px: they must be equal, or "
-        "--sensor-origin say which part of the sensor it is",
-        options.picture_path, width_px, height_px, options.camera_path, camera.sensor.width_px,
-        camera.sensor.height_px));
+    throw Error(
+        fmt::format("{}: the picture is {}x{} px, the sensor of {} has {}x{} px: they must be "
+                    "equal, or --sensor-origin must state which part of the sensor the picture is",
+                    options.picture_path, width_px, height_px, options.camera_path,
+                    camera.sensor.width_px, camera.sensor.height_px));
   }
   return crop ? model::CropCamera(camera, *crop) : camera;
 }
 
-// UV on the aperture, where each view has one transmission; ST in the plane of focus unless a
-// depth is given.
+// UV lies on the aperture, where each view has one transmission; ST lies in the plane of focus
+// unless a depth is given.
 model::LightFieldGrid GridFor(const EstimateOptions& options, const model::Camera& camera,
                               const Eigen::ArrayXXd& weights) {
   const model::ApertureSamples samples =
       model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
   const double st_depth_mm = options.st_depth_mm.value_or(camera.focus_depth_mm());
   if (std::isinf(st_depth_mm)) {
-    throw Error(fmt::format(
-        "{}: the camera is focused at infinity, where no ST plane can lie: --st-depth-mm must say "
-        "where it lies",
-        options.camera_path));
+    throw Error(
+        fmt::format("{}: the camera is focused at infinity, where no ST plane can lie: "
+                    "--st-depth-mm must give its depth",
+                    options.camera_path));
   }
   return model::GridOnPlanes(camera, {0, st_depth_mm}, samples);
 }
 
-// Picture and depth are cut alike. Where only one of them has the crop's size, it was cut before.
+// Crops picture and depth alike. If only one of them has the crop's size, it was cropped before.
 void CutToCrop(const EstimateOptions& options, const std::optional<model::PixelRect>& crop,
                model::StoredPicture* picture, model::RawDepthMap* map) {
   if (!crop) return;
   const auto was_cut = [&](int width_px, int height_px, const std::string& path) {
     const bool cut = width_px == crop->width && height_px == crop->height &&
                      (picture->width_px != map->width_px || picture->height_px != map->height_px);
-    if (cut) spdlog::warn("{}: has the size of --crop and is taken as it is", path);
+    if (cut) spdlog::warn("{}: has the size of --crop already and is not cropped", path);
     return cut;
   };
   const bool cut_picture = !was_cut(picture->width_px, picture->height_px, options.picture_path);
@@ -99,54 +99,56 @@ void CutToCrop(const EstimateOptions& options, const std::optional<model::PixelR
   }
 }
 
-// A depth far from what the camera is focused at is possible, but more often its unit is wrong.
+// Warns of a median depth far from the focused one: it is possible, but more often the unit is
+// wrong.
 void TellUnlikelyDepth(const EstimateOptions& options, const model::Camera& camera,
                        const model::DepthStatistics& depth) {
   constexpr double kUsual = 4;
   const double focus_depth_mm = camera.focus_depth_mm();
-  if (std::isinf(focus_depth_mm)) return;  // any depth is far from it
+  if (std::isinf(focus_depth_mm)) return;  // every depth is far from infinity
   if (depth.median_mm <= kUsual * focus_depth_mm && depth.median_mm >= focus_depth_mm / kUsual) {
     return;
   }
   spdlog::warn(
-      "{}: the median depth is {:.6g} mm, the camera is focused at {:.6g} mm; is --depth-unit "
+      "{}: the median depth is {:.6g} mm, but the camera is focused at {:.6g} mm; is --depth-unit "
       "right?",
       options.depth_path, depth.median_mm, focus_depth_mm);
 }
 
-// How light became stored values; taken for granted where nobody says it, and told then.
+// Returns how light became stored values. If nothing states it, sRGB is assumed and reported.
 model::TransferCurve TransferFor(const EstimateOptions& options,
                                  const std::optional<model::Camera>& camera) {
   if (camera) return camera->sensor.transfer;
   if (!options.transfer.empty()) return model::TransferCurve::FromName(options.transfer);
-  spdlog::info("{}: stored values are taken as sRGB (--transfer)", options.picture_path);
+  spdlog::info("{}: stored values are assumed to be sRGB (--transfer)", options.picture_path);
   return model::TransferCurve::Srgb();
 }
 
 void CheckViewCounts(const Eigen::ArrayXXd& weights) {
   if (weights.size() < 2) {
     throw Error(
-        "--views: 1x1 is no light field: one view is the picture itself; it must be at least two "
-        "views, e.g. 3x3");
+        "--views: 1x1 is not a light field: one view is the picture itself; at least two views are "
+        "expected, e.g. 3x3");
   }
   for (const auto& [count, axis] :
        {std::pair{weights.cols(), "u (across)"}, std::pair{weights.rows(), "v (down)"}}) {
-    if (count == 1) spdlog::warn("--views: one view along {}: no blur is modelled that way", axis);
+    if (count == 1)
+      spdlog::warn("--views: one view along {}: no blur is modelled in that direction", axis);
   }
 }
 
-// A disparity as large as the picture is none of a scene.
+// A disparity as large as the picture does not occur in a scene.
 void CheckDisparities(const EstimateOptions& options, const estimator::DisparityMap& map) {
   const auto [low_px, high_px] = DisparityRangePx(map);
   const int size_px = std::max(map.width_px, map.height_px);
   if (std::max(std::abs(low_px), std::abs(high_px)) <= size_px) return;
-  throw Error(fmt::format(
-      "{}: disparities from {:.4g} to {:.4g} px per view step, which must be within the {} px of "
-      "the picture; {}",
-      options.depth_path, low_px, high_px, size_px,
-      options.depth.kind == "disparity"
-          ? "are --disparity-scale and --disparity-offset right?"
-          : "are --depth-unit, and the camera's aperture and focus, right?"));
+  throw Error(
+      fmt::format("{}: disparities from {:.4g} to {:.4g} px per view step, but they must be within "
+                  "the {} px of the picture; {}",
+                  options.depth_path, low_px, high_px, size_px,
+                  options.depth.kind == "disparity"
+                      ? "are --disparity-scale and --disparity-offset right?"
+                      : "are --depth-unit, and the camera's aperture and focus, right?"));
 }
 
 void SmoothNoisyDepth(const EstimateOptions& options, PreparedEstimate* prepared) {
@@ -178,9 +180,10 @@ PreparedEstimate PrepareEstimate(const EstimateOptions& options) {
   const int full_height_px = std::max(stored.height_px, map.height_px);
   CutToCrop(options, crop, &stored, &map);
   if (map.width_px != stored.width_px || map.height_px != stored.height_px) {
-    throw Error(fmt::format("{}: it is {}x{} px, the picture {} {}x{} px: the sizes must be equal",
-                            options.depth_path, map.width_px, map.height_px, options.picture_path,
-                            stored.width_px, stored.height_px));
+    throw Error(
+        fmt::format("{}: it is {}x{} px, the picture {} is {}x{} px: the sizes must be equal",
+                    options.depth_path, map.width_px, map.height_px, options.picture_path,
+                    stored.width_px, stored.height_px));
   }
   PreparedEstimate prepared;
   estimator::EstimateInput& input = prepared.input;

@@ -39,7 +39,7 @@ CLI::Validator IsStrength() {
           ""};
 }
 
-// What a variable of the shell gives that was never set.
+// A shell variable that was never set gives an empty text.
 CLI::Validator NotEmpty(const std::string& what) {
   return {[what](std::string& given) {
             return given.empty() ? what + " is expected, found ''" : std::string();
@@ -48,23 +48,23 @@ CLI::Validator NotEmpty(const std::string& what) {
 }
 
 void AddInputOptions(CLI::App* command, EstimateOptions* options) {
-  command->add_option("picture", options->picture_path, "The photograph")
+  command->add_option("picture", options->picture_path, "The photograph (PNG, JPEG or TIFF)")
       ->required()
       ->type_name("IMAGE");
-  command->add_option("depth", options->depth_path, "Its depth map, pixel by pixel")
+  command->add_option("depth", options->depth_path, "Its depth map, of the same size")
       ->required()
       ->type_name("DEPTH");
   command
       ->add_option("--camera", options->camera_path,
-                   "The calibrated camera; not needed for a disparity map")
+                   "The calibrated camera; optional if the depth map holds disparities")
       ->type_name("CAMERA.yaml");
   command
       ->add_option("--sensor-origin", options->sensor_origin,
-                   "Where on the camera's sensor a picture of a part of it begins, px")
+                   "Position on the camera's sensor of a picture that is a part of it, px")
       ->type_name("X,Y");
   command->add_flag("--ignore-exif", options->ignore_exif,
-                    "Go on where the photograph's EXIF says that it was taken with another lens, "
-                    "setting or sensor than the camera file describes");
+                    "Continue even if the EXIF of the photograph states another lens, setting or "
+                    "sensor than the camera file");
   command->add_option("-o,--output", options->output_folder, "Folder for the light field")
       ->required()
       ->type_name("LF");
@@ -77,44 +77,44 @@ void AddInputOptions(CLI::App* command, EstimateOptions* options) {
   AddCropOption(command, &options->crop);
   command
       ->add_option("--transfer", options->transfer,
-                   "How light became stored values: linear, srgb or gamma-2.2; default: what the "
-                   "camera's file says, without a camera srgb")
+                   "How light became stored values: linear, srgb or gamma-2.2; default: as the "
+                   "camera file states, or srgb without a camera")
       ->check(CLI::IsMember({"linear", "srgb", "gamma-2.2"}))
       ->type_name("NAME");
 }
 
 void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
-  AddViewsOption(command, &options->views, "Views across and down; default 7x7");
+  AddViewsOption(command, &options->views, "Number of views across and down; default 7x7");
   AddApertureShapeOption(command, &options->aperture_shape);
   command
       ->add_option(
           "--aperture-of", options->aperture_of,
-          "Take the views, and which of them the photograph saw, from this light field; how "
-          "it weighs them too, where its lightfield.yaml states that, else by "
-          "--aperture-shape")
+          "Take the views, and which of them the photograph saw, from this light field, with their "
+          "weights if its lightfield.yaml states them, otherwise with those of --aperture-shape")
       ->type_name("LF");
-  command->add_option("--grid", options->grid, "Of --aperture-of: row length of the HCI numbering")
+  command
+      ->add_option("--grid", options->grid, "For --aperture-of: views per row in the HCI numbering")
       ->check(CLI::Range(1, 1000))
       ->type_name("N");
-  command->add_flag("--sparse", options->sparse, "Of --aperture-of: any set of views may be there");
+  command->add_flag("--sparse", options->sparse, "For --aperture-of: accept missing views");
   command
       ->add_option("--st-depth-mm", options->st_depth_mm,
                    "Depth of the ST plane (UV is the aperture); default: the plane of focus")
       ->check(Between(0, 1e9, "millimetres"))
       ->type_name("MM");
   command->add_flag("--keep-depth-noise", options->keep_depth_noise,
-                    "Takes the depth as it is, however noisy: it is smoothed along surfaces else");
+                    "Disable depth denoising, which smooths the depth along surfaces");
   command
       ->add_option("--fill", options->fill,
-                   "What the centre view does not show: as the solver has it, or by the source's "
-                   "inpainting (telea), view by view, for comparison")
+                   "Fill of areas that the centre view does not show: by the solver, or by the "
+                   "paper's inpainting (telea) view by view, for comparison")
       ->check(CLI::IsMember({"solver", "telea"}))
       ->capture_default_str()
       ->type_name("NAME");
   AddEffectOptions(command, &options->effects);
   command
       ->add_option("--format", options->format,
-                   "Of the views: png (16 bit, stored values) or tiff (float, linear light)")
+                   "Format of the views: png (16 bit, stored values) or tiff (float, linear light)")
       ->check(CLI::IsMember({"png", "tiff"}))
       ->capture_default_str()
       ->type_name("NAME");
@@ -122,18 +122,17 @@ void AddLightFieldOptions(CLI::App* command, EstimateOptions* options) {
 
 void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
   command
-      ->add_option(
-          "--solver", options->solver,
-          "scene: the whole picture at once. For comparison: blocks, the source's, block by "
-          "block; functional and grid, the source's functional for the whole picture, on the rays "
-          "of scene points or of the views")
+      ->add_option("--solver", options->solver,
+                   "scene: solves for the whole picture at once. For comparison: blocks, the "
+                   "paper's method, block by block; functional and grid, the paper's functional "
+                   "for the whole picture, on the rays of scene points or of the views")
       ->check(CLI::IsMember({"scene", "blocks", "functional", "grid"}))
       ->capture_default_str()
       ->type_name("NAME");
   command
       ->add_option("--memory-limit", options->memory_limit_mib,
-                   "For the whole program; scene then solves the picture in bands. Default of "
-                   "scene: four fifths of what is available")
+                   "Memory limit of the whole program; the solver scene then works in bands. "
+                   "Default of scene: four fifths of the available memory")
       ->check(Between(0, 1e9, "MiB"))
       ->type_name("MIB");
   AddDeviceOption(command, &options->device);
@@ -141,39 +140,38 @@ void AddSolverOptions(CLI::App* command, EstimateOptions* options) {
 
 void AddSceneOptions(CLI::App* command, EstimateOptions* options) {
   command
-      ->add_option(
-          "--prior", options->prior,
-          "Of scene: what is taken for granted of the radiance: ridge, gradient, tv "
-          "(total variation, default) or patches (tv, few waves in a patch, and folds of the "
-          "depth show in the shading: better where depth and camera explain the picture "
-          "well, but slower)")
+      ->add_option("--prior", options->prior,
+                   "Regularisation prior of the radiance (solver scene): ridge, gradient, tv "
+                   "(total variation, default) or patches (tv plus few frequencies per patch and "
+                   "shading that follows the relief of the depth: better but slower if depth and "
+                   "camera explain the picture well)")
       ->check(CLI::IsMember({"ridge", "gradient", "tv", "patches"}))
       ->type_name("NAME");
   command
       ->add_option("--strength", options->strength,
-                   "Of scene, of the prior: auto (from the picture's noise, default), gcv "
-                   "(cross-validation) or a number")
+                   "Weight of the prior (solver scene): auto (from the picture's noise, default), "
+                   "gcv (cross-validation) or a number")
       ->check(IsStrength())
       ->type_name("RULE");
   command->add_flag("--check-blur", options->check_blur,
-                    "Of scene: look whether the photograph asks for a narrower blur, or another "
-                    "plane of focus, than camera and depth say, and propose it; costs one more "
-                    "solve at half the size, and seven to seventeen where something may be wrong");
+                    "Check whether a narrower blur or another plane of focus fits the photograph "
+                    "better than camera and depth, and propose it (solver scene); costs one more "
+                    "solve at half the size, and seven to seventeen if something may be wrong");
 }
 
 void AddFunctionalOptions(CLI::App* command, EstimateOptions* options) {
   const estimator::FunctionalOptions usual;
   command
       ->add_option("--gamma", options->gamma,
-                   fmt::format("Of all but scene: weight of the smoothness along scene points; "
-                               "default {:g}",
+                   fmt::format("Weight of the smoothness along scene points (solvers blocks, "
+                               "functional, grid); default {:g}",
                                usual.gamma))
       ->check(Finite())
       ->type_name("X");
   command
       ->add_option("--ridge", options->ridge,
-                   "Of all but scene: weight mu of the distance to the warped picture; default "
-                   "0.01/(U V)")
+                   "Weight mu of the distance to the warped picture (solvers blocks, functional, "
+                   "grid); default 0.01/(U V)")
       ->check(Finite())
       ->type_name("X");
 }
@@ -183,43 +181,44 @@ void AddIterationOptions(CLI::App* command, EstimateOptions* options) {
   const estimator::FunctionalOptions functional;
   command
       ->add_option("--tolerance", options->tolerance,
-                   fmt::format("Of iterative solvers: relative residual at which they stop; "
-                               "default {:g} (scene with tv), {:g} (blocks) or {:g}",
+                   fmt::format("Relative residual at which iterative solvers stop; default {:g} "
+                               "(scene with tv), {:g} (blocks) or {:g}",
                                scene.tolerance_or_usual(), estimator::BlockOptions().tolerance,
                                functional.tolerance))
       ->check(Inside(0, 1, "a relative residual"))
       ->type_name("X");
   command
-      ->add_option(
-          "--max-iterations", options->max_iterations,
-          fmt::format("Of iterative solvers: in all (scene; default {}; as many for the relief of "
-                      "patches), for each channel (default {}), or for each block's "
-                      "(default {})",
-                      scene.max_iterations, functional.max_iterations,
-                      estimator::BlockOptions().max_iterations))
+      ->add_option("--max-iterations", options->max_iterations,
+                   fmt::format("Maximum number of iterations: in total (scene; default {}; patches "
+                               "uses as many again for fine relief), for each channel (default "
+                               "{}), or for each block (default {})",
+                               scene.max_iterations, functional.max_iterations,
+                               estimator::BlockOptions().max_iterations))
       ->check(CLI::Range(1, kMaxIterations))
       ->type_name("N");
   command->add_flag("--double", options->double_precision,
-                    "Of all but blocks: numbers of 64 bit instead of 32");
+                    "Compute in double precision (solvers scene, functional, grid)");
 }
 
 void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
   const std::string usual = estimator::BlockSolverName(estimator::DefaultBlockSolver());
   command
       ->add_option("--block-solver", options->block_solver,
-                   fmt::format("Of blocks: umfpack, cholmod or eigen; iterative, for comparison: "
-                               "cg, bicgstab or viennacl; default {}",
+                   fmt::format("Solver of each block (solver blocks): umfpack, cholmod or eigen; "
+                               "iterative, for comparison: cg, bicgstab or viennacl; default {}",
                                usual))
       ->check(CLI::IsMember({"umfpack", "cholmod", "eigen", "cg", "bicgstab", "viennacl"}))
       ->type_name("NAME");
   command
-      ->add_option("--block-px", options->block_px,
-                   "Of blocks: their edge; default 16, or the largest that --memory-limit allows")
+      ->add_option(
+          "--block-px", options->block_px,
+          "Edge of a block (solver blocks); default 16, or the largest that --memory-limit allows")
       ->check(CLI::Range(1, 100000))
       ->type_name("PX");
   command
       ->add_option("--stencil", options->stencil,
-                   "Of blocks, of the smoothness: warp (default), or the source's six differences")
+                   "Stencil of the smoothness (solver blocks): warp (default), or the paper's six "
+                   "differences")
       ->check(CLI::IsMember({"warp", "source"}))
       ->type_name("NAME");
   command
@@ -230,13 +229,13 @@ void AddBlockOptions(CLI::App* command, EstimateOptions* options) {
       ->type_name("NAME");
   command
       ->add_option("--checkpoint", options->checkpoint_path,
-                   "Of blocks: keep each that is solved in this file, so that the same command "
-                   "goes on where it was interrupted; removed once the light field is there")
+                   "Keep each solved block in this file (solver blocks), so that the same command "
+                   "continues after an interruption; removed once the light field is written")
       ->check(NotEmpty("a file's name"))
       ->type_name("FILE");
 }
 
-// An option that not every solver has.
+// An option that only some solvers have.
 struct OptionOfSolvers {
   const char* name;
   bool is_given;
@@ -273,7 +272,8 @@ std::string Either(const std::vector<std::string>& names) {
   return fmt::format("{} or {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
 }
 
-// The light field's folder is replaced as a whole; what lies in it would go with the older one.
+// The light field's folder is replaced as a whole; a file in it would be lost with the older light
+// field.
 void RequireBesideLightField(const char* option, const std::string& path,
                              const EstimateOptions& options) {
   if (path.empty()) return;
@@ -288,8 +288,8 @@ void RequireBesideLightField(const char* option, const std::string& path,
   const auto differing = std::mismatch(inner.begin(), inner.end(), output.begin(), output.end());
   if (differing.second == output.end()) {
     throw UsageError(
-        fmt::format("{} {}: lies in the light field's folder {}; choose a name outside of it",
-                    option, path, options.output_folder));
+        fmt::format("{} {}: lies in the light field's folder {}; choose a name outside it", option,
+                    path, options.output_folder));
   }
 }
 
@@ -310,7 +310,7 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
   AddPlanWishOptions(command, &options->wish);
   command
       ->add_option("--profile", options->profile_path,
-                   "What --quality, --within and --psnr-loss choose from, as bench accuracy "
+                   "Profile for --quality, --within and --psnr-loss, as bench accuracy "
                    "--save-profile writes it; default: your own, or the one that ships")
       ->type_name("FILE");
   AddCommonOptions(command, &options->common);
@@ -326,22 +326,23 @@ void CheckSolverUsage(const EstimateOptions& options) {
     const bool is_iterations =
         option.name == std::string("--tolerance") || option.name == std::string("--max-iterations");
     throw UsageError(
-        fmt::format("{} is of --solver {}{}, the solver is {}", option.name, Either(solvers),
+        fmt::format("{} requires --solver {}{}, the solver is {}", option.name, Either(solvers),
                     options.by_blocks() && is_iterations
-                        ? ", or of blocks with an iterative --block-solver (cg, bicgstab, viennacl)"
+                        ? ", or blocks with an iterative --block-solver (cg, bicgstab, viennacl)"
                         : "",
                     options.solver));
   }
   if (options.block_solver == "viennacl" && options.device != "auto") {
-    throw UsageError(fmt::format(
-        "--device {} is not for --block-solver viennacl, which takes a device for itself (auto)",
-        options.device));
+    throw UsageError(
+        fmt::format("--device {} cannot be used with --block-solver viennacl, which selects a "
+                    "device itself (auto)",
+                    options.device));
   }
   if (options.solver != "scene" && !options.by_blocks() && options.device.rfind("opencl", 0) == 0) {
-    throw UsageError(fmt::format(
-        "--device {} is for --solver scene or blocks; the solver {} computes on the processor "
-        "(auto or cpu)",
-        options.device, options.solver));
+    throw UsageError(
+        fmt::format("--device {} requires --solver scene or blocks; the solver {} computes on the "
+                    "processor (auto or cpu)",
+                    options.device, options.solver));
   }
 }
 
@@ -354,16 +355,16 @@ void CheckEstimateUsage(const EstimateOptions& options) {
   const bool camera = !options.camera_path.empty();
   const bool aperture_of = !options.aperture_of.empty();
   needs(!options.sensor_origin.empty(), camera, "--sensor-origin needs a --camera");
-  needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, which EXIF may contradict");
+  needs(options.ignore_exif, camera, "--ignore-exif needs a --camera, with which EXIF is compared");
   needs(options.st_depth_mm.has_value(), camera, "--st-depth-mm needs a --camera");
   needs(options.grid > 0 || options.sparse, aperture_of, "--grid and --sparse need --aperture-of");
   needs(IsLeftOut(options.effects, model::Effect::kApertureShape),
         options.aperture_shape.empty() && !aperture_of,
-        "--aperture-shape and --aperture-of say which shape the aperture has; without the effect "
+        "--aperture-shape and --aperture-of state the shape of the aperture; without the effect "
         "aperture-shape it is Gaussian");
   CheckSolverUsage(options);
   needs(!options.profile_path.empty(), options.wish.IsMade(),
-        "--profile is what --quality, --within or --psnr-loss choose from, and none is given");
+        "--profile is only used by --quality, --within or --psnr-loss, and none of them is given");
   RequireBesideLightField("--report", options.report_folder, options);
   RequireBesideLightField("--checkpoint", options.checkpoint_path, options);
 }

@@ -40,7 +40,7 @@ Value FieldOf(const json& fields, const char* name, const std::string& where) {
   try {
     return found->get<Value>();
   } catch (const json::exception&) {
-    throw Error(fmt::format("{}: {}: found {}, which it cannot be", where, name, found->dump()));
+    throw Error(fmt::format("{}: {}: the value {} is not allowed", where, name, found->dump()));
   }
 }
 
@@ -76,7 +76,7 @@ std::vector<std::string> PlanWords(const EstimatePlan& plan) {
   if (plan.tolerance) add("--tolerance", fmt::format("{:g}", *plan.tolerance));
   if (plan.double_precision) words.emplace_back("--double");
   if (plan.on_opencl) add("--device", "opencl");
-  // Else the best there is; ViennaCL takes one for itself.
+  // Otherwise the best device is used; ViennaCL selects one itself.
   if (!plan.on_opencl && plan.solver == "blocks" && plan.block_solver != "viennacl") {
     add("--device", "cpu");
   }
@@ -122,7 +122,7 @@ EstimatePlan PlanFromJson(const json& fields, const std::string& where) {
     throw Error(fmt::format("{}: solver: scene, blocks, functional or grid is expected, found '{}'",
                             where, plan.solver));
   }
-  // What estimate's command line would refuse is not believed of a file either.
+  // A file must not contain what the command line of estimate would refuse.
   EstimateOptions options;
   ApplyPlan(plan, &options);
   try {
@@ -150,7 +150,7 @@ void ApplyPlan(const EstimatePlan& plan, EstimateOptions* options) {
   options->tolerance = plan.tolerance;
   options->double_precision = plan.double_precision;
   options->block_px = plan.block_px;
-  // ViennaCL takes a device for itself.
+  // ViennaCL selects a device itself.
   const char* processor = plan.block_solver == "viennacl" ? "auto" : "cpu";
   options->device = plan.on_opencl ? "opencl" : processor;
 }
@@ -165,7 +165,7 @@ PlanRun RunPlan(const EstimatePlan& plan, const estimator::EstimateInput& input,
   if (plan.solver == "scene") {
     estimator::SceneSummary summary;
     estimator::SceneOptions scene = SceneOptionsOf(options, on, StopWhenAsked);
-    scene.memory_limit_mib = UsualMemoryLimitMib();  // which `estimate` respects, too
+    scene.memory_limit_mib = UsualMemoryLimitMib();  // which `estimate` respects as well
     run.light_field = estimator::EstimateScene(input, scene, &summary, nullptr, backend);
     TakeSeconds(summary, &run);
     TakeIterations(summary, &run);

@@ -18,7 +18,7 @@
 
 namespace thicklens::tools {
 
-// The text of configs/profiles/default.json; made by CMake.
+// Returns the text of configs/profiles/default.json, which CMake embeds.
 std::string DefaultProfileText();
 
 namespace {
@@ -79,7 +79,7 @@ EstimateProfile Parse(const std::string& text, const std::string& where) {
   const json fields = json::parse(text, nullptr, false);
   if (!fields.is_object()) {
     throw Error(
-        fmt::format("{}: is no JSON object; make a profile by thicklens bench accuracy "
+        fmt::format("{}: is not a JSON object; make a profile with thicklens bench accuracy "
                     "--save-profile",
                     where));
   }
@@ -172,7 +172,7 @@ EstimateProfile DefaultProfile() { return Parse(DefaultProfileText(), "the profi
 std::string UserProfilePath() {
   const auto folder = [](const char* variable) -> std::filesystem::path {
     const char* value = std::getenv(variable);  // NOLINT: nothing sets it meanwhile
-    // A relative path would lead to the current folder, which may be anybody's.
+    // A relative path would start at the current folder, which anybody may have filled.
     const std::filesystem::path path = value == nullptr ? "" : value;
     return path.is_absolute() ? path : std::filesystem::path();
   };
@@ -190,7 +190,7 @@ EstimateProfile ProfileFor(const std::string& path) {
     return ReadProfile(own);
   } catch (const Error& error) {
     throw Error(
-        fmt::format("{}; measure it anew by `thicklens bench accuracy --save-profile`, or "
+        fmt::format("{}; measure it again with `thicklens bench accuracy --save-profile`, or "
                     "delete it to use the one that ships",
                     error.what()));
   }
@@ -198,7 +198,7 @@ EstimateProfile ProfileFor(const std::string& path) {
 
 double ProbeSeconds(int threads) {
   constexpr int kSizePx = 256, kViews = 5, kRuns = 3;
-  // Nothing of what it shows matters: a plane that is blurred alike everywhere.
+  // The content of the scene does not matter: it is a plane with the same blur everywhere.
   estimator::EstimateInput input;
   input.picture = model::LinearPicture{kSizePx, kSizePx, 1, {}};
   input.picture.values.resize(kSizePx * kSizePx);
@@ -209,7 +209,7 @@ double ProbeSeconds(int threads) {
   input.disparity.width_px = input.disparity.height_px = kSizePx;
   input.disparity.disparity.assign(kSizePx * kSizePx, 1.0F);
   input.weights = Eigen::ArrayXXd::Constant(kViews, kViews, 1.0 / (kViews * kViews));
-  // Where the machine is so busy that one run takes this long, more of them tell nothing new.
+  // On a machine that is so busy that one run takes this long, more runs give no new information.
   constexpr double kEnoughSeconds = 0.4;
   double best = 0, spent = 0;
   for (int run = 0; run < kRuns && spent < kEnoughSeconds; ++run) {

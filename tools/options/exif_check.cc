@@ -18,7 +18,8 @@ namespace {
 
 using nlohmann::json;
 
-// Focal lengths are engraved with 5 % at most (ISO 517 has it for f-numbers and lengths alike).
+// Engraved focal lengths are within 5 % at most (ISO 517 states this for f-numbers and for focal
+// lengths).
 constexpr double kNominalFocal = 0.05;
 // Half of a third of a stop: a factor of 2^(1/12) in the f-number.
 constexpr double kNominalFNumber = 0.06;
@@ -28,7 +29,7 @@ constexpr double kNominalPitch = 0.03, kOtherPitch = 0.1;
 constexpr double kNominalField = 0.03, kOtherField = 0.15;
 constexpr double kFullFrameDiagonalMm = 43.2666, kFullFrameWidthMm = 36;
 
-// Half a unit of the last decimal digit that the number has.
+// Returns half a unit of the last decimal digit of the number.
 double RoundingOf(double value) {
   double unit = 1;
   for (int digits = 0; digits < 4; ++digits) {
@@ -49,7 +50,7 @@ std::string WithTolerance(double value, double tolerance) {
                        : fmt::format("{:.6g}", value);
 }
 
-// How far a number lies outside an interval; 0: inside.
+// Returns how far a number lies outside an interval; 0 if it is inside.
 double Outside(double value, double low, double high) {
   return std::max({0.0, low - value, value - high});
 }
@@ -75,7 +76,8 @@ ExifFinding FocalLengthFinding(double exif_mm, const model::Camera& camera) {
   return finding;
 }
 
-// F-numbers are set in steps of a third of a stop: f/2 is none of the numbers from 1.5 to 2.5.
+// F-numbers are set in steps of a third of a stop, so f/2 does not stand for all numbers from 1.5
+// to 2.5.
 double RoundingOfFNumber(double number) {
   return std::min(RoundingOf(number), number < 10 ? 0.05 : 0.5);
 }
@@ -94,7 +96,7 @@ ExifFinding FNumberFinding(double exif_number, const model::Camera& camera) {
   const bool is_near = off <= kNominalFNumber * number;
   finding.verdict = is_near ? ExifVerdict::kUndecided : ExifVerdict::kContradicts;
   finding.remark = is_near ? "f-numbers are marked in rounded steps"
-                           : "the aperture was set otherwise than in the calibration";
+                           : "the aperture setting differs from that of the calibration";
   return finding;
 }
 
@@ -109,14 +111,15 @@ std::optional<ExifFinding> FocusDistanceFinding(double exif_mm, const model::Cam
                       fmt::format("{} (zf, from the aperture; {} from the sensor)", in_words(zf_mm),
                                   in_words(far_mm)),
                       ExifVerdict::kAgrees, ""};
-  // A ring at infinity, and a calibration far away, may be the same place.
+  // A focus ring at infinity and a calibration at a large distance may be the same position.
   constexpr double kFarMm = 10000;
   if (std::isinf(exif_mm) || std::isinf(zf_mm)) {
     if (std::min(exif_mm, zf_mm) >= kFarMm) return finding;
     finding.verdict = ExifVerdict::kContradicts;
   } else {
     constexpr double kMmPerMetre = 1000;
-    // Whole metres may be exact or rounded: what agrees only by half a metre of rounding is open.
+    // Whole metres may be exact or rounded: a value that agrees only within half a metre of
+    // rounding is left undecided.
     constexpr double kMostRoundingMm = 50;
     const double whole_mm = kMmPerMetre * RoundingOf(exif_mm / kMmPerMetre);
     const double close_mm = exif_mm < kFarMm / 2 ? std::min(kMostRoundingMm, whole_mm) : whole_mm;
@@ -129,21 +132,23 @@ std::optional<ExifFinding> FocusDistanceFinding(double exif_mm, const model::Cam
                           ? ExifVerdict::kUndecided
                           : ExifVerdict::kContradicts;
   }
-  finding.remark = finding.verdict == ExifVerdict::kUndecided
-                       ? "cameras know the distance roughly"
-                       : "the lens was focused elsewhere than in the calibration, and with it d1";
+  finding.remark =
+      finding.verdict == ExifVerdict::kUndecided
+          ? "cameras state the distance only roughly"
+          : "the lens was focused at another distance than in the calibration, so d1 differs";
   return finding;
 }
 
-// Whether the picture has the size in which the camera made it, or the camera file's sensor has.
+// Returns whether the picture has the size that the camera made, or the size of the camera file's
+// sensor.
 bool IsOfSize(const io::PhotoExif& exif, int width_px, int height_px) {
   if (!exif.made_width_px || !exif.made_height_px) return true;
   const auto made = std::minmax(*exif.made_width_px, *exif.made_height_px);
   const auto here = std::minmax(width_px, height_px);
-  return made == here;  // turned or not
+  return made == here;  // rotated or not
 }
 
-// Scaled pixels have a pitch as much larger.
+// Scaled pixels have a pitch that is larger by the same factor.
 std::optional<ExifFinding> SizeFinding(const io::PhotoExif& exif, const model::Camera& camera,
                                        const PhotoSize& size) {
   if (!exif.made_width_px || !exif.made_height_px) return std::nullopt;
@@ -158,20 +163,20 @@ std::optional<ExifFinding> SizeFinding(const io::PhotoExif& exif, const model::C
   const bool is_scaled = std::abs(across / down - 1) < 0.01;
   if (is_scaled && exif.made_pixel_pitch_mm &&
       std::abs(*exif.made_pixel_pitch_mm * across / sensor.pixel_pitch_mm - 1) <= kNominalPitch) {
-    return finding;  // the camera file is that of pictures scaled in the same way
+    return finding;  // the camera file describes pictures scaled in the same way
   }
   finding.verdict = ExifVerdict::kUndecided;
   finding.remark = fmt::format(
-      "the photograph of {} x {} px was {} after it was taken: pixel pitch and principal point of "
-      "the camera file must be those of such images",
+      "the photograph of {} x {} px was {} after it was taken: the pixel pitch and principal point "
+      "of the camera file must be those of such images",
       size.width_px, size.height_px,
-      is_scaled ? fmt::format("scaled by 1/{:.4g}, or cut,", across)
-                : std::string("cut or scaled"));
+      is_scaled ? fmt::format("scaled by 1/{:.4g}, or cropped,", across)
+                : std::string("cropped or scaled"));
   return finding;
 }
 
 std::optional<ExifFinding> PitchFinding(const io::PhotoExif& exif, const model::Camera& camera) {
-  if (!exif.pixel_pitch_mm) return std::nullopt;  // of another size: see there
+  if (!exif.pixel_pitch_mm) return std::nullopt;  // the size differs: SizeFinding reports it
   constexpr double kUmPerMm = 1000;
   const double pitch_mm = camera.sensor.pixel_pitch_mm;
   const double tolerance_mm = ToleranceOf(camera, "sensor.pixel_pitch_mm");
@@ -182,13 +187,13 @@ std::optional<ExifFinding> PitchFinding(const io::PhotoExif& exif, const model::
   if (off <= kNominalPitch) return finding;
   finding.verdict = off <= kOtherPitch ? ExifVerdict::kUndecided : ExifVerdict::kContradicts;
   finding.remark = finding.verdict == ExifVerdict::kUndecided
-                       ? "EXIF may count pixels at the edge of the sensor that images do not have"
-                       : "another sensor, or an image of other pixels";
+                       ? "EXIF may count pixels at the edge of the sensor that are not in images"
+                       : "another sensor, or an image with other pixels";
   return finding;
 }
 
-// The equivalent focal length over the focal length is the diagonal, or the width, of 36 x 24 mm
-// over that of the sensor: makers use both.
+// The ratio of the equivalent focal length to the focal length is that of the diagonals, or of the
+// widths, of 36 x 24 mm and of the sensor: manufacturers use both.
 std::optional<ExifFinding> FieldOfViewFinding(const io::PhotoExif& exif,
                                               const model::Camera& camera, const PhotoSize& size) {
   const model::Sensor& sensor = camera.sensor;
@@ -205,8 +210,7 @@ std::optional<ExifFinding> FieldOfViewFinding(const io::PhotoExif& exif,
   const double rounding =
       0.5 / *exif.focal_length_35mm + RoundingOf(*exif.focal_length_mm) / *exif.focal_length_mm;
   ExifFinding finding{
-      "crop factor",
-      fmt::format("{:.4g} ({:g} mm as of 35 mm film)", factor, *exif.focal_length_35mm),
+      "crop factor", fmt::format("{:.4g} ({:g} mm in 35 mm film)", factor, *exif.focal_length_35mm),
       fmt::format("{:.4g} (a sensor of {:.4g} x {:.4g} mm)", low, width_mm, height_mm),
       ExifVerdict::kAgrees, ""};
   const double off = Outside(factor, low, high) / factor - rounding;
@@ -221,21 +225,21 @@ std::optional<ExifFinding> DigitalZoomFinding(const io::PhotoExif& exif) {
   if (!exif.digital_zoom || *exif.digital_zoom <= kNoZoom) return std::nullopt;
   return ExifFinding{"digital zoom", fmt::format("{:.4g}", *exif.digital_zoom), "none stated",
                      ExifVerdict::kUndecided,
-                     "the pixels are those of a cut and enlarged image: the camera file must be "
-                     "of images with this zoom"};
+                     "the pixels are those of a cropped and enlarged image: the camera file must "
+                     "describe images with this zoom"};
 }
 
 std::optional<ExifFinding> OrientationFinding(const io::PhotoExif& exif) {
   if (exif.orientation == 1) return std::nullopt;
-  return ExifFinding{"orientation", fmt::format("{}", exif.orientation), "as stored",
-                     ExifVerdict::kUndecided,
-                     "whether photograph, depth map and principal point are turned alike cannot be "
-                     "told"};
+  return ExifFinding{
+      "orientation", fmt::format("{}", exif.orientation), "as stored", ExifVerdict::kUndecided,
+      "whether photograph, depth map and principal point are rotated alike cannot be "
+      "told"};
 }
 
 std::string FindingText(const ExifFinding& finding) {
-  return fmt::format("{}: the photograph's EXIF says {}, the camera file {} ({})", finding.quantity,
-                     finding.photo, finding.camera, finding.remark);
+  return fmt::format("{}: the photograph's EXIF states {}, the camera file {} ({})",
+                     finding.quantity, finding.photo, finding.camera, finding.remark);
 }
 
 json ExifFindingsJson(const std::vector<ExifFinding>& findings, bool ignore) {
@@ -296,11 +300,11 @@ json RequireSameCamera(const std::string& photo_path, const std::string& camera_
                  finding.verdict == ExifVerdict::kContradicts ? "; ignored (--ignore-exif)" : "");
   }
   if (!contradictions.empty()) {
-    throw Error(fmt::format(
-        "{}: it was not taken with the camera and setting of {}: {}; calibrate that setting, name "
-        "its camera file, or say --ignore-exif if EXIF is wrong",
-        PrintableUtf8(photo_path), PrintableUtf8(camera_path),
-        PrintableUtf8(fmt::format("{}", fmt::join(contradictions, "; ")))));
+    throw Error(
+        fmt::format("{}: it was not taken with the camera and setting of {}: {}; calibrate that "
+                    "setting, name its camera file, or give --ignore-exif if EXIF is wrong",
+                    PrintableUtf8(photo_path), PrintableUtf8(camera_path),
+                    PrintableUtf8(fmt::format("{}", fmt::join(contradictions, "; ")))));
   }
   return ExifFindingsJson(findings, ignore);
 }

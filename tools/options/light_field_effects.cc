@@ -30,7 +30,7 @@ model::EffectDecision DecisionWithoutCamera(const EffectOptions& options,
                                             const EffectSet& of_model) {
   if (options.tolerance) {
     throw UsageError(options.tolerance_option +
-                     ": without a camera nothing is known of what effects matter");
+                     ": without a camera, which effects are relevant is unknown");
   }
   const model::EffectChoice choice = ChoiceOf(options);
   const EffectSet base = choice.base == model::EffectChoice::Base::kGiven ? choice.given : of_model;
@@ -51,20 +51,20 @@ model::EffectDecision DecideEstimateEffects(const EstimateOptions& options,
   const EffectSet of_model = EffectsOf(options.solver, camera.has_value());
   CheckEffectNames(options.effects, of_model);
   model::EffectChoice choice = ChoiceOf(options.effects);
-  // The solution's own, which cost what they bring.
+  // Effects of the solution itself, which cost the time that they take.
   choice.kept = EffectsOf(options.solver, false);
   const bool is_gaussian = options.aperture_shape.empty() && options.aperture_of.empty() &&
                            camera && camera->psf == model::Psf::kGaussian;
   if (is_gaussian) choice.kept.Remove(Effect::kApertureShape);
   if (IsLeftOut(options.effects, Effect::kDefocus)) {
     throw UsageError(
-        "--effects, --without: defocus is what an estimate undoes and cannot be left out; "
+        "--effects, --without: defocus is what an estimate inverts and cannot be left out; "
         "thicklens compare --dibr measures the picture that is only warped by its depth");
   }
   if (of_model.Has(Effect::kOcclusion) && IsLeftOut(options.effects, Effect::kOcclusion)) {
     throw UsageError(
-        "--effects, --without: occlusion cannot be left out of an estimate, whose views show the "
-        "depth map as each of them sees it; where nothing is hidden it costs nothing");
+        "--effects, --without: occlusion cannot be left out of an estimate, because each view "
+        "shows the depth map from its own position; where nothing is occluded it costs nothing");
   }
   if (!camera) return DecisionWithoutCamera(options.effects, of_model);
   model::EffectConditions conditions;
@@ -89,8 +89,8 @@ model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
   model::EffectConditions conditions;
   conditions.camera = *light_field.camera;
   if (light_field.grid) conditions.planes = light_field.grid->planes;
-  // Views do not tell their depths: any, from half of that of the plane of focus on. What defocus
-  // and aperture shape do there is therefore not told.
+  // Views do not state their depths: every depth from half of the in-focus distance on is possible.
+  // The impact of defocus and aperture shape is therefore not reported.
   constexpr double kFarMm = 1e6;
   const double near_mm = std::min(light_field.camera->focus_depth_mm(), kFarMm) / 2;
   model::EffectDecision decision =
@@ -98,7 +98,7 @@ model::EffectDecision DecidePhotographEffects(const EffectOptions& options,
                            model::PlacesBetween(*light_field.camera, near_mm,
                                                 std::numeric_limits<double>::infinity(), false),
                            of_model);
-  // Without defocus a pixel has one ray.
+  // Without defocus each pixel has one ray.
   if (!decision.on.Has(Effect::kDefocus)) decision.on.Remove(Effect::kVignetting);
   decision.findings.erase(std::remove_if(decision.findings.begin(), decision.findings.end(),
                                          [&](const model::EffectFinding& finding) {

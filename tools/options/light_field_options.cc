@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kMaxGrid = 1000;
 
-// Step between views on the aperture, mm, along u, or along v where there is one view in u.
+// Returns the step between views on the aperture in mm along u, or along v if u has one view.
 double ApertureStepMm(const model::LightFieldGrid& grid, const model::Camera& camera) {
   const Eigen::Vector2d step = model::ApertureStepsMm(grid, camera);
   return std::abs(step.x() != 0 ? step.x() : step.y());
@@ -33,7 +33,7 @@ estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
 void RequireSize(const model::RawDepthMap& map, const std::string& map_name,
                  const model::LinearPicture& picture) {
   if (map.width_px == picture.width_px && map.height_px == picture.height_px) return;
-  throw Error(fmt::format("{}: it is {}x{} px, the picture {}x{} px: the sizes must be equal",
+  throw Error(fmt::format("{}: it is {}x{} px, the picture is {}x{} px: the sizes must be equal",
                           map_name, map.width_px, map.height_px, picture.width_px,
                           picture.height_px));
 }
@@ -44,7 +44,7 @@ PreparedDepth PrepareByCamera(const model::RawDepthMap& map, const std::string& 
                               const model::LightFieldGrid& grid) {
   if (convention.kind == model::DepthKind::kDisparity)
     convention.aperture_step_mm = ApertureStepMm(grid, camera);
-  // Of the picture, only its size counts here.
+  // Only the size of the picture matters here.
   model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
   empty.values.assign(map.values.size(), 0.0F);
   const model::Scene scene = model::MakeScene(camera, std::move(empty), map, convention, map_name);
@@ -64,7 +64,7 @@ void AddViewsOption(CLI::App* command, ViewsOption* option, const std::string& h
   command->add_option("--views", option->text, help)->type_name("UxV");
 }
 
-// One way; the number of rays is far beyond any memory before.
+// The maximum along one axis; long before it the number of rays exceeds any memory.
 constexpr int kMaxViews = 99;
 
 std::pair<int, int> ViewCounts(const ViewsOption& option) {
@@ -78,7 +78,7 @@ std::pair<int, int> ViewCounts(const ViewsOption& option) {
 }
 
 void AddCropOption(CLI::App* command, CropOption* option) {
-  command->add_option("--crop", option->text, "Take only this rectangle, px")
+  command->add_option("--crop", option->text, "Use only this rectangle, px")
       ->type_name("X,Y,WIDTH,HEIGHT");
 }
 
@@ -87,8 +87,8 @@ std::optional<model::PixelRect> CropRect(const CropOption& option) {
   const std::string form = "x,y,width,height";
   const std::vector<int> px = SplitPixels("--crop", option.text, ',', form);
   if (px.size() != 4 || px[2] < 1 || px[3] < 1) {
-    throw UsageError(
-        fmt::format("--crop: {}, the sizes above 0, is expected, found '{}'", form, option.text));
+    throw UsageError(fmt::format("--crop: {} with width and height above 0 is expected, found '{}'",
+                                 form, option.text));
   }
   return model::PixelRect{px[0], px[1], px[2], px[3]};
 }
@@ -96,12 +96,12 @@ std::optional<model::PixelRect> CropRect(const CropOption& option) {
 void AddReadingOptions(CLI::App* command, ReadingOptions* options) {
   command
       ->add_option("--grid", options->grid,
-                   "Of a folder in the HCI layout: how many views its numbering counts in a row; "
-                   "default: parameters.cfg says it, or the views are a full square")
+                   "For a folder in the HCI layout: views per row in its numbering; default: as in "
+                   "parameters.cfg, or the views form a full square")
       ->check(CLI::Range(1, kMaxGrid))
       ->type_name("N");
-  command->add_flag("--sparse", options->sparse, "Accept a light field with views missing");
-  AddViewsOption(command, &options->views, "Take only the UxV views in the middle");
+  command->add_flag("--sparse", options->sparse, "Accept a light field with missing views");
+  AddViewsOption(command, &options->views, "Use only the UxV views in the middle");
   AddCropOption(command, &options->crop);
 }
 
@@ -116,23 +116,26 @@ io::LightFieldReading ReadingOf(const ReadingOptions& options) {
 
 void AddDepthOptions(CLI::App* command, DepthOptions* options) {
   command
-      ->add_option("--depth-kind", options->kind,
-                   "What the depth map says: z (along the axis), range (along the pixel's ray) or "
-                   "disparity (px per view step, near positive, 0 in the plane of focus)")
+      ->add_option(
+          "--depth-kind", options->kind,
+          "Required. Meaning of the depth map: z (along the axis), range (along the pixel's ray) "
+          "or disparity (px per view step, near positive, 0 in the plane of focus)")
       ->check(CLI::IsMember({"z", "range", "disparity"}))
       ->type_name("KIND");
   command
       ->add_option("--depth-unit", options->unit,
-                   "Of z and range: mm, cm, m, or tum5000 (16-bit PNG, metres times 5000)")
+                   "Unit of z and range: mm, cm, m, or tum5000 (16-bit PNG, metres times 5000)")
       ->check(CLI::IsMember({"mm", "cm", "m", "tum5000"}))
       ->type_name("UNIT");
   command
       ->add_option("--disparity-scale", options->disparity_scale,
-                   "disparity = scale * value + offset")
+                   "Scale of disparities: disparity = scale * value + offset")
       ->check(Finite())
       ->capture_default_str()
       ->type_name("X");
-  command->add_option("--disparity-offset", options->disparity_offset_px, "See --disparity-scale")
+  command
+      ->add_option("--disparity-offset", options->disparity_offset_px,
+                   "Offset of disparities, see --disparity-scale")
       ->check(Finite())
       ->capture_default_str()
       ->type_name("PX");
@@ -141,7 +144,8 @@ void AddDepthOptions(CLI::App* command, DepthOptions* options) {
 model::DepthConvention ConventionOf(const DepthOptions& options) {
   if (options.kind.empty()) {
     throw UsageError(
-        "--depth-kind is missing: z, range or disparity must be given, a depth map does not say it "
+        "--depth-kind is missing: z, range or disparity must be given, a depth map does not state "
+        "it "
         "itself");
   }
   model::DepthConvention convention;
@@ -149,11 +153,12 @@ model::DepthConvention ConventionOf(const DepthOptions& options) {
   if (convention.kind == model::DepthKind::kDisparity) {
     if (!options.unit.empty()) {
       throw UsageError(fmt::format(
-          "--depth-unit {}: a disparity has none, it is px per view step; see --disparity-scale",
+          "--depth-unit {}: a disparity has no unit, it is px per view step; see --disparity-scale",
           options.unit));
     }
     if (options.disparity_scale == 0) {
-      throw UsageError("--disparity-scale: must not be 0, all would lie in the plane of focus");
+      throw UsageError(
+          "--disparity-scale: must not be 0, everything would lie in the plane of focus");
     }
     convention.disparity_scale = options.disparity_scale;
     convention.disparity_offset_px = options.disparity_offset_px;
@@ -165,7 +170,7 @@ model::DepthConvention ConventionOf(const DepthOptions& options) {
   }
   if (options.disparity_scale != 1 || options.disparity_offset_px != 0) {
     throw UsageError(fmt::format(
-        "--disparity-scale and --disparity-offset are for --depth-kind disparity, found {}",
+        "--disparity-scale and --disparity-offset require --depth-kind disparity, found {}",
         options.kind));
   }
   convention.unit_mm = model::DepthUnitMm(options.unit);
@@ -175,7 +180,7 @@ model::DepthConvention ConventionOf(const DepthOptions& options) {
 void AddApertureShapeOption(CLI::App* command, std::string* text) {
   command
       ->add_option("--aperture-shape", *text,
-                   "How the aperture weighs the views: uniform, gaussian or disc")
+                   "Transmission of the aperture over the views: uniform, gaussian or disc")
       ->check(CLI::IsMember({"uniform", "gaussian", "disc"}))
       ->type_name("SHAPE");
 }
@@ -197,9 +202,9 @@ void AddDeviceOption(CLI::App* command, std::string* text) {
       },
       "");
   command
-      ->add_option("--device", *text,
-                   "Where the kernels run: auto, cpu, opencl, opencl:PLATFORM or "
-                   "opencl:PLATFORM:DEVICE")
+      ->add_option(
+          "--device", *text,
+          "Device that computes: auto, cpu, opencl, opencl:PLATFORM or opencl:PLATFORM:DEVICE")
       ->check(is_device)
       ->capture_default_str()
       ->type_name("DEVICE");
@@ -212,10 +217,10 @@ PreparedDepth PrepareDepth(const model::RawDepthMap& map, const std::string& map
   RequireSize(map, map_name, picture);
   if (camera != nullptr) return PrepareByCamera(map, map_name, convention, picture, *camera, *grid);
   if (convention.kind != model::DepthKind::kDisparity) {
-    throw UsageError(fmt::format(
-        "--depth-kind {}: millimetres need a camera (--camera CAMERA.yaml); without one the map "
-        "must be a disparity",
-        options.kind));
+    throw UsageError(
+        fmt::format("--depth-kind {}: millimetres need a camera (--camera CAMERA.yaml); without a "
+                    "camera the map must be a disparity",
+                    options.kind));
   }
   PreparedDepth prepared;
   prepared.disparity = NamingTheFile(map_name, [&] {

@@ -16,12 +16,12 @@ std::string MissingTolerancesLine(const model::Camera& camera) {
   const bool pitch = is_missing("sensor.pixel_pitch_mm");
   if (!focal_length && !pitch) return "";
   std::string effect;
-  if (focal_length) effect = "d1 moves about 1 % for each 1 % of the focal length";
+  if (focal_length) effect = "d1 changes by about 1 % for each 1 % of the focal length";
   if (pitch)
     effect += focal_length ? ", kappa about 1 % for each 1 % of the pixel pitch"
-                           : "kappa moves about 1 % for each 1 % of the pixel pitch";
+                           : "kappa changes by about 1 % for each 1 % of the pixel pitch";
   return fmt::format(
-      "no tolerance is stated for the {}: the intervals take {} as exact, but {}; give {{value: "
+      "no tolerance is stated for the {}: the intervals treat {} as exact, but {}; give {{value: "
       ".., tolerance: ..}} in the camera file",
       focal_length && pitch ? "focal lengths and the pixel pitch"
       : focal_length        ? "focal lengths"

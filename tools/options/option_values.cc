@@ -23,7 +23,7 @@ std::optional<double> FiniteNumber(const std::string& text) {
   return value;
 }
 
-// CLI11 puts the option's name in front of what is returned; empty: fine.
+// CLI11 puts the option's name in front of the returned text; an empty text means valid.
 template <typename Condition>
 CLI::Validator NumberThat(const std::string& must, Condition condition) {
   return CLI::Validator(

@@ -15,7 +15,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Of the views' places along one axis, in view steps squared.
+// Returns the variance of the views' places along one axis, in view steps squared.
 double VarianceOf(const Eigen::ArrayXd& weights) {
   const Eigen::ArrayXd places =
       Eigen::ArrayXd::LinSpaced(weights.size(), 0, static_cast<double>(weights.size() - 1));
@@ -23,13 +23,14 @@ double VarianceOf(const Eigen::ArrayXd& weights) {
   return (weights * (places - mean).square()).sum();
 }
 
-// Seconds that the files of all views take: those of a part of one, which is the photograph half a
-// pixel farther to the right, because views lie between the photograph's pixels.
+// Returns the seconds for the files of all views. They are extrapolated from a part of one view,
+// for which the photograph is shifted by half a pixel, because views lie between the photograph's
+// pixels.
 double FileSeconds(const estimator::EstimateInput& input) {
   constexpr double kMostPixels = 1 << 16;
   constexpr int kRuns = 3, kBits = 16;
   const model::LinearPicture& picture = input.picture;
-  // Others have no such files, and the law does not know theirs.
+  // Pictures with other channels have no such files, and the model of the time does not cover them.
   if (picture.channels != 1 && picture.channels != 3) return 0;
   const int rows =
       std::clamp(static_cast<int>(kMostPixels / picture.width_px), 1, picture.height_px);
@@ -59,8 +60,8 @@ PictureLoad PictureLoadOf(const estimator::EstimateInput& input) {
     square_sum += static_cast<double>(disparity) * static_cast<double>(disparity);
   }
   const auto pixels = static_cast<double>(map.disparity.size());
-  // A point lands in the view (a, b) at its disparity times the view's place; the views' weights
-  // spread it in x and in y.
+  // A point lands in the view (a, b) at its disparity times the view's place; the weights of the
+  // views determine its spread in x and in y.
   const double spread_x = VarianceOf(input.weights.colwise().sum().transpose());
   const double spread_y = VarianceOf(input.weights.rowwise().sum());
   const double per_disparity =

@@ -11,7 +11,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Of the best plan's gain over warping.
+// The shares of the best plan's gain over warping.
 constexpr double kDraftShare = 0.5, kStandardShare = 0.9;
 
 struct Offer {
@@ -32,7 +32,7 @@ std::string OfferText(const Offer& offer) {
 [[noreturn]] void Refuse(const PlanWish& wish, const EstimateProfile& profile,
                          const std::string& nearest) {
   throw Error(
-      fmt::format("{} cannot be met by what {} knows: {}", wish.Text(), profile.from, nearest));
+      fmt::format("{} cannot be met by any plan of {}: {}", wish.Text(), profile.from, nearest));
 }
 
 Offer Choose(const EstimateProfile& profile, const PlanWish& wish,
@@ -58,17 +58,18 @@ Offer Choose(const EstimateProfile& profile, const PlanWish& wish,
   if (soon.empty()) {
     const Offer fastest = *std::min_element(offers.begin(), offers.end(), IsFaster);
     Refuse(wish, profile,
-           fmt::format("the fastest is {}; fewer --views or a smaller picture (--crop) take less",
-                       OfferText(fastest)));
+           fmt::format(
+               "the fastest plan is {}; fewer --views or a smaller picture (--crop) take less time",
+               OfferText(fastest)));
   }
   const Offer best = *std::min_element(soon.begin(), soon.end(), IsBetter);
   if (!wish.psnr_loss_db) return best;
   Refuse(wish, profile,
-         fmt::format("in that time the best is {}; the fastest that is as good is {}",
+         fmt::format("in that time the best plan is {}; the fastest plan of that quality is {}",
                      OfferText(best), OfferText(fastest_with_loss(*wish.psnr_loss_db))));
 }
 
-// Where the law speaks of what was never measured.
+// Lists in which respects the prediction extrapolates far beyond the measurements.
 std::vector<std::string> BeyondProfile(const EstimateProfile& profile, const PictureLoad& load) {
   constexpr double kFar = 2;
   std::vector<std::string> beyond;
@@ -89,7 +90,7 @@ std::vector<std::string> BeyondProfile(const EstimateProfile& profile, const Pic
 PlanChoice ChoosePlan(const EstimateProfile& profile, const PlanWish& wish, const PictureLoad& load,
                       double speed_ratio, double spent_seconds) {
   std::vector<Offer> offers;
-  // The files' time is of this machine already.
+  // The time for the files was measured on this machine.
   PictureLoad there = load;
   there.file_seconds /= speed_ratio;
   for (const PlanProfile& plan : profile.plans) {
@@ -107,17 +108,17 @@ PlanChoice ChoosePlan(const EstimateProfile& profile, const PlanWish& wish, cons
   choice.message = fmt::format("{}: {}, about {:.2g} s (+- {:.0f} %)", wish.Text(),
                                PlanName(choice.plan), chosen.seconds, 100 * choice.median_error);
   if (chosen.plan == best.plan) {
-    choice.message += "; the best it knows";
+    choice.message += "; the best of its plans";
   } else if (chosen.loss_db < 0.005) {
     choice.message +=
         fmt::format("; as good as {} ({:.2g} s)", PlanName(best.plan->plan), best.seconds);
   } else {
-    choice.message += fmt::format("; gives up {:.2f} dB of {} ({:.2g} s)", chosen.loss_db,
+    choice.message += fmt::format("; {:.2f} dB below {} ({:.2g} s)", chosen.loss_db,
                                   PlanName(best.plan->plan), best.seconds);
   }
-  choice.message += "; by " + profile.from;
+  choice.message += "; from " + profile.from;
   if (speed_ratio != 1) {
-    choice.message += fmt::format(", times {:.2g} by a probe: roughly", speed_ratio);
+    choice.message += fmt::format(", scaled by {:.2g} after a speed test (rough)", speed_ratio);
   }
   for (const std::string& beyond : BeyondProfile(profile, load)) choice.message += ", " + beyond;
   return choice;

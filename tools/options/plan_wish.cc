@@ -9,7 +9,7 @@
 namespace thicklens::tools {
 namespace {
 
-// A number of at least 0 with its unit, which may be left out.
+// Parses a number of at least 0 with its unit, which may be left out.
 std::optional<double> NumberWithUnit(const std::string& text, const std::string& unit) {
   double value = 0;
   const char* end = text.data() + text.size();
@@ -51,20 +51,19 @@ void AddPlanWishOptions(CLI::App* command, PlanWish* wish) {
   CLI::Option* quality =
       command
           ->add_option("--quality", wish->quality,
-                       "In place of a solver. draft: the fastest way that gains half of what the "
-                       "best one does over warping; standard: nine tenths; best")
+                       "Choose the solver by quality. draft: the fastest plan with half of the "
+                       "gain of the best plan over warping; standard: nine tenths; best")
           ->check(CLI::IsMember({"draft", "standard", "best"}))
           ->type_name("NAME");
-  CLI::Option* within = AddNumberWithUnit(
-      command, "--within", "s", "2s",
-      "In place of a solver: the best that is expected to be done in that time, reading and "
-      "writing included",
-      &wish->within_s);
-  CLI::Option* loss = AddNumberWithUnit(
-      command, "--psnr-loss", "dB", "0.1dB",
-      "In place of a solver: the fastest that is expected to lose no more against the best one; "
-      "with --within both",
-      &wish->psnr_loss_db);
+  CLI::Option* within = AddNumberWithUnit(command, "--within", "s", "2s",
+                                          "Choose the most accurate solver that is expected to "
+                                          "finish in that time, including reading and writing",
+                                          &wish->within_s);
+  CLI::Option* loss =
+      AddNumberWithUnit(command, "--psnr-loss", "dB", "0.1dB",
+                        "Choose the fastest solver that is expected to lose no more PSNR than this "
+                        "against the best one; can be combined with --within",
+                        &wish->psnr_loss_db);
   quality->excludes(within)->excludes(loss);
   for (const char* chosen : {"--solver", "--prior", "--strength", "--check-blur", "--tolerance",
                              "--max-iterations", "--double", "--gamma", "--ridge", "--block-solver",

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The file that a name leads to, links followed; none: there is nothing.
+// Identifies the file that a path leads to, following links; none if there is nothing.
 using FileIdentity = std::optional<std::pair<dev_t, ino_t>>;
 FileIdentity IdentityOf(const std::string& path) {
   struct stat info {};
@@ -26,16 +26,16 @@ FileIdentity IdentityOf(const std::string& path) {
   return std::pair(info.st_dev, info.st_ino);
 }
 
-// The whole path, links followed as far as it exists, without a slash at its end. A link to a file
-// that is still to be made is followed too.
+// Returns the whole path without a slash at its end, following links as far as the path exists,
+// including a link to a file that does not exist yet.
 fs::path ResolvedPath(const std::string& path) {
-  constexpr int kMaxLinks = 40;  // as the system allows
+  constexpr int kMaxLinks = 40;  // the limit of the system
   std::error_code failure;
   fs::path named = fs::absolute(path);
   for (int i = 0; i < kMaxLinks && fs::is_symlink(named, failure); ++i) {
     const fs::path target = fs::read_symlink(named, failure);
     if (failure) break;
-    named = named.parent_path() / target;  // `target` alone where it is absolute
+    named = named.parent_path() / target;  // only `target` if it is absolute
   }
   fs::path resolved = fs::weakly_canonical(named, failure);
   if (failure) resolved = named.lexically_normal();
@@ -46,7 +46,7 @@ struct RunOutput {
   std::string path;
   fs::path resolved;
   FileIdentity identity;
-  bool is_folder = false;  // that is there
+  bool is_folder = false;  // an existing folder
 };
 
 bool IsSame(const RunOutput& output, const std::string& path) {
@@ -54,8 +54,8 @@ bool IsSame(const RunOutput& output, const std::string& path) {
   return ResolvedPath(path) == output.resolved;
 }
 
-// Whether one of the folders that lead to `inner` is that one. By what the folders are, so that two
-// mounts of one folder are one.
+// Returns whether `folder` is one of the folders that lead to `inner`. The folders are compared by
+// identity, so that two mounts of one folder count as one.
 bool LeadsThrough(const fs::path& inner, const FileIdentity& folder) {
   if (!folder) return false;
   for (fs::path at = inner; at.has_relative_path();) {
@@ -65,7 +65,7 @@ bool LeadsThrough(const fs::path& inner, const FileIdentity& folder) {
   return false;
 }
 
-// Every file in it is part of the light field or belongs beside it, not into it.
+// A light field owns every file in its folder; other files belong beside the folder, not into it.
 bool IsLightField(const std::string& folder) {
   std::error_code failure;
   if (!fs::is_directory(folder, failure)) return false;
@@ -102,7 +102,7 @@ class RunFiles {
                        [&](const RunOutput& output) { return output.path == path; });
   }
 
-  // Called from any thread.
+  // May be called from any thread.
   void RequireNoOutput(const std::string& input) {
     if (input.empty()) return;
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -113,7 +113,7 @@ class RunFiles {
                  : fmt::format("{}: the input {} would be overwritten; choose another name",
                                output.path, input));
     }
-    // Frames and views lie in one folder by the thousand; a link may lead anywhere.
+    // Thousands of frames and views may lie in one folder; a link may lead anywhere.
     std::error_code ignored;
     const std::string folder = fs::path(input).parent_path().string();
     const bool is_link = fs::is_symlink(input, ignored);
@@ -134,8 +134,7 @@ class RunFiles {
     for (const RunOutput& output : outputs_) {
       if (!LeadsThrough(output.resolved, folder)) continue;
       Refuse(
-          fmt::format("{}: lies in the light field {}, which is an input; choose a name outside of "
-                      "it",
+          fmt::format("{}: lies in the light field {}, which is an input; choose a name outside it",
                       output.path, light_field));
     }
   }
@@ -153,10 +152,9 @@ class RunFiles {
 
   static void RequireBeside(const RunOutput& inner, const RunOutput& outer) {
     if (!outer.is_folder || !LeadsThrough(inner.resolved, outer.identity)) return;
-    throw UsageError(
-        fmt::format("{}: lies in the output folder {}, which is replaced as a whole; choose a name "
-                    "outside of it",
-                    inner.path, outer.path));
+    throw UsageError(fmt::format(
+        "{}: lies in the output folder {}, which is replaced as a whole; choose a name outside it",
+        inner.path, outer.path));
   }
 
   std::mutex mutex_;
@@ -165,7 +163,7 @@ class RunFiles {
   std::set<std::string> in_no_output_;  // folders of inputs
 };
 
-// One: a process runs one command.
+// There is only one: a process runs one command.
 RunFiles& FilesOfThisRun() {
   static RunFiles files;
   return files;

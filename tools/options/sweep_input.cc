@@ -24,13 +24,13 @@ constexpr char kSweepName[] = "sweep.yaml";
 constexpr char kTruthName[] = "truth.yaml";
 constexpr char kUnknown[] = "unknown";
 
-// The file that describes the sweep; empty for a folder with a table of readings.
+// Returns the file that describes the sweep; empty for a folder with a table of readings.
 std::string SweepYamlOf(const SweepArguments& arguments) {
   std::error_code failure;
   if (!fs::is_directory(arguments.input, failure)) {
     if (!arguments.readings_csv.empty()) {
-      throw UsageError(
-          fmt::format("--readings goes with a folder of frames; {} is none", arguments.input));
+      throw UsageError(fmt::format("--readings requires a folder of frames; {} is not a folder",
+                                   arguments.input));
     }
     return arguments.input;
   }
@@ -62,7 +62,7 @@ model::SweepFile ReadFile(const SweepArguments& arguments, std::vector<std::stri
 void TakeOffset(const SweepArguments& arguments, model::SweepFile* file) {
   if (arguments.offset_mm == kUnknown) {
     if (arguments.offset_sigma_mm)
-      throw UsageError("--offset-sigma-mm: an unknown offset has no sigma");
+      throw UsageError("--offset-sigma-mm: an unknown offset has no standard deviation");
     file->offset_mm.reset();
     return;
   }
@@ -111,7 +111,7 @@ void TakeRoi(const std::string& text, model::SweepFile* file) {
   file->roi = {px[0], px[1], px[2], px[3]};
 }
 
-// Direction and target have been checked to be one of the names when the command line was read.
+// Direction and target were checked against their lists of names when the command line was read.
 void TakeArguments(const SweepArguments& arguments, model::SweepFile* file) {
   TakeOffset(arguments, file);
   TakeFloor(arguments, file);
@@ -135,21 +135,21 @@ bool IsJpeg(const std::string& path) {
   return ending == ".jpg" || ending == ".jpeg";
 }
 
-// What compression leaves out looks like blur, and no fit of the frames alone can tell one from the
-// other: on a simulated sweep of 1 px of blur, quality 90 moves kappa by 1 %.
+// Compression removes fine detail, which looks like blur, and a fit of the frames alone cannot
+// separate the two: on a simulated sweep with 1 px of blur, quality 90 changes kappa by 1 %.
 void NoteCompression(const std::vector<model::SweepFrame>& frames,
                      std::vector<std::string>* notices) {
   const auto jpegs = std::count_if(frames.begin(), frames.end(),
                                    [](const auto& frame) { return IsJpeg(frame.image); });
   if (jpegs == 0) return;
-  notices->push_back(fmt::format(
-      "{} of {} frames are JPEG files: compression takes fine detail away as blur does, "
-      "and the errors given do not hold what that does to zf and kappa (about 1 % of "
-      "kappa at quality 90 and 1 px of blur); use PNG or TIFF for the last per cent",
-      jpegs, frames.size()));
+  notices->push_back(
+      fmt::format("{} of {} frames are JPEG files: compression removes fine detail as blur does, "
+                  "and the stated errors do not include its effect on zf and kappa (about 1 % of "
+                  "kappa at quality 90 and 1 px of blur); use PNG or TIFF if 1 % matters",
+                  jpegs, frames.size()));
 }
 
-// A file that merely happens to be called truth.yaml shall not stop a calibration.
+// A file that merely happens to be called truth.yaml must not stop a calibration.
 std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
                                            const std::string& sweep_yaml,
                                            std::vector<std::string>* notices) {
@@ -158,7 +158,7 @@ std::optional<model::SweepTruth> ReadTruth(const SweepArguments& arguments,
   const fs::path beside = fs::path(sweep_yaml).parent_path() / kTruthName;
   std::error_code failure;
   if (!fs::is_regular_file(beside, failure)) return std::nullopt;
-  // Also where it is not used: it belongs to the sweep.
+  // The file is reported even if it is not used: it belongs to the sweep.
   TellInput(beside.string());
   try {
     return model::ReadSweepTruth(beside.string());
@@ -178,7 +178,7 @@ SweepInput ReadSweepInput(const SweepArguments& arguments) {
   SweepInput input;
   input.file = ReadFile(arguments, &input.notices);
   TakeArguments(arguments, &input.file);
-  // The file did not state it, but the command line does.
+  // The file does not state it, but the command line does.
   if (input.file.reading_sigma_stated) {
     input.notices.erase(std::remove_if(input.notices.begin(), input.notices.end(),
                                        [](const std::string& notice) {
@@ -190,7 +190,7 @@ SweepInput ReadSweepInput(const SweepArguments& arguments) {
   NoteCompression(input.file.frames, &input.notices);
   input.truth = ReadTruth(arguments, SweepYamlOf(arguments), &input.notices);
   input.sweep = calib::MakeFocusSweep(input.file, model::ReadCamera(input.file.camera_path));
-  if (!input.truth) {  // a simulated camera's numbers are exact
+  if (!input.truth) {  // the parameters of a simulated camera are exact
     const std::string missing = MissingTolerancesLine(input.sweep.camera);
     if (!missing.empty()) input.notices.push_back(missing);
   }

@@ -13,7 +13,7 @@
 namespace thicklens::tools {
 namespace {
 
-// What the parts of a run can depend on.
+// The terms that the parts of a run can depend on.
 constexpr std::array kSetupTerms = {TimeLaw::kStart,       TimeLaw::kViews,
                                     TimeLaw::kPixels,      TimeLaw::kPixelsChannels,
                                     TimeLaw::kPixelsViews, TimeLaw::kPixelsViewsBlur};
@@ -52,7 +52,7 @@ TimeLaw::Terms TermsOf(const PictureLoad& load) {
   return terms;
 }
 
-// A part of the time of some pictures, and the whole that its errors count against.
+// A part of the time for some pictures, with the whole time that its errors are relative to.
 struct PartOfTime {
   std::vector<PictureLoad> loads;
   std::vector<double> part, whole;
@@ -64,8 +64,8 @@ struct PartOfTime {
   }
 };
 
-// The best that is nowhere negative is the plain best of the terms that it uses: few terms, so all
-// choices of them are tried.
+// The best fit without negative coefficients equals the unconstrained fit of the terms that it
+// uses: there are few terms, so all subsets of them are tried.
 template <std::size_t N>
 TimeLaw::Terms FitPart(const PartOfTime& time, const std::array<TimeLaw::Term, N>& allowed) {
   const auto count = static_cast<Eigen::Index>(time.loads.size());
@@ -107,18 +107,19 @@ double RestSeconds(const TimedLoad& load) {
 void CheckTimes(const TimesOfPlans& plans) {
   for (const std::vector<TimedLoad>& plan : plans) {
     if (plan.size() < 2 || plan.size() != plans.front().size()) {
-      throw Error(fmt::format(
-          "laws of the time need the same pictures for each plan, two at least; there are {} and "
-          "{}",
-          plans.front().size(), plan.size()));
+      throw Error(
+          fmt::format("models of the run time need the same pictures for each plan, at least two; "
+                      "there are {} and "
+                      "{}",
+                      plans.front().size(), plan.size()));
     }
     for (const TimedLoad& load : plan) {
       const auto [read, setup, solve, files] = load.parts;
       if (!(load.seconds > 0) || !(read >= 0) || !(setup >= 0) || !(solve >= 0) || !(files >= 0) ||
           !(RestSeconds(load) >= 0)) {
         throw Error(
-            fmt::format("a law of the time needs times above 0, and parts of them, found {} s "
-                        "(read), {} s (setup), {} s (solve) and {} s (files) of {} s",
+            fmt::format("a model of the run time needs times above 0, and parts of them, found {} "
+                        "s (read), {} s (setup), {} s (solve) and {} s (files) of {} s",
                         read, setup, solve, files, load.seconds));
       }
     }

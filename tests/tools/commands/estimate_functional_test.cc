@@ -175,12 +175,13 @@ TEST_P(EstimateFunctionalTest, OptionsOfOthersAreAUsageError) {
                                                            {"--splat", "bilinear"}}) {
     EXPECT_THAT(
         Refusal(With(Usual(), of_blocks), 2),
-        HasSubstr(of_blocks.front() + " is of --solver blocks, the solver is " + GetParam()));
+        HasSubstr(of_blocks.front() + " requires --solver blocks, the solver is " + GetParam()));
   }
   for (const Arguments& of_scene :
        std::vector<Arguments>{{"--prior", "tv"}, {"--strength", "auto"}}) {
-    EXPECT_THAT(Refusal(With(Usual(), of_scene), 2),
-                HasSubstr(of_scene.front() + " is of --solver scene, the solver is " + GetParam()));
+    EXPECT_THAT(
+        Refusal(With(Usual(), of_scene), 2),
+        HasSubstr(of_scene.front() + " requires --solver scene, the solver is " + GetParam()));
   }
   EXPECT_THAT(Refusal(With(Usual(), {"--device", "opencl:0"}), 2),
               AllOf(HasSubstr("opencl:0"), HasSubstr(GetParam())));

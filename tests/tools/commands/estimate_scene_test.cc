@@ -255,14 +255,14 @@ TEST_F(EstimateSceneTest, OptionsOfBlocksAreAUsageError) {
   for (const Arguments& smooth : std::vector<Arguments>{{"--gamma", "1"}, {"--ridge", "0.1"}}) {
     EXPECT_THAT(Refusal(With(Usual(), smooth), 2),
                 HasSubstr(smooth.front() +
-                          " is of --solver blocks, functional or grid, the solver is scene"));
+                          " requires --solver blocks, functional or grid, the solver is scene"));
   }
   for (const Arguments& of_blocks : std::vector<Arguments>{{"--block-solver", "eigen"},
                                                            {"--block-px", "16"},
                                                            {"--stencil", "warp"},
                                                            {"--splat", "bilinear"}}) {
     EXPECT_THAT(Refusal(With(Usual(), of_blocks), 2),
-                HasSubstr(of_blocks.front() + " is of --solver blocks, the solver is scene"));
+                HasSubstr(of_blocks.front() + " requires --solver blocks, the solver is scene"));
   }
 }
 
@@ -292,7 +292,7 @@ TEST_F(EstimateSceneTest, SettingsThatCannotBe) {
 
 // Never linear by accident, and never silently.
 TEST_F(EstimateSceneTest, TheTransferCurve) {
-  const std::string assumed = "stored values are taken as sRGB (--transfer)";
+  const std::string assumed = "stored values are assumed to be sRGB (--transfer)";
   ProgramResult result;
   json summary = Summary(Usual(), &result);
   EXPECT_THAT(result.err, HasSubstr(assumed));
@@ -573,7 +573,7 @@ TEST_F(EstimateSceneTest, ChecksTheBlurWhereItIsAskedTo) {
   fs::remove_all(Output());
   for (const std::string solver : {"blocks", "functional", "grid"}) {
     EXPECT_THAT(Refusal(With(sharp, {"--check-blur", "--solver", solver}), 2),
-                HasSubstr("--check-blur is of --solver scene"));
+                HasSubstr("--check-blur requires --solver scene"));
   }
 }
 

@@ -215,7 +215,7 @@ TEST_F(EstimateTest, OneViewAcrossIsReportedAndOneViewInAllIsRefused) {
   EXPECT_THAT(result.err, HasSubstr("one view along u"));
   fs::remove_all(Output());
   EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "1x1"}),
-              HasSubstr("1x1 is no light field"));
+              HasSubstr("1x1 is not a light field"));
 }
 
 TEST_F(EstimateTest, BlocksLargerThanThePictureAndTheSourcesStencil) {
@@ -293,19 +293,19 @@ TEST_F(EstimateTest, NothingThatIsGivenIsLeftOutWithoutAWord) {
   const Arguments relative = AsDisparity(Picture(), Disparity());
   EXPECT_THAT(Refusal(With(relative, {"--st-depth-mm", "700"}), 2), HasSubstr("--camera"));
   EXPECT_THAT(Refusal(With(relative, {"--block-solver", "viennacl"}), 2),
-              HasSubstr("--device cpu is not for"));
+              HasSubstr("--device cpu cannot be used with"));
   EXPECT_THAT(Refusal(With(relative, {"--sparse"}), 2), HasSubstr("--aperture-of"));
   EXPECT_THAT(Refusal(With(relative, {"--grid", "9"}), 2), HasSubstr("--aperture-of"));
   EXPECT_THAT(Refusal(With(relative, {"--ignore-exif"}), 2), HasSubstr("--camera"));
   for (const Arguments& of_scene :
        std::vector<Arguments>{{"--prior", "tv"}, {"--strength", "auto"}}) {
     EXPECT_THAT(Refusal(With(relative, of_scene), 2),
-                HasSubstr(of_scene.front() + " is of --solver scene, the solver is blocks"));
+                HasSubstr(of_scene.front() + " requires --solver scene, the solver is blocks"));
   }
   for (const Arguments& iterative :
        std::vector<Arguments>{{"--tolerance", "1e-3"}, {"--max-iterations", "9"}, {"--double"}}) {
     EXPECT_THAT(Refusal(With(relative, iterative), 2),
-                HasSubstr(iterative.front() + " is of --solver scene, functional or grid"));
+                HasSubstr(iterative.front() + " requires --solver scene, functional or grid"));
   }
   EXPECT_THAT(Refusal({Picture(), Disparity(), "--depth-kind", "disparity", "--views", "100x3"}, 2),
               HasSubstr("from 1 to 99"));
@@ -412,7 +412,7 @@ TEST_F(EstimateTest, IterationsOfTheBlocksAreReported) {
   EXPECT_THAT(Refusal(With(AsDisparity(Picture(), Disparity()),
                            {"--block-solver", "eigen", "--tolerance", "1e-3"}),
                       2),
-              HasSubstr("--tolerance is of --solver"));
+              HasSubstr("--tolerance requires --solver"));
 }
 
 TEST_F(EstimateTest, AnInterruptLeavesNothing) {

@@ -140,7 +140,7 @@ TEST_F(SimulateSceneTest, EffectsAreChosenAndReported) {
 
   const ProgramResult foreign = Run({"picture", config, "-o", folder_ / "c", "--effects", "tilt"});
   EXPECT_EQ(foreign.exit_code, 2);
-  EXPECT_THAT(foreign.err, HasSubstr("--effects: effect tilt is not one of those there are here"));
+  EXPECT_THAT(foreign.err, HasSubstr("--effects: effect tilt is not available here"));
   EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--without", "bokeh"}).exit_code, 2);
   EXPECT_EQ(Run({"picture", config, "-o", folder_ / "c", "--tolerance", "1"}).exit_code, 2);
 }

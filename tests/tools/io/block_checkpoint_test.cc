@@ -348,7 +348,7 @@ TEST_F(ResumedEstimate, RefusesWhatIsOfAnotherEstimateAndLeavesItAlone) {
       Run({"estimate", folder_ / "picture.png", folder_ / "depth.pfm", "--depth-kind", "disparity",
            "--checkpoint", Checkpoint(), "-o", folder_ / "lf"});
   EXPECT_EQ(scene.exit_code, 2);
-  EXPECT_THAT(scene.err, HasSubstr("--checkpoint is of --solver blocks"));
+  EXPECT_THAT(scene.err, HasSubstr("--checkpoint requires --solver blocks"));
   const ProgramResult none = Run(Estimate("lf", {"--checkpoint", ""}));
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("a file's name is expected"));

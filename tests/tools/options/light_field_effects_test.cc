@@ -85,7 +85,7 @@ TEST(LightFieldEffectsTest, WithoutACameraNothingIsKnownOfTheirImpact) {
   EXPECT_THAT(UsageErrorOf([&] { Decided(tolerance, std::nullopt); }),
               HasSubstr("--effect-tolerance"));
   EXPECT_THAT(UsageErrorOf([] { Decided(Without("falloff"), std::nullopt); }),
-              HasSubstr("--without: effect falloff is not one of those there are here"));
+              HasSubstr("--without: effect falloff is not available here"));
 }
 
 // What auto leaves out is within the tolerance as it is told, too: there each is alone without,
@@ -113,7 +113,7 @@ TEST(LightFieldEffectsTest, AnEstimateRefusesToLeaveOutWhatItIsAbout) {
   EXPECT_THAT(UsageErrorOf([] { Decided(Without("occlusion"), std::nullopt); }),
               HasSubstr("occlusion cannot be left out"));
   EXPECT_THAT(UsageErrorOf([] { Decided(Without("shot-noise"), ThickCamera(0.2)); }),
-              HasSubstr("--without: effect shot-noise is not one of"));
+              HasSubstr("--without: effect shot-noise is not available here"));
   EXPECT_THAT(UsageErrorOf([] { Decided(Without("bokeh"), ThickCamera(0.2)); }),
               HasSubstr("\"bokeh\""));
   EstimateOptions options;

@@ -117,12 +117,13 @@ TEST(ChoosePlan, SaysInOneLineWhatItCostsAndGivesUp) {
   EXPECT_DOUBLE_EQ(choice.expected_seconds, 8);
   EXPECT_NEAR(choice.loss_db, 0.8, 1e-9);
   EXPECT_EQ(choice.message,
-            "--quality standard: scene tv, about 8 s (+- 10 %); gives up 0.80 dB of scene patches "
-            "(16 s); by a test's profile, times 2 by a probe: roughly");
+            "--quality standard: scene tv, about 8 s (+- 10 %); 0.80 dB below scene patches "
+            "(16 s); from a test's profile, scaled by 2 after a speed test (rough)");
   const PlanChoice best = ChoosePlan(SomeProfile(), Quality("best"), kLoad, 1);
-  EXPECT_EQ(best.message,
-            "--quality best: scene patches, about 8 s (+- 10 %); the best it knows; by a test's "
-            "profile");
+  EXPECT_EQ(
+      best.message,
+      "--quality best: scene patches, about 8 s (+- 10 %); the best of its plans; from a test's "
+      "profile");
   PictureLoad large = kLoad;
   large.megapixels = 12;
   large.blur_sigma_px = 7;
@@ -178,7 +179,7 @@ TEST(Profile, IsLookedForWhereAPersonsSettingsAre) {
       ProfileFor("");
       ADD_FAILURE() << "no refusal";
     } catch (const Error& error) {
-      EXPECT_THAT(error.what(), AllOf(HasSubstr("measure it anew"), HasSubstr("delete it")));
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("measure it again"), HasSubstr("delete it")));
     }
   }
   const Environment config("XDG_CONFIG_HOME", nullptr);
@@ -336,7 +337,7 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
   EXPECT_THAT(with("/plans/0/plan/device", "gpu"), HasSubstr("device: cpu or opencl"));
   EXPECT_THAT(with("/largest/views", "many"), HasSubstr("largest: views: a whole number"));
   EXPECT_THAT(with("/plans/0/plan/tolerance", 7), HasSubstr("plans[0]: "));
-  EXPECT_THAT(with("/plans/0/plan/block_px", 7), HasSubstr("--block-px is of --solver blocks"));
+  EXPECT_THAT(with("/plans/0/plan/block_px", 7), HasSubstr("--block-px requires --solver blocks"));
   json lacking = good;
   lacking["plans"][2].erase("psnr_db");
   EXPECT_THAT(refusal(lacking), HasSubstr("plans[2]: 'psnr_db' is missing"));
