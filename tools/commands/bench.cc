@@ -1,4 +1,4 @@
-// thicklens bench: what the solvers cost on this machine, and what they give for it.
+// thicklens bench: the run time and the accuracy of the solvers on this machine.
 #include <fmt/format.h>
 
 #include <cstddef>
@@ -38,7 +38,7 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr int kSamplePx = 64;  // edge of the part that blocks are measured on
+constexpr int kSamplePx = 64;  // edge of the part on which blocks are measured
 
 struct BenchOptions {
   CommonOptions common;
@@ -81,7 +81,8 @@ std::vector<Contender> Contenders(int threads, kernels::Backend* backend) {
   return contenders;
 }
 
-// The picture, and the part in its middle that blocks solve, and all are judged on.
+// Returns the picture, and the part in its middle that the blocks solve and on which all solvers
+// are judged.
 SampledPicture WithPartInTheMiddle(BenchScene whole, bool full) {
   SampledPicture picture;
   picture.whole = std::move(whole);
@@ -114,7 +115,7 @@ void JudgeSolver(const SampledPicture& picture, const model::LightField& estimat
   if (is_whole) row->psnr_whole_db = PsnrOfWholeDb(picture.whole, estimate, threads);
 }
 
-// A first run of each solver, on the part, is not counted.
+// The first run of each solver, on the part, is not counted.
 void Measure(const BenchOptions& options, const SampledPicture& picture, int threads,
              std::vector<Contender>* contenders) {
   ProgressLine progress("measuring", options.common.quiet);
@@ -184,7 +185,7 @@ CommandResult BenchSolvers(const BenchOptions& options) {
 
 void AddBenchCommand(CLI::App* program, CommandAction* action) {
   CLI::App* bench =
-      program->add_subcommand("bench", "What accuracy costs in time, on this machine");
+      program->add_subcommand("bench", "Benchmarks: accuracy against run time on this machine");
   bench->require_subcommand(1);
   AddBenchAccuracyCommand(bench, action);
   AddBenchSourceCommand(bench, action);
@@ -195,12 +196,12 @@ void AddBenchCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
       "solvers", "All light-field solvers on one simulated picture, in one run");
   const auto options = std::make_shared<BenchOptions>();
-  command->add_option("--size", options->size, "Of the picture, px")
+  command->add_option("--size", options->size, "Size of the picture, px")
       ->capture_default_str()
       ->type_name("WIDTHxHEIGHT");
-  AddViewsOption(command, &options->views, "Views across and down; default 7x7");
+  AddViewsOption(command, &options->views, "Number of views across and down; default 7x7");
   AddRepeatOption(command, &options->repeat);
-  command->add_flag("--full", options->full, "Blocks of the whole picture, not of a sample");
+  command->add_flag("--full", options->full, "Solve all blocks of the picture, not a sample");
   AddSeedOption(command, &options->seed);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {

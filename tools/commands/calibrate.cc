@@ -1,4 +1,4 @@
-// thicklens calibrate: from a focus sweep to a camera that knows its image distance and blur.
+// thicklens calibrate: from a focus sweep to a camera with its image distance and blur.
 #include "thicklens/calib/calibrate.h"
 
 #include <fmt/format.h>
@@ -54,7 +54,7 @@ struct CalibrateOptions {
   }
 };
 
-// The sign by which a folder of figures is known as ours.
+// A folder with this file was written by this program.
 constexpr char kCaptions[] = "captions.txt";
 
 std::vector<std::string> OwnFigureFiles() {
@@ -63,7 +63,7 @@ std::vector<std::string> OwnFigureFiles() {
   return names;
 }
 
-// Claimed before anything is measured, so that an output that cannot be is told at once.
+// Outputs are claimed before anything is measured, so that an invalid output is reported at once.
 struct Outputs {
   explicit Outputs(const CalibrateOptions& options) : folder(options.report_folder) {
     if (!options.camera_output.empty()) camera.emplace(options.camera_output);
@@ -82,7 +82,7 @@ const model::SweepTruth* TruthOf(const SweepInput& input) {
   return input.truth ? &*input.truth : nullptr;
 }
 
-// Why there is no camera to write; empty: there is one.
+// Returns the reason why there is no camera to write; empty if there is one.
 std::string RefusalOf(const calib::Calibration& calibration, bool use_source_recipe) {
   if (use_source_recipe) return calibration.source.done ? "" : calibration.source.message;
   return calibration.outcome == calib::Outcome::kRefused ? calibration.reason : "";
@@ -120,7 +120,8 @@ CalibrationReport Report(const CalibrateOptions& options, const SweepInput& inpu
                                input.sweep.read_frame);
 }
 
-// All texts are made, and the figures written aside, before the first file is put in place.
+// All texts are made, and the figures written to temporary files, before the first file is put in
+// place.
 void WriteOutputs(const CalibrateOptions& options, const SweepInput& input,
                   const calib::Calibration& calibration, bool refused, Outputs* outputs) {
   const std::string date = NowIso8601();
@@ -154,11 +155,11 @@ CommandResult RunCalibration(const CalibrateOptions& options, const SweepInput& 
   ThrowIfCancelled();
   const std::string refusal = RefusalOf(calibration, options.use_source_recipe());
   WriteOutputs(options, input, calibration, !refusal.empty(), &outputs);
-  if (options.common.quiet) {  // else they stand in the text
+  if (options.common.quiet) {  // otherwise they are part of the text
     for (const std::string& warning : calibration.warnings)
       spdlog::warn("{}", PrintableUtf8(warning));
   }
-  // A refusal before anything was measured is one line, on stderr.
+  // A refusal before any measurement is one line on stderr.
   if (refusal.empty() || calibration.source.done)
     PrintResult(options.common, CalibrationText(input.sweep, calibration, TruthOf(input)));
   CommandResult result;
@@ -197,14 +198,14 @@ CommandResult Calibrate(const CalibrateOptions& options) {
 void AddSweepOptions(CLI::App* command, SweepArguments* sweep) {
   command
       ->add_option("sweep", sweep->input,
-                   "The sweep's description, or a folder of frames with --readings and --camera")
+                   "Sweep description, or a folder of frames with --readings and --camera")
       ->required()
       ->type_name("SWEEP.yaml|DIR");
-  command->add_option("--readings", sweep->readings_csv, "Table of a folder: file, reading in mm")
+  command->add_option("--readings", sweep->readings_csv, "Table for a folder: file, reading in mm")
       ->type_name("CSV");
-  command->add_option("--camera", sweep->camera_path, "The camera, instead of the sweep's own")
+  command->add_option("--camera", sweep->camera_path, "Camera file, instead of the sweep's own")
       ->type_name("CAMERA.yaml");
-  command->add_option("--truth", sweep->truth_path, "Truth to compare with (of a simulation)")
+  command->add_option("--truth", sweep->truth_path, "True values to compare with (of a simulation)")
       ->type_name("FILE");
   AddSweepStatements(command, sweep);
 }
@@ -216,19 +217,19 @@ void AddCalibrateCommand(CLI::App* program, CommandAction* action) {
       "calibrate", "Image distance, blur ratio, blur floor and bench offset from a focus sweep");
   const auto options = std::make_shared<CalibrateOptions>();
   AddSweepOptions(command, &options->sweep);
-  command->add_option("-o,--output", options->camera_output, "The calibrated camera")
+  command->add_option("-o,--output", options->camera_output, "Calibrated camera to write")
       ->type_name("CAMERA.yaml");
   command
       ->add_option("--report", options->report_folder,
-                   "Folder for report.html and its figures as SVG")
+                   "Folder for report.html with its figures as SVG")
       ->type_name("DIR");
-  command->add_option("--method", options->method, "fit, or source: the source's own recipe")
+  command->add_option("--method", options->method, "fit, or source: the paper's baseline method")
       ->check(CLI::IsMember({"fit", "source"}))
       ->type_name("NAME");
   command->add_flag("!--no-field", options->map_field,
-                    "Leave out the maps over the field and the colours; faster");
+                    "Skip the maps over the field and the colours; faster");
   command->add_flag("--dry-run", options->dry_run,
-                    "Tell what is understood of the sweep and measure nothing");
+                    "Report what the sweep file says, and measure nothing");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {

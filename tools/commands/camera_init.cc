@@ -35,7 +35,7 @@ struct CameraInitOptions {
   std::string output;
 };
 
-// A number and whether it was given by the person.
+// A number, and whether it was assumed.
 struct Known {
   double value = 0;
   bool assumed = false;
@@ -48,7 +48,7 @@ std::optional<Known> GivenOr(const std::optional<double>& given,
   return std::nullopt;
 }
 
-// Collects what is missing, so that it can all be told at once.
+// Collects what is missing, so that everything is reported at once.
 Known Require(const std::optional<Known>& known, const std::string& what,
               std::vector<std::string>* missing) {
   if (!known) missing->push_back(what);
@@ -68,8 +68,8 @@ void DescribeLens(const CameraDescription& given, const Known& focal, const Know
       Take(*GivenOr(given.rear_focal_length_mm, focal.value), "lens.rear_focal_length_mm", camera);
   lens.lens_thickness_mm =
       Take(*GivenOr(given.lens_thickness_mm, 0.0), "lens.lens_thickness_mm", camera);
-  // The f-number N is the focal length over the diameter of the entrance pupil, which is taken for
-  // the aperture on the front principal plane: r = f1/(2 N), mm [D9].
+  // The f-number N is the focal length divided by the diameter of the entrance pupil, which is
+  // assumed to equal the aperture on the front principal plane: r = f1/(2 N), mm [D9].
   const Known radius{focal.value / (2 * f_number.value), focal.assumed || f_number.assumed};
   lens.aperture_radius_mm = Take(radius, "lens.aperture_radius_mm", camera);
 }
@@ -163,33 +163,35 @@ void AddLensOptions(CLI::App* command, CameraDescription* camera) {
       ->type_name("MM");
   command
       ->add_option("--rear-focal-mm", camera->rear_focal_length_mm,
-                   "Rear focal length f2; default: the front one, assumed")
+                   "Rear focal length f2; default: equal to the front one, marked as assumed")
       ->check(Between(0, kMaxLengthMm, "millimetres"))
       ->type_name("MM");
   command
       ->add_option("--thickness-mm", camera->lens_thickness_mm,
-                   "Front to rear principal plane, negative if they cross; default: 0, assumed")
+                   "Distance from the front to the rear principal plane, negative if they cross; "
+                   "default: 0, marked as assumed")
       ->check(Between(-kMaxLengthMm, kMaxLengthMm, "millimetres"))
       ->type_name("MM");
   command
       ->add_option("--f-number", camera->f_number,
-                   "Focal length over the diameter of the entrance pupil, which is taken for the "
-                   "aperture: its radius is f1/(2 N)")
+                   "Focal length divided by the diameter of the entrance pupil, which is assumed "
+                   "to equal the aperture: its radius is f1/(2 N)")
       ->check(Between(0, kMaxFNumber, "focal length over pupil diameter"))
       ->type_name("N");
 }
 
 void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
   CameraDescription& camera = options->camera;
-  command->add_option("--pitch-um", camera.pixel_pitch_um, "Distance of neighbouring pixels")
+  command->add_option("--pitch-um", camera.pixel_pitch_um, "Distance between neighbouring pixels")
       ->check(Between(0, kMaxPitchUm, "micrometres"))
       ->type_name("UM");
-  command->add_option("--size", options->size, "Of the pictures; default: the photograph's")
+  command
+      ->add_option("--size", options->size, "Size of the pictures; default: that of the photograph")
       ->type_name("WIDTHxHEIGHT");
   command
       ->add_option("--principal-point", options->principal_point,
-                   "Where the axis meets the sensor, px; the centre of the top-left pixel is 0,0; "
-                   "default: the middle, assumed")
+                   "Point where the axis meets the sensor, px; the centre of the top-left pixel is "
+                   "0,0; default: the middle, marked as assumed")
       ->type_name("X,Y");
   command
       ->add_option("--transfer", camera.transfer,
@@ -201,7 +203,9 @@ void AddSensorOptions(CLI::App* command, CameraInitOptions* options) {
       ->check(CLI::IsMember({"gaussian", "disc"}))
       ->capture_default_str()
       ->type_name("NAME");
-  command->add_option("--name", camera.name, "Default: the photograph's camera model, or camera")
+  command
+      ->add_option("--name", camera.name,
+                   "Name of the camera; default: the model in EXIF, or camera")
       ->type_name("TEXT");
 }
 
@@ -244,15 +248,17 @@ void AddCameraCommand(CLI::App* program, CommandAction* action) {
   camera->require_subcommand(1);
   AddCameraVerifyCommand(camera, action);
   CLI::App* command = camera->add_subcommand(
-      "init", "A camera file from a data sheet's numbers or from a photograph's EXIF");
+      "init", "A camera file from data-sheet values or from a photograph's EXIF");
   const auto options = std::make_shared<CameraInitOptions>();
   command
-      ->add_option("--from-exif", options->photo_path,
-                   "Take from this photograph what is not given; it is marked as assumed")
+      ->add_option(
+          "--from-exif", options->photo_path,
+          "Take values that are not given from this photograph; they are marked as assumed")
       ->type_name("PHOTO");
   AddLensOptions(command, &options->camera);
   AddSensorOptions(command, options.get());
-  command->add_option("-o,--output", options->output, "Default: standard output")
+  command
+      ->add_option("-o,--output", options->output, "Camera file to write; default: standard output")
       ->type_name("CAMERA.yaml");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
@@ -261,8 +267,8 @@ void AddCameraCommand(CLI::App* program, CommandAction* action) {
       if (options->output == "-") options->output.clear();
       if (options->output.empty() && options->common.json_path == "-") {
         throw UsageError(
-            "--json -: standard output is where the camera file goes; --output must name a file "
-            "for one of the two");
+            "--json -: the camera file also goes to standard output; give --output FILE, or --json "
+            "FILE");
       }
       RequireDistinctFiles({options->output, options->common.json_path}, {options->photo_path});
       RunCommand(options->common, [&] { return InitCamera(*options); });

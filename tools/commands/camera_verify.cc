@@ -1,4 +1,4 @@
-// thicklens camera verify: whether a stored calibration still holds, from a new sweep.
+// thicklens camera verify: tests with a new sweep whether a stored calibration still holds.
 #include "tools/commands/camera_verify.h"
 
 #include <fmt/format.h>
@@ -63,7 +63,7 @@ std::string ParameterLine(const calib::ComparedParameter& parameter) {
                         : std::string("not counted"));
 }
 
-// The stored camera, of which the sweep's calibration sees the lens and the sensor alone.
+// Reads the stored camera. The sweep is calibrated with its lens and sensor only.
 model::Camera ReadStoredCamera(const std::string& path) {
   model::Camera camera = model::ReadCamera(path);
   if (!camera.calibration) {
@@ -99,7 +99,7 @@ CommandResult VerifyCamera(const CameraVerifyOptions& options) {
   if (!of_stored.empty() && of_stored == input.frame_files->DataSha256()) {
     verification.verdict = calib::Verdict::kCannotTell;
     verification.reason =
-        "this is the sweep that the stored calibration was made from: photograph a new one";
+        "this is the sweep that the stored calibration was made from: take a new one";
   }
   for (const std::string& warning : found.warnings) spdlog::debug("{}", PrintableUtf8(warning));
 
@@ -119,10 +119,10 @@ CommandResult VerifyCamera(const CameraVerifyOptions& options) {
           found.blur.done ? FiniteOrNull(found.blur.chi2_per_dof) : json(nullptr)}}}});
   if (verification.verdict != calib::Verdict::kHolds) {
     const bool is_other = verification.verdict == calib::Verdict::kDoesNotHold;
-    result.refusal =
-        PrintableUtf8(fmt::format("{}: {} by {}: {}", options.camera_path,
-                                  is_other ? "the calibration does not hold" : "it cannot be told",
-                                  options.sweep.input, verification.reason));
+    result.refusal = PrintableUtf8(fmt::format(
+        "{}: {} by {}: {}", options.camera_path,
+        is_other ? "the calibration does not hold" : "whether the calibration holds is undecided",
+        options.sweep.input, verification.reason));
   }
   return result;
 }
@@ -133,7 +133,7 @@ std::string VerificationText(const calib::Verification& verification) {
   std::string text;
   if (!verification.parameters.empty()) {
     text += fmt::format("{:<20}{:>24}{:>24}{:>12}{:>12}{:>9}{:>13}\n", "", "stored", "new sweep",
-                        "difference", "its sigma", "sigmas", "would show");
+                        "difference", "its sigma", "sigmas", "detectable");
   }
   for (const calib::ComparedParameter& parameter : verification.parameters) {
     text += ParameterLine(parameter);
@@ -144,7 +144,8 @@ std::string VerificationText(const calib::Verification& verification) {
   }
   if (verification.degrees_of_freedom > 0) {
     text += fmt::format(
-        "together: chi-square {:.2f} of {} parameter(s); chance exceeds it with probability "
+        "together: chi-square {:.2f} of {} parameter(s); a larger value occurs by chance with "
+        "probability "
         "{:.2g}\n",
         verification.chi_square, verification.degrees_of_freedom, verification.p_value);
   }
@@ -152,13 +153,14 @@ std::string VerificationText(const calib::Verification& verification) {
     text += "warning: " + PrintableUtf8(warning) + "\n";
   }
   if (verification.detectable_blur_px > 0) {
-    text += fmt::format("a change of d1 that would show changes the blur by {:.2g} px of sigma\n",
-                        verification.detectable_blur_px);
+    text +=
+        fmt::format("the smallest detectable change of d1 changes the blur by {:.2g} px of sigma\n",
+                    verification.detectable_blur_px);
   }
   text += verification.verdict == calib::Verdict::kHolds ? "the calibration holds"
           : verification.verdict == calib::Verdict::kDoesNotHold
               ? "the calibration does not hold"
-              : "whether the calibration holds cannot be told";
+              : "whether the calibration holds is undecided";
   return text + (verification.reason.empty() ? "" : ": " + PrintableUtf8(verification.reason)) +
          "\n";
 }
@@ -187,35 +189,35 @@ json VerificationJson(const calib::Verification& verification) {
 
 void AddCameraVerifyCommand(CLI::App* camera, CommandAction* action) {
   CLI::App* command = camera->add_subcommand(
-      "verify", "Whether a stored calibration still holds, from a new sweep, which may be short");
+      "verify", "Test with a new, possibly short sweep whether a stored calibration still holds");
   const auto options = std::make_shared<CameraVerifyOptions>();
   command
       ->add_option("camera", options->camera_path,
-                   "The calibrated camera; the sweep is measured with its lens and sensor")
+                   "Calibrated camera; its lens and sensor are used for the sweep")
       ->required()
       ->type_name("CAMERA.yaml");
   command
       ->add_option("sweep", options->sweep.input,
-                   "The new sweep's description, or a folder of frames with --readings")
+                   "Description of the new sweep, or a folder of frames with --readings")
       ->required()
       ->type_name("SWEEP.yaml|DIR");
   command
       ->add_option("--readings", options->sweep.readings_csv,
-                   "Table of a folder: file, reading in mm")
+                   "Table for a folder: file, reading in mm")
       ->type_name("CSV");
   AddSweepStatements(command, &options->sweep);
   command->add_flag("--same-bench", options->verification.same_bench,
-                    "The camera stands on the bench as it did: the bench zero is compared too");
+                    "The camera is mounted on the bench as before: compare the bench zero too");
   command
       ->add_option("--significance", options->verification.significance,
-                   "How seldom chance may call a calibration wrong that holds")
+                   "Probability that chance rejects a calibration that holds")
       ->check(Inside(0, 1, "a probability"))
       ->capture_default_str()
       ->type_name("P");
   command
       ->add_option("--needed-blur-px", options->verification.needed_blur_px,
-                   "A sweep that would not show so large a change of the blur, px of sigma, cannot "
-                   "tell")
+                   "Change of the blur, px of sigma, that the sweep must be able to detect; "
+                   "otherwise the result is undecided")
       ->check(Between(0, 1000, "pixels"))
       ->capture_default_str()
       ->type_name("PX");

@@ -1,4 +1,4 @@
-// thicklens compare: how near a picture or a light field is to the true one.
+// thicklens compare: compares a picture or a light field with the true one.
 #include "thicklens/estimator/compare.h"
 
 #include <fmt/format.h>
@@ -43,7 +43,7 @@ struct CompareOptions {
   std::string reference_path, other_path;
   int border_px = 0;
   ReadingOptions reading;
-  std::vector<std::string> dibr_paths;  // none, or the photograph and its depth map
+  std::vector<std::string> dibr_paths;  // empty, or the photograph and its depth map
   DepthOptions depth;
   std::vector<std::string> without;  // effects that the photograph of --dibr lacks
 };
@@ -56,7 +56,7 @@ bool IsFolder(const std::string& path) {
   return fs::is_directory(status);
 }
 
-// False for what has the rectangle's size already: it is taken as cropped before.
+// Returns false for a picture that has the rectangle's size already: it was cropped before.
 bool IsToCrop(const Rect& crop, int width_px, int height_px) {
   return crop && (crop->width != width_px || crop->height != height_px);
 }
@@ -76,10 +76,9 @@ model::StoredPicture Cropped(const model::StoredPicture& picture, const Rect& cr
 CommandResult ComparePictureFiles(const CompareOptions& options) {
   const io::LightFieldReading reading = ReadingOf(options.reading);
   if (reading.grid > 0 || reading.sparse || reading.u_count > 0 || !options.dibr_paths.empty()) {
-    throw UsageError(
-        fmt::format("--grid, --sparse, --views and --dibr are for light fields: {} is "
-                    "a picture",
-                    PrintableUtf8(options.reference_path)));
+    throw UsageError(fmt::format(
+        "--grid, --sparse, --views and --dibr are for light fields, but {} is a picture",
+        PrintableUtf8(options.reference_path)));
   }
   model::StoredPicture reference = ReadPicture(options.reference_path);
   if (reading.crop) {
@@ -104,7 +103,7 @@ CommandResult ComparePictureFiles(const CompareOptions& options) {
 
 // ---- Two light fields.
 
-// The inner views of the larger one; of both, where each is larger one way.
+// Takes the inner views of the larger light field, or of both if each is larger along one axis.
 void TakeCommonViews(const CompareOptions& options, model::LightField* reference,
                      model::LightField* other) {
   const int u_count = std::min(reference->u_count, other->u_count);
@@ -128,8 +127,9 @@ model::LinearPicture Photograph(const CompareOptions& options, const Rect& crop,
   model::StoredPicture stored = Cropped(ReadPicture(path), crop, path);
   const int channels = stored.channels;
   if (channels == 1 && reference.channels == 3) {
-    throw Error(fmt::format("{}: a photograph in colour is expected, as the views are; it is grey",
-                            PrintableUtf8(path)));
+    throw Error(fmt::format(
+        "{}: a photograph in colour is expected because the views are in colour; it is grey",
+        PrintableUtf8(path)));
   }
   model::LinearPicture light = model::ToLinear(stored, reference.transfer);
   if (reference.channels == 1) return model::ToGrey(light);
@@ -147,7 +147,7 @@ std::optional<estimator::DibrInput> ReadDibr(const CompareOptions& options, cons
   if (options.dibr_paths.empty()) return std::nullopt;
   const std::string& map_path = options.dibr_paths.back();
   DepthOptions depth = options.depth;
-  // Without a camera a map can be nothing else.
+  // Without a camera the map can only hold disparities.
   if (depth.kind.empty() && !reference.camera) depth.kind = "disparity";
   estimator::DibrInput dibr;
   dibr.photograph = Photograph(options, crop, reference);
@@ -157,7 +157,8 @@ std::optional<estimator::DibrInput> ReadDibr(const CompareOptions& options, cons
                             PrintableUtf8(options.dibr_paths.front()), dibr.photograph.width_px,
                             dibr.photograph.height_px, reference.s_count, reference.t_count));
   }
-  // Views are radiance, a photograph is not: its fall-off would count as an error of the warp.
+  // Views hold radiance, but a photograph does not: its fall-off would count as an error of the
+  // warp.
   if (reference.camera && options.without.empty()) {
     dibr.photograph = estimator::WithoutFalloff(dibr.photograph, *reference.grid, *reference.camera,
                                                 reference.weights, options.common.threads);
@@ -169,7 +170,7 @@ std::optional<estimator::DibrInput> ReadDibr(const CompareOptions& options, cons
                                         reference.camera ? &*reference.camera : nullptr,
                                         reference.grid ? &*reference.grid : nullptr);
   if (prepared.holes > 0)
-    spdlog::warn("{}: {} holes are filled along the surfaces beside them", PrintableUtf8(map_path),
+    spdlog::warn("{}: {} holes are filled from the surfaces beside them", PrintableUtf8(map_path),
                  prepared.holes);
   dibr.disparity = std::move(prepared.disparity);
   return dibr;
@@ -213,17 +214,16 @@ CommandResult Compare(const CompareOptions& options) {
 // ---- The command line.
 
 void AddDibrOptions(CLI::App* command, CompareOptions* options) {
-  CLI::Option* dibr =
-      command
-          ->add_option("--dibr", options->dibr_paths,
-                       "Beside it, depth-image-based rendering: this photograph warped to each "
-                       "view by its depth map")
-          ->expected(2)
-          ->type_name("PHOTO DEPTH");
+  CLI::Option* dibr = command
+                          ->add_option("--dibr", options->dibr_paths,
+                                       "Also score depth-image-based rendering: this photograph "
+                                       "warped to each view by its depth map")
+                          ->expected(2)
+                          ->type_name("PHOTO DEPTH");
   AddDepthOptions(command, &options->depth);
   command
       ->add_option("--without", options->without,
-                   "Effects that the photograph of --dibr does not have: falloff")
+                   "Effects that the photograph of --dibr lacks: falloff")
       ->check(CLI::IsMember({"falloff"}))
       ->delimiter(',')
       ->type_name("EFFECT");
@@ -237,19 +237,19 @@ void AddDibrOptions(CLI::App* command, CompareOptions* options) {
 
 void AddCompareCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "compare", "PSNR, SSIM, mean CIE94 difference and edge orientation against the true picture");
+      "compare", "PSNR, SSIM, mean CIE94 difference and edge orientation against a true picture");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("reference", options->reference_path, "The true picture or light field")
       ->required()
       ->type_name("REFERENCE");
   command
       ->add_option("other", options->other_path,
-                   "What is compared with it: a picture too, or a folder too. Of two light fields "
-                   "with different counts the inner views of the larger are taken. With --crop, "
-                   "what has the rectangle's size already is taken as cropped before")
+                   "Picture or light field to compare with it. Of light fields with different "
+                   "counts the inner views of the larger one are used. With --crop, a picture that "
+                   "has the rectangle's size already is not cropped")
       ->required()
       ->type_name("OTHER");
-  command->add_option("--border", options->border_px, "Leave out a border of so many pixels")
+  command->add_option("--border", options->border_px, "Width in px of a border that is left out")
       ->check(CLI::Range(0, kMaxBorderPx))
       ->capture_default_str()
       ->type_name("PX");
@@ -258,7 +258,7 @@ void AddCompareCommand(CLI::App* program, CommandAction* action) {
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {
-      ReadingOf(options->reading);  // tells wrong usage before anything is done
+      ReadingOf(options->reading);  // reports wrong usage before any work begins
       std::vector<std::string> inputs = options->dibr_paths;
       inputs.insert(inputs.end(), {options->reference_path, options->other_path});
       RequireDistinctFiles({options->common.json_path}, inputs);

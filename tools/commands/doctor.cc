@@ -1,4 +1,4 @@
-// thicklens doctor: what this machine computes with, and whether it computes right.
+// thicklens doctor: lists what this machine computes with, and checks its results.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -36,16 +36,16 @@ struct DoctorOptions {
   HardCasesOptions hard;
 };
 
-// What the examination found.
+// The results of the examination.
 struct Findings {
   int cores = 0;
   int threads = 0;
   std::string blas;
   std::vector<std::string> block_solvers;
   std::string picture_files;
-  std::optional<kernels::DeviceSurvey> survey;   // none if OpenCL was not to be touched
+  std::optional<kernels::DeviceSurvey> survey;   // none if OpenCL must not be used
   std::string used, used_description, used_why;  // empty: nothing can be used
-  std::string notice;                            // of the fall back from OpenCL
+  std::string notice;                            // reports the fallback from OpenCL
   std::optional<kernels::AgreementCheck> agreement;
   std::string refusal;
 };
@@ -61,21 +61,22 @@ std::vector<std::string> BuiltInSolvers() {
 std::string WhyUsed(const DoctorOptions& options, const kernels::Backend& backend,
                     const std::string& notice) {
   if (!notice.empty()) return "no OpenCL device can be used";
-  if (!backend.is_opencl()) return "asked for by --device " + options.device;
+  if (!backend.is_opencl()) return "requested by --device " + options.device;
   const std::string tried = "a small kernel was compiled and ran there";
-  return options.device == "auto" ? "the best OpenCL device that works: " + tried
-                                  : "asked for by --device " + options.device + ": " + tried;
+  return options.device == "auto" ? "the best working OpenCL device: " + tried
+                                  : "requested by --device " + options.device + ": " + tried;
 }
 
 std::string Disagreement(const std::string& device, const kernels::AgreementCheck& check) {
   return fmt::format(
       "device {} and the C++ code differ by {:.2g} in float (limit {:g}) and {:.2g} in double "
-      "(limit {:g}), relative; the worst is {}: update its driver, or use another --device",
+      "(limit {:g}), relative; the largest difference is in {}: update its driver, or use another "
+      "--device",
       device, check.float_error, check.float_limit, check.double_error, check.double_limit,
       check.worst);
 }
 
-// Whatever is wrong with the device goes into the findings: they are there to be read.
+// Problems of the device become part of the findings, which report them.
 void ExamineDevice(const DoctorOptions& options, Findings* findings) {
   const kernels::DeviceRequest request = kernels::ParseDeviceRequest(options.device);
   try {
@@ -105,7 +106,7 @@ void ExaminePictureFiles(Findings* findings) {
     io::LoadedOpenCvCodecs();
     findings->picture_files = "PNG; JPEG, TIFF, EXR, BMP and PNM by OpenCV";
   } catch (const Error& error) {
-    findings->picture_files = "PNG alone";
+    findings->picture_files = "PNG only";
     if (findings->refusal.empty()) findings->refusal = error.what();
   }
 }
@@ -121,7 +122,7 @@ std::string Joined(const std::vector<std::string>& texts) {
 }
 
 std::string SurveyText(const Findings& findings) {
-  if (!findings.survey) return "opencl         not looked at\n";
+  if (!findings.survey) return "opencl         not examined\n";
   std::string text;
   for (const kernels::DeviceDescription& device : findings.survey->devices) {
     text += fmt::format(
@@ -131,7 +132,7 @@ std::string SurveyText(const Findings& findings) {
         "memory {:.0f} KiB, work groups of up to {}\n",
         NameOf(device), PrintableUtf8(device.name), PrintableUtf8(device.platform_name),
         PrintableUtf8(device.version), PrintableUtf8(device.driver_version), device.type,
-        device.compute_units, device.has_double ? "float and double" : "float alone, no double",
+        device.compute_units, device.has_double ? "float and double" : "float only, no double",
         Mib(device.global_memory_bytes), Mib(device.max_allocation_bytes),
         static_cast<double>(device.local_memory_bytes) / 1024, device.max_work_group);
     if (!device.problem.empty()) {
@@ -154,7 +155,7 @@ std::string AgreementText(const kernels::AgreementCheck& check) {
       "agreement      {}: largest relative differences from the C++ code: float {:.2g} (limit "
       "{:g}), {}{}\n",
       check.agrees ? "yes" : "NO", check.float_error, check.float_limit, in_double,
-      check.worst.empty() ? "" : "; the worst: " + check.worst);
+      check.worst.empty() ? "" : "; the largest in " + check.worst);
 }
 
 std::string FindingsText(const Findings& findings) {
@@ -200,7 +201,7 @@ nlohmann::json SurveyJson(const Findings& findings) {
   return {{"devices", devices}, {"problems", problems}};
 }
 
-// No number for what is none.
+// NaN and infinity become null.
 nlohmann::json NumberJson(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
 }
@@ -254,23 +255,23 @@ CommandResult Doctor(const DoctorOptions& options) {
 
 void AddDoctorCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "doctor", "What this machine computes with: cores, BLAS, OpenCL devices and their agreement");
+      "doctor", "List CPU, BLAS and OpenCL devices of this machine, and check their results");
   const auto options = std::make_shared<DoctorOptions>();
   AddDeviceOption(command, &options->device);
   CLI::Option* hard = command->add_flag(
       "--hard-cases", options->hard_cases,
-      "Run the table of hard cases: each solved to a stated accuracy or refused with a reason, by "
-      "every solver, precision and device there is here; takes minutes");
+      "Run the stress tests: each difficult input must be solved to a stated accuracy or rejected "
+      "with a reason, by every available solver, precision and device; takes minutes");
   command->get_option("--device")->excludes(hard);
   command
       ->add_option(
           "--only", options->hard.only,
-          "Of --hard-cases: one of them, or a group (optics, scene, estimator, calibration)")
+          "For --hard-cases: run only one case, or a group (optics, scene, estimator, calibration)")
       ->needs(hard)
       ->type_name("NAME");
   command
       ->add_option("--keep", options->hard.keep_folder,
-                   "Of --hard-cases: a new folder that keeps what was read and written")
+                   "For --hard-cases: a new folder that keeps the input and output files")
       ->needs(hard)
       ->type_name("DIR");
   AddCommonOptions(command, &options->common);

@@ -1,4 +1,4 @@
-// thicklens estimate: one picture and its depth map become a light field.
+// thicklens estimate: estimates a light field from one picture and its depth map.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -48,7 +48,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Claimed before anything is computed, so that an output that cannot be is told at once.
+// Outputs are claimed before anything is computed, so that an invalid output is reported at once.
 struct Outputs {
   explicit Outputs(const EstimateOptions& options)
       : light_field(options.output_folder, io::kLightFieldMarker, io::LightFieldEntries()),
@@ -60,7 +60,7 @@ struct Outputs {
           [](const std::string& text) { spdlog::warn("{}", text); });
     }
   }
-  // However a run ends whose light field is not there.
+  // Runs at the end of every run that did not complete the light field.
   ~Outputs() {
     const std::string kept = WhatIsKept();
     if (!kept.empty()) spdlog::warn("{}", kept);
@@ -71,22 +71,22 @@ struct Outputs {
   OutputFolder light_field;
   ReportFolder report_folder;
   std::optional<OutputFile> report;
-  std::unique_ptr<io::BlockCheckpoint> checkpoint;  // none: it was not asked for
+  std::unique_ptr<io::BlockCheckpoint> checkpoint;  // none if it was not requested
 
  private:
   std::string WhatIsKept() const {
     const int kept = checkpoint ? checkpoint->kept() : 0;
     if (kept == 0) return "";
     return fmt::format(
-        "{} block(s) that were solved are kept in {}: the same command goes on from there; for "
-        "other settings remove it or name another",
+        "{} solved block(s) are kept in {}: the same command continues from there; for other "
+        "settings remove it or name another",
         kept, checkpoint->path());
   }
   const LastWords last_words_{[this] { return WhatIsKept(); }};
 };
 
-// No part of a picture that is solved for as a whole is larger: what that would take grows, and
-// nothing gets better by it.
+// The maximum size of a part of the picture that is solved as a whole: larger parts take more
+// memory and time per pixel, and the result does not improve.
 constexpr double kMostBandPixels = 3e6;
 
 estimator::SceneOptions SceneSettings(const EstimateOptions& options,
@@ -113,12 +113,11 @@ void CheckBlur(const EstimateOptions& options, const estimator::EstimateInput& i
   outcome->seconds.blur_check = SecondsSince(start);
 }
 
-// Views go to the writer as they are made, unless a page is to show them or they are to be
-// inpainted.
+// Views are written as soon as they are computed, unless a page shows them or they are inpainted.
 void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& input,
                 const model::EffectSet& on, const Progress& progress, io::LightFieldWriter* writer,
                 EstimateOutcome* outcome) {
-  // A device is worth its start where it is asked for.
+  // Starting a device pays off only if it is requested.
   const auto backend = kernels::OpenBackend(
       kernels::ParseDeviceRequest(options.device == "auto" ? "cpu" : options.device), nullptr,
       ThrowIfCancelled);
@@ -145,7 +144,7 @@ void SolveScene(const EstimateOptions& options, const estimator::EstimateInput& 
   outcome->seconds.solve = scene.solve_seconds;
   outcome->seconds.files = writer->seconds() / scene.threads;
   outcome->seconds.views = std::max(0.0, scene.views_seconds - outcome->seconds.files);
-  outcome->maps.radiance = {};  // the middle of the light field says it
+  outcome->maps.radiance = {};  // the centre view of the light field shows it
   outcome->scene = std::move(scene);
 }
 
@@ -153,7 +152,7 @@ void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput&
                  const model::EffectSet& on, const Progress& progress,
                  io::BlockCheckpoint* checkpoint, EstimateOutcome* outcome) {
   std::string notice;
-  // What auto finds may depend on how busy the machine is.
+  // The device that auto selects may depend on the load of the machine.
   const std::string device = options.device == "auto" && checkpoint != nullptr
                                  ? checkpoint->device().value_or(options.device)
                                  : options.device;
@@ -163,8 +162,8 @@ void SolveBlocks(const EstimateOptions& options, const estimator::EstimateInput&
   spdlog::debug("device: {}", backend->description());
   estimator::BlockOptions settings = BlockOptionsOf(options, on, progress);
   settings.store = checkpoint;
-  // Which blocks a memory limit allows differs a little from run to run, with what the process
-  // holds besides.
+  // The number of blocks that a memory limit allows varies a little from run to run with the other
+  // memory of the process.
   constexpr double kLittle = 1.05;
   if (checkpoint != nullptr && checkpoint->block_px() && settings.memory_limit_mib &&
       !settings.block_px) {
@@ -192,8 +191,8 @@ void SolveFunctional(const EstimateOptions& options, const estimator::EstimateIn
   outcome->functional = std::move(functional);
 }
 
-// By the profile, as fast as this machine is now if it was made on another, or for other threads.
-// What was done since `start` is over, whatever it took.
+// Chooses by the profile, scaled by the present speed of this machine if the profile was made on
+// another one or for other threads. The time since `start` is spent already.
 PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::EstimateInput& input,
                           Clock::time_point start) {
   const EstimateProfile profile = ProfileFor(options.profile_path);
@@ -203,17 +202,17 @@ PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::Estim
   PictureLoad load = PictureLoadOf(input);
   spdlog::debug("plan: blur of {:.3g} px (sigma, rms), {:.3g} s for the files on one thread",
                 load.blur_sigma_px, load.file_seconds);
-  // The law knows how the profile's threads share the files.
+  // The model of the time knows how the profile's threads share the files.
   load.file_seconds *= static_cast<double>(profile.threads) / threads;
   PlanChoice choice = ChoosePlan(profile, options.wish, load, speed_ratio, SecondsSince(start));
-  // What the law does not know.
+  // Options whose time the model does not include.
   std::vector<std::string> besides;
   if (!options.report_folder.empty()) besides.emplace_back("--report");
   if (options.fill == "telea") besides.emplace_back("--fill telea");
   if (options.memory_limit_mib) besides.emplace_back("--memory-limit");
   if (options.format == "tiff") besides.emplace_back("--format tiff");
   if (!besides.empty()) {
-    choice.message += fmt::format("; what {} costs is not in it", fmt::join(besides, ", "));
+    choice.message += fmt::format("; without the time for {}", fmt::join(besides, ", "));
   }
   return choice;
 }
@@ -255,7 +254,7 @@ void Inpaint(const EstimateOptions& options, const estimator::EstimateInput& inp
   outcome->seconds.views += outcome->inpainting->seconds;
 }
 
-// What was not written as it was made.
+// Writes the outputs that were not written while they were computed.
 void WriteRays(const EstimateOptions& options, const estimator::EstimateInput& input,
                const EstimateOutcome& outcome, io::LightFieldWriter* writer) {
   const model::LightField& light_field = outcome.light_field;
@@ -269,7 +268,7 @@ void WriteRays(const EstimateOptions& options, const estimator::EstimateInput& i
   }
 }
 
-// The photograph's disparity as the page shows it, px per view step.
+// Returns the photograph's disparity in px per view step, as the page shows it.
 PageDepth DepthForPage(const PreparedEstimate& prepared) {
   const estimator::DisparityMap& map = prepared.input.disparity;
   const bool along_u = map.step.x() != 0;
@@ -284,7 +283,7 @@ PageDepth DepthForPage(const PreparedEstimate& prepared) {
   return depth;
 }
 
-// For the page: what was read, and what was taken for granted of it.
+// Returns for the page what was read, and what was assumed.
 std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions& options,
                                                            const std::string& aperture,
                                                            const nlohmann::json& summary) {
@@ -303,7 +302,7 @@ std::vector<std::pair<std::string, std::string>> SourcesOf(const EstimateOptions
           {"camera", options.camera_path},
           {"part of both", options.crop.text},
           {"stored values", fmt::format("{} ({})", summary["transfer"].get<std::string>(),
-                                        said.empty() ? "assumed" : "as " + said + " says")},
+                                        said.empty() ? "assumed" : "from " + said)},
           {"aperture", aperture}};
 }
 
@@ -394,7 +393,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   result.is_written = true;
   if (outputs.report) outputs.report->Commit(page);
   if (outputs.checkpoint && !outputs.checkpoint->Remove()) {
-    spdlog::warn("{}: is no longer needed, and could not be removed", outputs.checkpoint->path());
+    spdlog::warn("{}: is no longer needed, but could not be removed", outputs.checkpoint->path());
   }
   for (const std::string& warning : warnings) spdlog::warn("{}", warning);
   PrintResult(options.common, text);
@@ -402,8 +401,8 @@ CommandResult RunEstimate(const EstimateOptions& given) {
 }
 
 void AddEstimateCommand(CLI::App* program, CommandAction* action) {
-  CLI::App* command =
-      program->add_subcommand("estimate", "The light field of one picture with its depth map");
+  CLI::App* command = program->add_subcommand(
+      "estimate", "Estimate the light field of one picture with its depth map");
   const auto options = std::make_shared<EstimateOptions>();
   AddEstimateOptions(command, options.get());
   command->callback([options, action] {

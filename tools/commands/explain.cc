@@ -1,4 +1,4 @@
-// thicklens explain: what a calibrated camera does at given depths.
+// thicklens explain: reports what a calibrated camera does at given depths.
 #include <fmt/format.h>
 
 #include <limits>
@@ -62,7 +62,7 @@ DepthRange ParseDepthRange(const std::string& text) {
   return range;
 }
 
-// What is photographed, as far as it is known.
+// The known part of what is photographed.
 struct ExplainedScene {
   DepthRange range;
   std::vector<model::EffectPlace> places;
@@ -77,7 +77,7 @@ ExplainedScene SceneOf(const ExplainOptions& options, const model::Camera& camer
   const model::Sensor& sensor = camera.sensor;
   if (map.width_px != sensor.width_px || map.height_px != sensor.height_px) {
     throw Error(fmt::format(
-        "{}: it is {}x{} px, the camera's sensor {}x{} px: the sizes must be "
+        "{}: it is {}x{} px, but the camera's sensor has {}x{} px: the sizes must be "
         "equal",
         options.depth_path, map.width_px, map.height_px, sensor.width_px, sensor.height_px));
   }
@@ -100,7 +100,7 @@ model::EffectDecision Decide(const ExplainOptions& options, const model::Camera&
     conditions.planes = {*options.uv_depth_mm, camera.focus_depth_mm() - *options.uv_depth_mm};
   }
   model::EffectChoice choice;
-  // As a simulated picture has it.
+  // A simulated picture always has these effects.
   choice.kept = {model::Effect::kQuantisation, model::Effect::kTransferCurve};
   ApplyEffectOptions(options.effects, &choice);
   return model::DecideEffects(choice, conditions, places, model::EffectSet::All());
@@ -140,11 +140,9 @@ void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {
 
 std::string CostsText(const EffectCosts& costs) {
   return fmt::format(
-      "cost: how much longer a simulated picture of this size takes with the effect than without "
-      "it,\nextrapolated from a part of it, in seconds of one core of this machine, all others "
-      "being as they are here; with these "
-      "it "
-      "takes {:.3g}, and\n~0 is nothing, or less than can be measured\n",
+      "cost: additional time of the effect for a simulated picture of this size, extrapolated "
+      "from\na part of it, in seconds on one core of this machine, with all other effects as "
+      "listed here;\nwith these the simulation takes {:.3g}; ~0 is less than can be measured\n",
       costs.seconds);
 }
 
@@ -166,41 +164,41 @@ CommandResult Explain(const ExplainOptions& options) {
   ThrowIfCancelled();
   if (figure) figure->Commit(BlurCurveSvg(camera, scene.range));
   result.is_written = figure.has_value();
-  PrintResult(
-      options.common,
-      ExplanationText(explanation) +
-          "\nwhat each effect can matter here, at most, to edges between black and white\n" +
-          EffectsTable(decision, costs ? &costs->of_effect : nullptr) +
-          (costs ? CostsText(*costs) : ""));
+  PrintResult(options.common,
+              ExplanationText(explanation) +
+                  "\nlargest impact of each effect here on edges between black and white\n" +
+                  EffectsTable(decision, costs ? &costs->of_effect : nullptr) +
+                  (costs ? CostsText(*costs) : ""));
   return result;
 }
 
 // Throws UsageError.
 void CheckUsage(const ExplainOptions& options) {
   if (options.depth_range.empty() == options.depth_path.empty()) {
-    throw UsageError("one of --depth-range and --depth is needed: depths, or a map of them");
+    throw UsageError("--depth-range or --depth is missing: a range of depths, or a depth map");
   }
   if (options.read_noise_electrons > 0 && !(options.full_well_electrons > 0)) {
-    throw UsageError("--read-noise: noise in electrons needs --full-well, electrons at full scale");
+    throw UsageError(
+        "--read-noise: noise in electrons needs --full-well, the electrons at full scale");
   }
   const model::BenchConditions& bench = options.bench;
   if (!options.as_sweep && (bench.flicker > 0 || bench.drift_sigma_px > 0 ||
                             bench.reading_sigma_mm > 0 || bench.tilt_deg != 0)) {
-    throw UsageError("--flicker, --drift, --tilt and --reading-error belong to --as-sweep");
+    throw UsageError("--flicker, --drift, --tilt and --reading-error require --as-sweep");
   }
   if (options.costs && options.as_sweep) {
-    throw UsageError("--costs: effects of a sweep cost next to nothing; it is for pictures");
+    throw UsageError("--costs: not available with --as-sweep, whose effects take hardly any time");
   }
   if (!options.depth_path.empty()) {
     if (ConventionOf(options.depth).kind == model::DepthKind::kDisparity) {
       throw UsageError(
-          "--depth-kind disparity: disparities refer to views, which a camera alone "
-          "does not have; z or range is expected");
+          "--depth-kind disparity: disparities refer to views, but a camera alone has no views; z "
+          "or range is expected");
     }
     return;
   }
   if (!options.depth.kind.empty() || !options.depth.unit.empty()) {
-    throw UsageError("--depth-kind and --depth-unit belong to --depth");
+    throw UsageError("--depth-kind and --depth-unit require --depth");
   }
 }
 
@@ -208,24 +206,29 @@ void CheckUsage(const ExplainOptions& options) {
 
 void AddExplainCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "explain", "What a calibrated camera does: blur, depth of field, which effects matter");
+      "explain",
+      "Report blur, depth of field and relevant imaging effects of a camera at given depths");
   const auto options = std::make_shared<ExplainOptions>();
-  command->add_option("camera", options->camera_path, "A calibrated camera")
+  command->add_option("camera", options->camera_path, "Calibrated camera")
       ->required()
       ->type_name("CAMERA.yaml");
   command
       ->add_option("--depth-range", options->depth_range,
-                   "Depths from the aperture, in mm; FAR may be inf")
+                   "Depths from the aperture in mm; FAR may be inf")
       ->type_name("NEAR:FAR");
-  command->add_option("--depth", options->depth_path, "A depth map of the scene instead")
+  command
+      ->add_option("--depth", options->depth_path,
+                   "Depth map of the scene, instead of --depth-range")
       ->type_name("MAP");
   AddDepthOptions(command, &options->depth);
-  command->add_option("--steps", options->steps, "Depths in the table, equally spaced in 1/depth")
+  command
+      ->add_option("--steps", options->steps,
+                   "Number of depths in the table, equally spaced in 1/depth")
       ->check(CLI::Range(2, kMaxSteps))
       ->capture_default_str()
       ->type_name("N");
   AddEffectOptions(command, &options->effects);
-  command->add_option("--bits", options->bits, "Of the stored picture")
+  command->add_option("--bits", options->bits, "Bits per value of the stored picture")
       ->check(CLI::Range(1, 32))
       ->capture_default_str()
       ->type_name("N");
@@ -236,34 +239,38 @@ void AddExplainCommand(CLI::App* program, CommandAction* action) {
       ->type_name("ELECTRONS");
   command
       ->add_option("--read-noise", options->read_noise_electrons,
-                   "Of the sensor, sd; needs --full-well")
+                   "Read noise of the sensor, sd in electrons; needs --full-well")
       ->check(NonNegative())
       ->type_name("ELECTRONS");
   command->add_flag("--as-sweep", options->as_sweep,
                     "The depths are those of a target on a bench, lit from the camera");
-  command->add_option("--flicker", options->bench.flicker, "Of the lamp, relative sd")
+  command->add_option("--flicker", options->bench.flicker, "Flicker of the lamp, relative sd")
       ->check(NonNegative())
       ->type_name("SHARE");
-  command->add_option("--drift", options->bench.drift_sigma_px, "Of the target, sd at focus")
+  command
+      ->add_option("--drift", options->bench.drift_sigma_px,
+                   "Drift of the target between frames, sd in focus")
       ->check(NonNegative())
       ->type_name("PX");
-  command->add_option("--tilt", options->bench.tilt_deg, "Of the target")
+  command->add_option("--tilt", options->bench.tilt_deg, "Tilt of the target")
       ->check(Between(-89, 89, "degrees"))
       ->type_name("DEG");
-  command->add_option("--reading-error", options->bench.reading_sigma_mm, "Of the bench, sd")
+  command
+      ->add_option("--reading-error", options->bench.reading_sigma_mm,
+                   "Error of a reading of the bench, sd")
       ->check(NonNegative())
       ->type_name("MM");
   command
       ->add_option("--uv-depth", options->uv_depth_mm,
-                   "Depth of a light field's plane UV, whose ST lies in the plane of focus")
+                   "Depth of the UV plane of a light field whose ST plane is the plane of focus")
       ->check(Finite())
       ->type_name("MM");
   command->add_flag("--costs", options->costs,
-                    "Measure, too, what each effect costs in a simulated picture of this camera at "
-                    "these depths; takes some seconds");
+                    "Also measure the run time of each effect in a simulated picture of this "
+                    "camera at these depths; takes some seconds");
   command
       ->add_option("--figure", options->figure_path,
-                   "Draw the curve of blur against depth, with the band of its standard error")
+                   "Draw blur against depth, with the band of its standard error")
       ->type_name("FILE.svg");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {

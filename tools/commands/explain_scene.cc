@@ -19,7 +19,7 @@ class DepthBlocks {
         focus_(1 / camera.focus_depth_mm()),
         axis_px_(camera.sensor.principal_point_px) {}
 
-  // Nothing where all of the block are holes.
+  // Returns none if the block contains only holes.
   std::optional<model::EffectPlace> PlaceOf(int x0, int y0) const {
     model::EffectPlace place;
     bool found = false;
@@ -40,7 +40,7 @@ class DepthBlocks {
       }
     }
     if (!found) return std::nullopt;
-    // The other side lies as far beyond the plane of focus as it can.
+    // The other surface lies beyond the plane of focus, as far away as possible.
     const double here = 1 / place.depth_mm;
     const double there = here > focus_ ? here - steepest : here + steepest;
     if (steepest > 0) place.other_depth_mm = there > 0 ? 1 / there : 1 / (here + steepest);

@@ -1,4 +1,4 @@
-// thicklens render: pictures from a light field, and the light field in another layout.
+// thicklens render: renders pictures from a light field, or converts it to another layout.
 #include "thicklens/estimator/render.h"
 
 #include <fmt/format.h>
@@ -36,7 +36,7 @@ namespace {
 using model::Effect;
 
 constexpr int kMosaicGapPx = 2;
-constexpr int kEpipolarRepeatPx = 8;  // one line a view would be too thin to look at
+constexpr int kEpipolarRepeatPx = 8;  // one line per view would be too thin to see
 constexpr double kStoredLevels = 255;
 constexpr double kMaxLengthMm = 1e9;
 constexpr int kDefaultBits = 8;
@@ -45,7 +45,7 @@ struct RenderOptions {
   CommonOptions common;
   std::string light_field, output;
   ReadingOptions reading;
-  // What to render: one of these.
+  // Exactly one of these says what to render.
   bool as_captured = false;
   std::string view;
   std::optional<double> focus_mm, focus_disparity_px;
@@ -53,7 +53,7 @@ struct RenderOptions {
   bool is_epi = false;
   std::string epi;
   std::string convert;
-  // How.
+  // Settings of the rendering.
   std::string aperture_shape;
   std::optional<double> aperture_radius;
   EffectOptions effects;
@@ -85,7 +85,7 @@ std::vector<std::string> AskedFor(const RenderOptions& options) {
 }
 
 void RefuseUnless(bool fits, bool given, const char* option, const char* goes_with) {
-  if (given && !fits) throw UsageError(fmt::format("{}: goes with {} only", option, goes_with));
+  if (given && !fits) throw UsageError(fmt::format("{}: requires {}", option, goes_with));
 }
 
 void CheckUsage(RenderOptions* options) {
@@ -100,11 +100,11 @@ void CheckUsage(RenderOptions* options) {
                     asked.empty() ? "none" : fmt::format("{}", fmt::join(asked, ", "))));
   }
   const bool averages = options->as_captured || IsFocused(*options);
-  const char* const kAverages = "--as-captured, --focus and --focus-disparity";
+  const char* const kAverages = "--as-captured, --focus or --focus-disparity";
   RefuseUnless(averages, !options->aperture_shape.empty(), "--aperture-shape", kAverages);
   RefuseUnless(averages, options->aperture_radius.has_value(), "--aperture", kAverages);
   if (!options->aperture_shape.empty() && options->aperture_radius)
-    throw UsageError("--aperture and --aperture-shape: one of them, or none, is expected");
+    throw UsageError("--aperture and --aperture-shape: give at most one of them");
   RefuseUnless(options->as_captured, options->effects.effects.has_value(), "--effects",
                "--as-captured");
   RefuseUnless(options->as_captured, options->effects.without.has_value(), "--without",
@@ -112,7 +112,7 @@ void CheckUsage(RenderOptions* options) {
   RefuseUnless(options->as_captured, options->effects.tolerance.has_value(), "--tolerance",
                "--as-captured");
   const bool is_picture = options->convert.empty();
-  const char* const kPictures = "pictures, not with --convert,";
+  const char* const kPictures = "a picture as output, not --convert";
   RefuseUnless(is_picture, options->noise_levels.has_value(), "--noise", kPictures);
   RefuseUnless(is_picture, options->bits.has_value(), "--bits", kPictures);
   RefuseUnless(is_picture, options->seed.has_value(), "--seed", kPictures);
@@ -134,7 +134,8 @@ ViewPlace ParseView(const std::string& text) {
   return {false, place[0], place[1]};
 }
 
-// A line of every view, and the row or column of views; the middle ones where they are not given.
+// An epipolar line: one row or column of all views in a row or column of views; the middle ones by
+// default.
 struct EpiLine {
   bool is_row = true;
   std::optional<int> line, view;
@@ -163,9 +164,9 @@ EpiLine ParseEpi(const std::string& text) {
 
 struct Rendering {
   model::LinearPicture picture;
-  std::string what;  // for people
+  std::string what;  // for the text output
   nlohmann::json details;
-  std::string effects{};  // for people, a line of its own; empty: nothing to tell
+  std::string effects{};  // for the text output, a line of its own; may be empty
 };
 
 Eigen::ArrayXXd WeightsOf(const RenderOptions& options, const model::LightField& light_field,
@@ -197,7 +198,7 @@ std::string ApertureText(const RenderOptions& options, const model::LightField& 
                                                  : "a uniform aperture (assumed)";
 }
 
-// Those of the effects that are on.
+// Returns the weights with the effects that are on.
 Eigen::ArrayXXd PhotographWeights(const RenderOptions& options,
                                   const model::LightField& light_field, const model::EffectSet& on,
                                   nlohmann::json* details) {
@@ -220,7 +221,8 @@ Eigen::ArrayXXd PhotographWeights(const RenderOptions& options,
   return WeightsOf(options, light_field, details);
 }
 
-// The aperture of PhotographWeights where a ray crosses it between the views.
+// Returns the transmission of the aperture of PhotographWeights for rays that cross it between the
+// views.
 estimator::Vignetting VignettingOf(const RenderOptions& options,
                                    const model::LightField& light_field,
                                    const model::EffectDecision& effects) {
@@ -232,20 +234,20 @@ estimator::Vignetting VignettingOf(const RenderOptions& options,
   const std::optional<ApertureShape> own = estimator::ShapeOfWeights(light_field);
   if (own) return {*own, options.aperture_radius};
   throw Error(fmt::format(
-      "{}: its UV plane lies off the aperture, and its weights are those of no shape, so that "
-      "nothing is known of the aperture between the views: {}--without vignetting",
+      "{}: its UV plane lies off the aperture and its weights belong to no known shape, so that "
+      "the aperture between the views is unknown: give {}--without vignetting",
       options.light_field, options.aperture_radius ? "" : "--aperture-shape NAME or "));
 }
 
-// What the views do not hold, no weights bring back.
+// Light that the views do not contain cannot be restored by weights.
 void WarnOfWander(const model::LightField& light_field) {
   constexpr double kMuch = 0.4;
   const double wander = estimator::LargestWander(light_field);
   if (!(wander > kMuch)) return;
   spdlog::warn(
-      "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture beside its "
+      "with the UV plane at {:g} mm the rays of the outermost pixels cross the aperture off its "
       "middle, by {:.2g} of the half-width that the views cover: part of their light is missing, "
-      "and what is out of focus there is displaced and not blurred enough",
+      "and out-of-focus parts are displaced and not blurred enough",
       light_field.grid->planes.uv_depth_mm, wander);
 }
 
@@ -255,7 +257,7 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
       kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
   if (!notice.empty()) spdlog::warn("{}", notice);
   spdlog::debug("device: {}", backend->description());
-  // On the processor it is quicker without them.
+  // On the processor, rendering is faster without the kernels.
   const auto kernels = backend->is_opencl() ? backend->NewFloat() : nullptr;
   Rendering rendering;
   rendering.details = {{"rendered", "as-captured"}, {"device", backend->name()}};
@@ -268,7 +270,7 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
                                                  : model::ThinTwin(*light_field.camera);
   }
   std::optional<estimator::Vignetting> vignetting;
-  // An aperture of no size is one view.
+  // An aperture of radius 0 is a single view.
   if (effects.on.Has(Effect::kVignetting) && options.aperture_radius.value_or(1) > 0) {
     vignetting = VignettingOf(options, light_field, effects);
     WarnOfWander(light_field);
@@ -287,14 +289,15 @@ Rendering RenderPhotograph(const RenderOptions& options, const model::LightField
   return rendering;
 }
 
-// The disparity along v is that along u times the ratio of the view steps.
+// The disparity along v is the disparity along u times the ratio of the view steps.
 Eigen::Vector2d FocusDisparityPx(const RenderOptions& options,
                                  const model::LightField& light_field) {
   if (options.focus_mm) {
     if (!light_field.camera) {
-      throw Error(fmt::format(
-          "--focus {} mm: {} has no camera, so that millimetres mean nothing: --focus-disparity PX",
-          *options.focus_mm, options.light_field));
+      throw Error(
+          fmt::format("--focus {} mm: {} has no camera, so that depths in mm are unknown; give "
+                      "--focus-disparity PX",
+                      *options.focus_mm, options.light_field));
     }
     return estimator::DisparityAtDepthPx(light_field, *options.focus_mm);
   }
@@ -326,7 +329,7 @@ Rendering RenderView(const RenderOptions& options, const model::LightField& ligh
   if (place.centre) {
     if (light_field.u_count % 2 == 0 || light_field.v_count % 2 == 0) {
       throw Error(
-          fmt::format("--view centre: {} has {}x{} views, with none in the middle: --view "
+          fmt::format("--view centre: {} has {}x{} views, with none in the middle; give --view "
                       "u,v",
                       options.light_field, light_field.u_count, light_field.v_count));
     }
@@ -398,10 +401,10 @@ void AddToSummary(const RenderOptions& options, const model::LightField& light_f
 
 std::string ClippedText(double fraction) {
   return fraction > 0 ? fmt::format("clipped: {:.3g} % of the values\n", 100 * fraction)
-                      : "clipped: nothing\n";
+                      : "clipped: no values\n";
 }
 
-// For the file: "photograph through ...; effects: defocus, falloff".
+// The description in the file: "photograph through ...; effects: defocus, falloff".
 std::string Description(const Rendering& rendering) {
   const auto effects = rendering.details.find("effects");
   if (effects == rendering.details.end()) return rendering.what;
@@ -482,29 +485,29 @@ CommandResult Convert(const RenderOptions& options) {
 // --- Its options.
 
 void AddWhatToRender(CLI::App* command, RenderOptions* options) {
-  command->add_flag("--as-captured", options->as_captured,
-                    "The photograph that the whole aperture would take");
-  command->add_option("--view", options->view, "One view, indices from 0, or centre")
+  command->add_flag("--as-captured", options->as_captured, "Photograph through the whole aperture");
+  command->add_option("--view", options->view, "One view: its indices from 0, or centre")
       ->type_name("U,V");
   command
       ->add_option("--focus", options->focus_mm,
-                   "The photograph refocused at this depth; needs a camera")
+                   "Photograph refocused at this depth; needs a camera")
       ->check(Between(0, kMaxLengthMm, "millimetres"))
       ->type_name("MM");
   command
       ->add_option("--focus-disparity", options->focus_disparity_px,
-                   "The same by disparity, px per view step, near positive")
+                   "Photograph refocused at this disparity, px per view step, near positive")
       ->check(Finite())
       ->type_name("PX");
   command->add_flag("--mosaic", options->mosaic, "All views side by side");
   command
-      ->add_option("--epi", options->epi,
-                   "Epipolar picture: row=T[,v=L] or column=S[,u=K]; without a text the middle row")
+      ->add_option(
+          "--epi", options->epi,
+          "Epipolar picture: row=T[,v=L] or column=S[,u=K]; the middle row without a value")
       ->expected(0, 1)
       ->type_name("LINE");
   command
       ->add_option("--convert", options->convert,
-                   "The light field itself as a folder: thicklens (16-bit PNG), thicklens-tiff "
+                   "Convert the light field to a folder: thicklens (16-bit PNG), thicklens-tiff "
                    "(float) or hci (8-bit PNG in the layout of the HCI benchmark)")
       ->check(CLI::IsMember({"thicklens", "hci", "thicklens-tiff"}))
       ->type_name("LAYOUT");
@@ -514,20 +517,20 @@ void AddHowToRender(CLI::App* command, RenderOptions* options) {
   AddApertureShapeOption(command, &options->aperture_shape);
   command
       ->add_option("--aperture", options->aperture_radius,
-                   "Radius of another aperture: mm with a camera, else view steps; alone it means "
-                   "--as-captured with it")
+                   "Radius of another aperture, in mm with a camera, otherwise in view steps; "
+                   "implies --as-captured if nothing else is requested")
       ->check(NonNegative())
       ->type_name("R");
   AddEffectOptions(command, &options->effects);
   command
       ->add_option("--noise", options->noise_levels,
-                   "Add normal noise of N/255 to the stored values")
+                   "Add normally distributed noise of N/255 to the stored values")
       ->check(NonNegative())
       ->type_name("N");
-  command->add_option("--seed", options->seed, "Of the noise; default 0")
+  command->add_option("--seed", options->seed, "Seed of the noise; default 0")
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N");
-  command->add_option("--bits", options->bits, "A value of the picture: 8 (default) or 16")
+  command->add_option("--bits", options->bits, "Bits per value of the picture: 8 (default) or 16")
       ->check(CLI::IsMember({8, 16}))
       ->type_name("N");
   AddDeviceOption(command, &options->device);
@@ -537,12 +540,14 @@ void AddHowToRender(CLI::App* command, RenderOptions* options) {
 
 void AddRenderCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "render", "Pictures from a light field, or the light field in another layout");
+      "render", "Render pictures from a light field, or convert it to another layout");
   const auto options = std::make_shared<RenderOptions>();
-  command->add_option("light_field", options->light_field, "Folder of ours or in the HCI layout")
+  command
+      ->add_option("light_field", options->light_field,
+                   "Folder of a light field, in the layout of thicklens or HCI")
       ->required()
       ->type_name("LF");
-  command->add_option("-o,--output", options->output, "PNG file; for --convert a folder")
+  command->add_option("-o,--output", options->output, "PNG file to write; with --convert a folder")
       ->required()
       ->type_name("OUT");
   AddWhatToRender(command, options.get());

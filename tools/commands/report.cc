@@ -1,4 +1,4 @@
-// thicklens report: one page that shows the whole road from the focus sweep to the light field.
+// thicklens report: makes one page that shows all steps from the focus sweep to the light field.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -53,16 +53,18 @@ struct ReportOptions {
   ReadingOptions reading;
 };
 
-// --crop cuts what is of the whole picture; what was made of that cut already stays as it is.
+// --crop applies to files of the whole picture; files that were made from that crop stay as they
+// are.
 bool NeedsCrop(const std::optional<model::PixelRect>& crop, int width_px, int height_px) {
   return crop && (crop->width != width_px || crop->height != height_px);
 }
 
 [[noreturn]] void ThrowOtherSize(const std::string& path, int width_px, int height_px,
                                  const model::LightField& light_field) {
-  throw Error(fmt::format(
-      "{}: it is {}x{} px, the views are {}x{} px: the sizes must be equal (--crop cuts all alike)",
-      path, width_px, height_px, light_field.s_count, light_field.t_count));
+  throw Error(
+      fmt::format("{}: it is {}x{} px, the views are {}x{} px: the sizes must be equal (--crop "
+                  "crops all alike)",
+                  path, width_px, height_px, light_field.s_count, light_field.t_count));
 }
 
 model::LightField ReadCropped(const std::string& path, io::LightFieldReading reading) {
@@ -74,8 +76,8 @@ model::LightField ReadCropped(const std::string& path, io::LightFieldReading rea
   return light_field;
 }
 
-// Views of other places of the aperture are no truth of these. The difference that is allowed is
-// that between a true blur ratio and a calibrated one.
+// Requires that the views have the same places on the aperture; otherwise they are not the truth of
+// these views. The allowed difference is that between a true blur ratio and a calibrated one.
 void RequireSameViewpoints(const ReportOptions& options, const model::LightField& truth,
                            const model::LightField& light_field) {
   constexpr double kTolerance = 0.05;
@@ -86,12 +88,13 @@ void RequireSameViewpoints(const ReportOptions& options, const model::LightField
       std::abs(true_mm - step_mm) <= kTolerance * std::max(true_mm, step_mm)) {
     return;
   }
-  throw Error(fmt::format(
-      "{}: its views are {:.4g} mm apart, those of {} {:.4g} mm: the distances must be equal",
-      options.truth_path, true_mm, options.light_field_path, step_mm));
+  throw Error(
+      fmt::format("{}: its views are {:.4g} mm apart, those of {} are {:.4g} mm apart: the "
+                  "distances must be equal",
+                  options.truth_path, true_mm, options.light_field_path, step_mm));
 }
 
-// The truth in the views of the light field.
+// Returns the true views that correspond to the views of the light field.
 model::LightField ReadTruth(const ReportOptions& options, const model::LightField& light_field) {
   io::LightFieldReading reading = ReadingOf(options.reading);
   reading.u_count = reading.v_count = 0;
@@ -129,7 +132,7 @@ model::LinearPicture ReadPhoto(const ReportOptions& options, const model::LightF
   return model::ToLinear(photo, light_field.transfer);
 }
 
-// A light field's depths are millimetres where it has a camera, else disparities.
+// The depths of a light field are in mm if it has a camera; otherwise they are disparities.
 PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light_field) {
   model::DepthConvention convention = ConventionOf(options.depth);
   if (convention.kind != model::DepthKind::kDisparity && !light_field.camera) {
@@ -155,10 +158,10 @@ PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light
     return depth;
   }
   const model::LightFieldGrid& grid = *light_field.grid;
-  // One step in u, or in v where there is one view in u.
+  // One view step along u, or along v if u has one view.
   const Eigen::Vector2d step_mm = model::ApertureStepsMm(grid, *light_field.camera);
   convention.aperture_step_mm = std::abs(step_mm.x() != 0 ? step_mm.x() : step_mm.y());
-  // Of the picture, only its size counts here.
+  // Only the size of the picture matters here.
   model::LinearPicture picture{map.width_px, map.height_px, 1, {}};
   picture.values.assign(map.values.size(), 0.0F);
   depth.values =
@@ -167,13 +170,14 @@ PageDepth ReadDepth(const ReportOptions& options, const model::LightField& light
   return depth;
 }
 
-// Depths of the frames of a sweep up to a constant: larger is farther.
+// Returns the depths of the frames of a sweep up to a constant; larger is farther.
 double RelativeDepthMm(const model::SweepFile& sweep, const model::SweepFrame& frame) {
   return model::DirectionSign(sweep.direction) * frame.reading_mm;
 }
 
-// Which of the frames, ordered from near to far, stands nearest to the camera's plane of focus.
-// None where the bench zero is not known, or that plane lies more than a step outside the sweep.
+// Returns which of the frames, ordered from near to far, is nearest to the camera's plane of focus.
+// Returns none if the bench zero is unknown, or if that plane lies more than a step outside the
+// sweep.
 std::optional<std::size_t> FrameInFocus(const model::SweepFile& sweep,
                                         const std::optional<model::Camera>& camera) {
   if (!camera || !camera->calibration || !camera->calibration->image_distance_mm) {
@@ -196,7 +200,7 @@ std::optional<std::size_t> FrameInFocus(const model::SweepFile& sweep,
   return nearest;
 }
 
-// Evenly chosen on both sides of `middle`, with both ends: at most kShots.
+// Chooses at most kShots frames evenly on both sides of `middle`, including both ends.
 std::vector<std::size_t> ShotIndices(std::size_t count, std::size_t middle) {
   std::vector<std::size_t> indices;
   constexpr std::size_t kSide = kShots / 2;
@@ -208,7 +212,8 @@ std::vector<std::size_t> ShotIndices(std::size_t count, std::size_t middle) {
   return indices;
 }
 
-// The middle of the frame, or of the region of interest: blur is seen at full size alone.
+// Returns the middle of the frame, or of the region of interest, because blur is visible only at
+// full size.
 cv::Mat MiddleOf(const cv::Mat& frame, const model::RegionOfInterest& roi) {
   constexpr int kLeastPx = 128, kMostPx = 320;
   cv::Rect whole(0, 0, frame.cols, frame.rows);
@@ -247,7 +252,7 @@ SweepStrip ReadSweepStrip(const std::string& path, const std::optional<model::Ca
   return strip;
 }
 
-// The record of another run would put wrong numbers beside these pictures.
+// A record of another run would show wrong numbers beside these pictures.
 EstimateRecord ReadMatchingRecord(const ReportOptions& options,
                                   const model::LightField& light_field) {
   EstimateRecord record = ReadEstimateRecord(options.estimate_path);
@@ -256,16 +261,16 @@ EstimateRecord ReadMatchingRecord(const ReportOptions& options,
       record.u_count == light_field.u_count && record.v_count == light_field.v_count &&
       record.s_count == light_field.s_count && record.t_count == light_field.t_count;
   if (matches || is_part) return record;
-  throw Error(fmt::format(
-      "{}: it is of {}x{} views of {}x{} px, {} has {}x{} of {}x{} px: the record of its own "
-      "estimate is expected",
-      options.estimate_path, record.u_count, record.v_count, record.s_count, record.t_count,
-      options.light_field_path, light_field.u_count, light_field.v_count, light_field.s_count,
-      light_field.t_count));
+  throw Error(
+      fmt::format("{}: it is for {}x{} views of {}x{} px, but {} has {}x{} views of {}x{} px: the "
+                  "record of its own estimate is expected",
+                  options.estimate_path, record.u_count, record.v_count, record.s_count,
+                  record.t_count, options.light_field_path, light_field.u_count,
+                  light_field.v_count, light_field.s_count, light_field.t_count));
 }
 
-// Scores of another area would stand beside these views. Without a word in the record it is taken
-// as theirs.
+// Requires scores of the same area as these views. A record that does not state its area is assumed
+// to match.
 ComparisonRecord ReadMatchingComparison(const ReportOptions& options,
                                         const model::LightField& light_field) {
   ComparisonRecord record = ReadComparisonRecord(options.comparison_path);
@@ -277,8 +282,8 @@ ComparisonRecord ReadMatchingComparison(const ReportOptions& options,
        (record.s_count == light_field.s_count && record.t_count == light_field.t_count));
   if (matches) return record;
   throw Error(fmt::format(
-      "{}: it compares {}x{} views of {}x{} px, the page shows {}x{} of {}x{} px of {}: a "
-      "comparison of the same views and the same part is expected (--views, --crop)",
+      "{}: it compares {}x{} views of {}x{} px, but the page shows {}x{} views of {}x{} px of {}: "
+      "a comparison of the same views and the same part is expected (--views, --crop)",
       options.comparison_path, record.u_count, record.v_count, record.s_count, record.t_count,
       light_field.u_count, light_field.v_count, light_field.s_count, light_field.t_count,
       options.light_field_path));
@@ -334,36 +339,40 @@ void CheckUsage(const ReportOptions& options) {
     ConventionOf(depth);
   } else if (!depth.kind.empty() || !depth.unit.empty() || depth.disparity_scale != 1 ||
              depth.disparity_offset_px != 0) {
-    throw UsageError("--depth-kind, --depth-unit and --disparity-... go with --depth");
+    throw UsageError("--depth-kind, --depth-unit and --disparity-... require --depth");
   }
 }
 
 void AddFileOptions(CLI::App* command, ReportOptions* options) {
-  command->add_option("light-field", options->light_field_path, "The estimated light field")
+  command->add_option("light-field", options->light_field_path, "Estimated light field")
       ->required()
       ->type_name("LF");
-  command->add_option("-o,--output", options->output_path, "The page")
+  command->add_option("-o,--output", options->output_path, "Page to write")
       ->required()
       ->type_name("PAGE.html");
-  command->add_option("--photo", options->photo_path, "The photograph it was estimated from")
+  command->add_option("--photo", options->photo_path, "Photograph that it was estimated from")
       ->type_name("IMAGE");
-  command->add_option("--depth", options->depth_path, "The photograph's depth map")
+  command->add_option("--depth", options->depth_path, "Depth map of the photograph")
       ->type_name("DEPTH");
   AddDepthOptions(command, &options->depth);
   command
       ->add_option("--truth", options->truth_path,
-                   "The true light field; of more views, the inner ones are taken")
+                   "True light field; if it has more views, the inner ones are used")
       ->type_name("TRUE_LF");
-  command->add_option("--sweep", options->sweep_path, "The focus sweep that the camera comes from")
+  command
+      ->add_option("--sweep", options->sweep_path,
+                   "Focus sweep that the camera was calibrated with")
       ->type_name("SWEEP");
   command
       ->add_option("--calibration", options->calibration_path,
-                   "The page of thicklens calibrate --report")
+                   "Page of thicklens calibrate --report")
       ->type_name("REPORT.html");
-  command->add_option("--estimate", options->estimate_path, "What thicklens estimate --json wrote")
+  command
+      ->add_option("--estimate", options->estimate_path, "JSON file of thicklens estimate --json")
       ->type_name("ESTIMATE.json");
   command
-      ->add_option("--comparison", options->comparison_path, "What thicklens compare --json wrote")
+      ->add_option("--comparison", options->comparison_path,
+                   "JSON file of thicklens compare --json")
       ->type_name("COMPARE.json");
 }
 
@@ -371,7 +380,7 @@ void AddFileOptions(CLI::App* command, ReportOptions* options) {
 
 void AddReportCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command = program->add_subcommand(
-      "report", "One page that shows a light field and what it was made from");
+      "report", "Make one page that shows a light field and the data it was made from");
   const auto options = std::make_shared<ReportOptions>();
   AddFileOptions(command, options.get());
   AddReadingOptions(command, &options->reading);

@@ -1,4 +1,4 @@
-// thicklens simulate: made-up bench photographs with their truth.
+// thicklens simulate: simulates photographs on the bench, with their true values.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -30,7 +30,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Sign of a folder that this program wrote and may replace.
+// A folder with this file was written by this program, which may replace it.
 constexpr char kMarkerFile[] = "truth.yaml";
 
 struct SimulateOptions {
@@ -40,10 +40,10 @@ struct SimulateOptions {
   std::optional<std::int64_t> seed;
   bool unknown_offset = false;
   bool attribute = false;
-  EffectOptions effects{{}, {}, {}, ""};  // auto has no choice
+  EffectOptions effects{{}, {}, {}, ""};  // auto has nothing to choose
 };
 
-// Returns the bits of what is stored.
+// Returns the bits per stored value.
 int RenderFrames(const model::SweepSimulator& simulator, const CommonOptions& common,
                  OutputFolder* folder) {
   const auto& frames = simulator.truth().frames;
@@ -99,7 +99,7 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   const model::SweepSimulator simulator(simulation, target_picture);
   const int bits = RenderFrames(simulator, options.common, &folder);
   model::Camera camera = simulator.camera();
-  camera.calibration.reset();  // what a calibration of this sweep has to find
+  camera.calibration.reset();  // a calibration of this sweep must find it
   folder.Write("camera.yaml", model::CameraToYaml(camera));
   folder.Write("sweep.yaml", model::SweepToYaml(
                                  io::DescribeSweep(simulation, simulator, options.unknown_offset)));
@@ -133,27 +133,29 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
 }  // namespace
 
 void AddSimulateCommand(CLI::App* program, CommandAction* action) {
-  CLI::App* simulate = program->add_subcommand("simulate", "Make photographs with their truth");
+  CLI::App* simulate =
+      program->add_subcommand("simulate", "Simulate photographs, with their true values");
   simulate->require_subcommand(1);
   CLI::App* command = simulate->add_subcommand(
       "sweep",
       "A focus sweep: frames/, camera.yaml (without calibration), sweep.yaml and truth.yaml");
   const auto options = std::make_shared<SimulateOptions>();
-  command->add_option("config", options->config_path, "What to simulate")
+  command->add_option("config", options->config_path, "Description of the sweep to simulate")
       ->required()
       ->type_name("CONFIG");
   command->add_option("-o,--output", options->output_folder, "Folder to write")
       ->required()
       ->type_name("DIR");
-  command->add_option("--seed", options->seed, "Replaces the config's seed")
+  command->add_option("--seed", options->seed, "Seed; overrides the one in the config")
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N");
-  command->add_flag("--unknown-offset", options->unknown_offset,
-                    "Leave the bench offset out of sweep.yaml, to be found by a calibration");
+  command->add_flag(
+      "--unknown-offset", options->unknown_offset,
+      "Leave the bench offset out of sweep.yaml, so that a calibration has to find it");
   AddEffectOptions(command, &options->effects);
   command->add_flag("--attribute", options->attribute,
-                    "Also simulate and calibrate it without each effect in turn, and tell what "
-                    "each changes: a table, attribution.csv and the page attribution.html");
+                    "Also simulate and calibrate without each effect in turn, and report what each "
+                    "effect changes: a table, attribution.csv and the page attribution.html");
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {
     *action = [options] {

@@ -1,4 +1,4 @@
-// thicklens simulate picture, thicklens simulate light-field: a made-up photograph with its depth
+// thicklens simulate picture, thicklens simulate light-field: simulate a photograph with its depth
 // map, and the true light field of the same scene.
 #include "tools/commands/simulate_scene.h"
 
@@ -35,7 +35,7 @@
 namespace thicklens::tools {
 namespace {
 
-// Sign of a folder that this program wrote and may replace.
+// A folder with this file was written by this program, which may replace it.
 constexpr char kPictureMarker[] = "truth.yaml";
 
 struct SceneOptions {
@@ -45,7 +45,7 @@ struct SceneOptions {
   std::optional<std::int64_t> seed;
   EffectOptions effects;
   bool attribute = false;             // picture
-  std::string sweep_path;             // picture; of the attribution
+  std::string sweep_path;             // picture; for the attribution
   ViewsOption views;                  // light-field
   std::optional<double> uv_depth_mm;  // light-field
   std::string format = "png";         // light-field
@@ -65,7 +65,7 @@ model::SceneSimulationOptions ReadConfig(const SceneOptions& options) {
   return scene;
 }
 
-// Progress on the terminal, and an end when the person asks for one.
+// Shows progress on the terminal and ends when the user requests it.
 model::SceneRun RunWith(const CommonOptions& common, ProgressLine* progress) {
   return {common.threads, [progress](int done, int total) {
             ThrowIfCancelled();
@@ -98,9 +98,9 @@ std::string SamplingText(const model::SceneSimulationOptions& scene,
                          const model::SceneSimulator& simulator) {
   const double error = simulator.sampling_error_grey_levels();
   const double asked = scene.sampling_error_grey_levels;
-  return fmt::format("sampling error where it is largest: about {:.2g} grey levels rms{}\n", error,
+  return fmt::format("largest sampling error: about {:.2g} grey levels rms{}\n", error,
                      error > asked && asked > 0
-                         ? fmt::format(", above the {:.2g} asked for: rays_per_pixel is {}", asked,
+                         ? fmt::format(", above the requested {:.2g}: rays_per_pixel is {}", asked,
                                        scene.rays_per_pixel)
                          : "");
 }
@@ -109,11 +109,11 @@ Attribution Attribute(const SceneOptions& options, const model::SceneSimulationO
                       const std::vector<model::LayerPixels>& pixels) {
   Attribution attribution;
   std::optional<model::SweepSimulationOptions> sweep;
-  if (!options.sweep_path.empty()) {  // read before anything long
+  if (!options.sweep_path.empty()) {  // read before anything that takes long
     sweep = model::ReadSweepSimulation(options.sweep_path);
     if (options.seed) sweep->seed = static_cast<std::uint64_t>(*options.seed);
   }
-  // The sweep first: it may have no calibration to compare with.
+  // The sweep is read first, because it may have no calibration to compare with.
   if (sweep) {
     ProgressLine progress("attributing the sweep", options.common.quiet);
     attribution.sweep = AttributeSweepOf(options.sweep_path, *sweep, false,
@@ -219,11 +219,13 @@ CommandResult SimulateLightField(const SceneOptions& options) {
 CLI::App* AddSceneCommand(CLI::App* simulate, const std::string& name, const std::string& help,
                           SceneOptions* options) {
   CLI::App* command = simulate->add_subcommand(name, help);
-  command->add_option("config", options->config_path, "The scene")->required()->type_name("CONFIG");
+  command->add_option("config", options->config_path, "Description of the scene")
+      ->required()
+      ->type_name("CONFIG");
   command->add_option("-o,--output", options->output_folder, "Folder to write")
       ->required()
       ->type_name("DIR");
-  command->add_option("--seed", options->seed, "Replaces the config's seed")
+  command->add_option("--seed", options->seed, "Seed; overrides the one in the config")
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N");
   AddEffectOptions(command, &options->effects);
@@ -240,19 +242,19 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
                       "A photograph of a scene: picture.png, depth.pfm (z in mm), camera.yaml (the "
                       "true calibration) and truth.yaml",
                       picture.get());
-  command->add_flag("--attribute", picture->attribute,
-                    "Also simulate it without each effect in turn and estimate the light field of "
-                    "each, and tell what each changes: a table, attribution.csv and the page "
-                    "attribution.html");
+  command->add_flag(
+      "--attribute", picture->attribute,
+      "Also simulate the picture and estimate its light field without each effect in turn, and "
+      "report what each effect changes: a table, attribution.csv and the page attribution.html");
   command
       ->add_option("--sweep", picture->sweep_path,
-                   "With --attribute: a simulated sweep (as of simulate sweep), to tell what each "
-                   "effect changes in its calibration")
+                   "For --attribute: a simulated sweep (as for simulate sweep), to report what "
+                   "each effect changes in its calibration")
       ->type_name("SWEEP");
   command->callback([picture, action] {
     *action = [picture] {
       if (!picture->sweep_path.empty() && !picture->attribute) {
-        throw UsageError("--sweep belongs to --attribute");
+        throw UsageError("--sweep requires --attribute");
       }
       RequireDistinctFiles({picture->common.json_path, picture->output_folder},
                            {picture->config_path, picture->sweep_path});
@@ -263,15 +265,15 @@ void AddSimulateSceneCommands(CLI::App* simulate, CommandAction* action) {
   const auto views = std::make_shared<SceneOptions>();
   command = AddSceneCommand(simulate, "light-field",
                             "The true light field of a scene, as its views", views.get());
-  AddViewsOption(command, &views->views, "Replaces the config's views");
+  AddViewsOption(command, &views->views, "Number of views across and down; overrides the config");
   command
       ->add_option("--uv-depth", views->uv_depth_mm,
-                   "Depth of the UV plane, 0: the aperture; replaces the config's uv_depth_mm")
+                   "Depth of the UV plane, 0: the aperture; overrides uv_depth_mm of the config")
       ->check(Finite())
       ->type_name("MM");
   command
       ->add_option("--format", views->format,
-                   "Of the views: png (16 bit, stored values) or tiff (float, linear light)")
+                   "Format of the views: png (16 bit, stored values) or tiff (float, linear light)")
       ->check(CLI::IsMember({"png", "tiff"}))
       ->capture_default_str()
       ->type_name("NAME");

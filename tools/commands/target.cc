@@ -1,4 +1,4 @@
-// thicklens target: a sheet to be photographed for a calibration, at true scale.
+// thicklens target: draws a calibration target to be printed at true scale.
 #include <fmt/format.h>
 
 #include <array>
@@ -28,7 +28,8 @@ constexpr double kLongestSideMm = 2000;
 constexpr double kMaxFeatureMm = 50;
 constexpr double kMaxDistanceMm = 1e6;
 constexpr double kLeastDpi = 72, kMostDpi = 4800;
-// Both axes of the edge's pixels get many phases, and the plateaus stay wide.
+// In this range the pixels along both axes of the edge have many phases, and the plateaus stay
+// wide.
 constexpr double kLeastEdgeDeg = 2, kMostEdgeDeg = 20;
 
 enum class Format { kPdf, kSvg, kPng };
@@ -151,18 +152,19 @@ void AddTargetOptions(CLI::App* command, TargetOptions* options) {
   command->add_option("--size", options->size, "Sheet: a4, a3, letter, or width x height in mm")
       ->capture_default_str()
       ->type_name("WxH");
-  CLI::Option* camera = command
-                            ->add_option("--camera", options->camera_path,
-                                         "Camera whose field the pattern has to fill")
-                            ->type_name("CAMERA.yaml");
+  CLI::Option* camera =
+      command
+          ->add_option("--camera", options->camera_path, "Camera whose field the pattern must fill")
+          ->type_name("CAMERA.yaml");
   CLI::Option* distance = command
                               ->add_option("--distance-mm", options->distance_mm,
-                                           "From its aperture to the target in focus")
+                                           "Distance from its aperture to the target in focus")
                               ->check(Between(0, kMaxDistanceMm, "mm from the aperture"))
                               ->needs(camera)
                               ->type_name("Z");
   camera->needs(distance);
-  command->add_option("--feature-mm", options->feature_mm, "Smallest feature; else it is chosen")
+  command
+      ->add_option("--feature-mm", options->feature_mm, "Smallest feature; by default it is chosen")
       ->check(Between(0, kMaxFeatureMm, "mm on the sheet"))
       ->type_name("S");
   command
@@ -173,17 +175,17 @@ void AddTargetOptions(CLI::App* command, TargetOptions* options) {
       ->type_name("S");
   command
       ->add_option("--edge-angle-deg", options->request.edge_angle_deg,
-                   "Of the edge from the vertical, upper end to the right")
+                   "Angle of the edge from the vertical, upper end to the right")
       ->check(Between(kLeastEdgeDeg, kMostEdgeDeg, "degrees from the vertical"))
       ->capture_default_str()
       ->type_name("A");
   command->add_flag("--two-tone", options->request.two_tone,
-                    "Black and white alone, for printers that make greys of dots");
+                    "Only black and white, for printers that print greys as dots");
   command->add_option("--dpi", options->dots_per_inch, "Resolution of a .png, dots per inch")
       ->check(Between(kLeastDpi, kMostDpi, "dots per inch"))
       ->capture_default_str()
       ->type_name("N");
-  command->add_option("--seed", options->seed, "Another seed, another texture")
+  command->add_option("--seed", options->seed, "Seed of the texture")
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
       ->capture_default_str()
       ->type_name("N");
@@ -194,7 +196,7 @@ void AddTargetOptions(CLI::App* command, TargetOptions* options) {
 
 void AddTargetCommand(CLI::App* program, CommandAction* action) {
   CLI::App* command =
-      program->add_subcommand("target", "A calibration target at true scale, to be printed");
+      program->add_subcommand("target", "Draw a calibration target to be printed at true scale");
   const auto options = std::make_shared<TargetOptions>();
   AddTargetOptions(command, options.get());
   command->callback([options, action] {

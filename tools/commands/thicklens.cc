@@ -1,4 +1,4 @@
-// The program: finds the command that is asked for, runs it, and tells a failure in one line.
+// The program: finds the requested command, runs it, and reports a failure in one line.
 #include <fmt/format.h>
 #include <glog/logging.h>
 #include <spdlog/sinks/stdout_sinks.h>
@@ -35,10 +35,10 @@ using namespace thicklens;
 enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2 };
 
 void SetUpMessages() {
-  // Libraries keep still: what goes wrong is told by whoever asked them, with the file's name.
+  // Libraries print nothing: the code that calls them reports errors, with the file's name.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   FLAGS_minloglevel = google::GLOG_FATAL;  // Ceres logs through glog
-  FLAGS_logtostderr = true;                // and not into files of /tmp or the current folder
+  FLAGS_logtostderr = true;                // and not to files in /tmp or the current folder
   google::InitGoogleLogging("thicklens");
   spdlog::set_default_logger(spdlog::stderr_logger_mt("thicklens"));
   spdlog::set_formatter(tools::MakeMessageFormatter());
@@ -51,10 +51,10 @@ int Fail(std::string message, ExitCode code) {
   return code;
 }
 
-// A variable of the shell that was never set gives an empty text, which is never a value.
+// A shell variable that was never set gives an empty text, which is never a valid value.
 void RequireNoEmptyValue(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
-    if (option->get_expected_min() == 0) continue;  // it may stand without a value
+    if (option->get_expected_min() == 0) continue;  // it needs no value
     for (const std::string& value : option->results()) {
       if (value.empty()) {
         throw tools::UsageError(fmt::format("{}: a value is expected, found ''",
@@ -75,7 +75,7 @@ int ParseAndRun(CLI::App* program, const tools::CommandAction* action, int argc,
   }
   RequireNoEmptyValue(*program);
   (*action)();
-  // Results that did not reach their file are a failure; a reader who went away is none.
+  // It is a failure if results do not reach their file, but not if the reader of a pipe went away.
   errno = 0;
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
     if (errno != EPIPE) {
@@ -99,7 +99,8 @@ int Main(int argc, char** argv) {
   CLI::App program(
       "Thick-lens camera calibration from focus sweeps, and light fields from one picture",
       "thicklens");
-  program.set_version_flag("--version", tools::BuildInfo(), "Version, and what it was built with");
+  program.set_version_flag("--version", tools::BuildInfo(),
+                           "Print the version and the libraries it was built with");
   program.require_subcommand(1);
   tools::CommandAction action;
   tools::AddSimulateCommand(&program, &action);
@@ -116,10 +117,10 @@ int Main(int argc, char** argv) {
   return ParseAndRun(&program, &action, argc, argv);
 }
 
-// However the program ends, by main's return or by a library that calls exit(), nothing is left to
-// the ends of libraries: where memory is short the threads that OpenBLAS starts with the program
-// ask for some again and again, and its end would wait for theirs forever. Sanitizers tell at the
-// end what they found.
+// However the program ends, by main's return or by a library that calls exit(), the exit handlers
+// of libraries do not run: if memory is short, the threads that OpenBLAS starts with the program
+// try to allocate again and again, and its exit handler would wait for their end forever.
+// Sanitizers report at the end what they found.
 void EndWithoutLibraries() {
 #if defined(__GLIBC__) && !defined(THICKLENS_IS_SANITIZED)
   ::on_exit(
@@ -139,7 +140,7 @@ int Run(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return Fail("out of memory", kFailed);
   } catch (const cv::Exception& error) {
-    // OpenCV says it this way, too, when memory is short.
+    // OpenCV reports a lack of memory this way.
     return Fail(error.code == cv::Error::StsNoMem ? "out of memory" : error.what(), kFailed);
   } catch (const std::exception& error) {
     return Fail(error.what(), kFailed);

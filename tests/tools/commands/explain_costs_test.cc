@@ -67,7 +67,7 @@ TEST_F(ExplainCostsTest, BlurIsWhatAPictureCosts) {
       EXPECT_FALSE(effect.contains("cost_seconds"));
     }
   }
-  EXPECT_THAT(result.out, AllOf(HasSubstr("cost s"), HasSubstr("seconds of one core")));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("cost s"), HasSubstr("seconds on one core")));
   EXPECT_THAT(Run({"--depth-range", "280:320"}).out, Not(HasSubstr("cost")));
 }
 

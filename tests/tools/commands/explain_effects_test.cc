@@ -132,7 +132,7 @@ TEST_F(ExplainEffectsTest, ToleranceAndSensorDecideWhatIsOn) {
 TEST_F(ExplainEffectsTest, SaysWhatIsWrong) {
   const std::string map = DepthMap(280);
   EXPECT_EQ(Run({}).exit_code, 2);
-  EXPECT_THAT(Run({}).err, HasSubstr("one of --depth-range and --depth is needed"));
+  EXPECT_THAT(Run({}).err, HasSubstr("--depth-range or --depth is missing"));
   EXPECT_EQ(
       Run({"--depth-range", "200:300", "--depth", map, "--depth-kind", "z", "--depth-unit", "mm"})
           .exit_code,
@@ -141,18 +141,18 @@ TEST_F(ExplainEffectsTest, SaysWhatIsWrong) {
   EXPECT_THAT(Run({"--depth", map, "--depth-kind", "disparity"}).err,
               HasSubstr("z or range is expected"));
   EXPECT_THAT(Run({"--depth-range", "200:300", "--depth-unit", "mm"}).err,
-              HasSubstr("belong to --depth"));
+              HasSubstr("require --depth"));
   EXPECT_THAT(Run({"--depth-range", "200:300", "--read-noise", "3"}).err,
               HasSubstr("needs --full-well"));
   EXPECT_THAT(Run({"--depth-range", "200:300", "--drift", "0.2"}).err,
-              HasSubstr("belong to --as-sweep"));
+              HasSubstr("require --as-sweep"));
   EXPECT_EQ(Run({"--depth-range", "200:300", "--effects", ""}).exit_code, 2);
   EXPECT_EQ(Run({"--depth-range", "200:300", "--tolerance", "1"}).exit_code, 2);
   model::RawDepthMap small{8, 8, std::vector<float>(64, 300), false};
   const ProgramResult wrong_size = Run({"--depth", folder_.Put("small.pfm", io::EncodePfm(small)),
                                         "--depth-kind", "z", "--depth-unit", "mm"});
   EXPECT_EQ(wrong_size.exit_code, 1);
-  EXPECT_THAT(wrong_size.err, HasSubstr("it is 8x8 px, the camera's sensor 40x32 px"));
+  EXPECT_THAT(wrong_size.err, HasSubstr("it is 8x8 px, but the camera's sensor has 40x32 px"));
 }
 
 }  // namespace

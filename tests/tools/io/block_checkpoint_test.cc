@@ -278,7 +278,7 @@ TEST_F(ResumedEstimate, GoesOnToTheSameBits) {
     EXPECT_FALSE(fs::exists(folder_ / "lf"));
     if (signal == SIGINT) {
       EXPECT_THAT(stopped.err, AllOf(HasSubstr("are kept in " + Checkpoint()),
-                                     HasSubstr("the same command goes on from there")));
+                                     HasSubstr("the same command continues from there")));
     }
     const std::string json = folder_ / "estimate.json";
     const ProgramResult resumed =

@@ -224,7 +224,7 @@ TEST_F(AttributionTest, ASweepWithoutAttributionIsRefused) {
                    scratch_.path(), 0)
           .Wait();
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("--sweep belongs to --attribute"));
+  EXPECT_THAT(result.err, HasSubstr("--sweep requires --attribute"));
 }
 
 }  // namespace

@@ -811,7 +811,7 @@ TEST_F(ReportProgram, RefusesFilesThatDoNotFit) {
   ExpectRefused(
       {estimate, "--estimate",
        folder_.Put("e.json", R"({"solver": "blocks", "views": [5, 5], "size": [40, 24]})")},
-      {"e.json: it is of 5x5 views of 40x24 px", "3x3"});
+      {"e.json: it is for 5x5 views of 40x24 px", "3x3"});
   // Scores of another part, or of other views, would stand beside these.
   for (const char* area :
        {R"("views": [3, 3], "size": [20, 24])", R"("views": [5, 5], "size": [40, 24])"}) {
@@ -845,7 +845,7 @@ TEST_F(ReportProgram, CommandLinesThatCannotBeMeant) {
   const std::string relative = Write(Relative(3, 3), "est");
   const std::string depth = PutDepth(1);
   ExpectRefused({relative, "--depth", depth}, {"--depth-kind is missing"}, 2);
-  ExpectRefused({relative, "--depth-kind", "disparity"}, {"go with --depth"}, 2);
+  ExpectRefused({relative, "--depth-kind", "disparity"}, {"require --depth"}, 2);
   ExpectRefused({relative, "--depth", depth, "--depth-kind", "z", "--depth-unit", "mm"},
                 {"has no camera"}, 2);
   ExpectRefused({relative, "--crop", "1,2,3"}, {"--crop"}, 2);
