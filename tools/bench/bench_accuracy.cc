@@ -20,6 +20,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/estimator/blas.h"
 #include "thicklens/io/scene_pixels.h"
 #include "thicklens/kernels/device.h"

@@ -7,6 +7,7 @@
 
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/estimator/blas.h"
 #include "tools/system/build_info.h"
 #include "tools/system/machine.h"

@@ -18,6 +18,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/parallel.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"

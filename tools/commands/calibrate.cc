@@ -16,6 +16,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/model/camera_file.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
@@ -28,7 +29,6 @@
 #include "tools/report/report_folder.h"
 #include "tools/report/sweep_understanding.h"
 #include "tools/system/build_info.h"
-#include "tools/system/machine.h"
 #include "tools/system/progress_line.h"
 
 namespace thicklens::tools {

@@ -18,6 +18,7 @@
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/stopwatch.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/functional_solver.h"
 #include "thicklens/estimator/grid_solver.h"
@@ -42,7 +43,6 @@
 #include "tools/report/report_folder.h"
 #include "tools/system/build_info.h"
 #include "tools/system/interrupt.h"
-#include "tools/system/machine.h"
 #include "tools/system/progress_line.h"
 
 namespace thicklens::tools {

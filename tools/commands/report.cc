@@ -17,6 +17,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/estimator/view_geometry.h"
 #include "thicklens/io/aperture_statement.h"
 #include "thicklens/io/depth_io.h"
@@ -34,7 +35,6 @@
 #include "tools/report/inlined_report.h"
 #include "tools/report/light_field_page.h"
 #include "tools/system/build_info.h"
-#include "tools/system/machine.h"
 
 namespace thicklens::tools {
 namespace {

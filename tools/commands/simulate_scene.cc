@@ -16,6 +16,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/base/stopwatch.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/io/image_io.h"
 #include "thicklens/io/light_field_io.h"
@@ -29,7 +30,6 @@
 #include "tools/options/option_values.h"
 #include "tools/report/attribution_page.h"
 #include "tools/system/build_info.h"
-#include "tools/system/machine.h"
 #include "tools/system/progress_line.h"
 
 namespace thicklens::tools {

@@ -12,7 +12,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/model/camera_file.h"
-#include "tools/options/missing_tolerances.h"
+#include "tools/interface/missing_tolerances.h"
 #include "tools/options/option_values.h"
 
 namespace thicklens::tools {

@@ -9,6 +9,7 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
+#include "thicklens/base/utc_time.h"
 #include "thicklens/io/simulated_sweep.h"
 #include "tools/report/light_field_figures.h"
 #include "tools/report/page_figures.h"
@@ -16,7 +17,6 @@
 #include "tools/report/page_style.h"
 #include "tools/report/svg_plot.h"
 #include "tools/system/build_info.h"
-#include "tools/system/machine.h"
 
 namespace thicklens::tools {
 namespace {

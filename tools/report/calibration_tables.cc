@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "thicklens/base/printable_text.h"
-#include "tools/options/missing_tolerances.h"
+#include "tools/interface/missing_tolerances.h"
 #include "tools/report/calibration_sections.h"
 #include "tools/report/calibration_words.h"
 #include "tools/report/page_style.h"

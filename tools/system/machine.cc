@@ -1,9 +1,6 @@
 #include "tools/system/machine.h"
 
-#include <fmt/chrono.h>
-
 #include <cstddef>
-#include <ctime>
 #include <fstream>
 
 namespace thicklens::tools {
@@ -16,10 +13,6 @@ std::string ProcessorName() {
     if (colon != std::string::npos) return line.substr(colon + 2);
   }
   return kUnknownProcessor;
-}
-
-std::string NowIso8601() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 }  // namespace thicklens::tools

@@ -1,12 +1,12 @@
-#include "tools/options/missing_tolerances.h"
+#include "tools/interface/missing_tolerances.h"
 
 #include <fmt/format.h>
 
 #include <vector>
 
-namespace thicklens::tools {
+namespace thicklens {
 
-std::string MissingTolerancesLine(const model::Camera& camera) {
+std::string MissingTolerancesLine(const Camera& camera) {
   const auto is_missing = [&](const std::string& field) {
     const auto statement = camera.statements.find(field);
     return statement == camera.statements.end() || !(statement->second.tolerance > 0);
@@ -16,12 +16,12 @@ std::string MissingTolerancesLine(const model::Camera& camera) {
   const bool pitch = is_missing("sensor.pixel_pitch_mm");
   if (!focal_length && !pitch) return "";
   std::string effect;
-  if (focal_length) effect = "d1 changes by about 1 % for each 1 % of the focal length";
+  if (focal_length) effect = "d1 moves about 1 % for each 1 % of the focal length";
   if (pitch)
     effect += focal_length ? ", kappa about 1 % for each 1 % of the pixel pitch"
-                           : "kappa changes by about 1 % for each 1 % of the pixel pitch";
+                           : "kappa moves about 1 % for each 1 % of the pixel pitch";
   return fmt::format(
-      "no tolerance is stated for the {}: the intervals treat {} as exact, but {}; give {{value: "
+      "no tolerance is stated for the {}: the intervals take {} as exact, but {}; give {{value: "
       ".., tolerance: ..}} in the camera file",
       focal_length && pitch ? "focal lengths and the pixel pitch"
       : focal_length        ? "focal lengths"
@@ -29,4 +29,4 @@ std::string MissingTolerancesLine(const model::Camera& camera) {
       focal_length ? "them" : "it", effect);
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens

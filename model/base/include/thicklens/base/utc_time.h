@@ -1,0 +1,13 @@
+#ifndef THICKLENS_BASE_UTC_TIME_H_
+#define THICKLENS_BASE_UTC_TIME_H_
+
+#include <string>
+
+namespace thicklens {
+
+// Returns the current time, UTC, as in 2026-01-31T12:00:00Z.
+std::string NowIso8601();
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_BASE_UTC_TIME_H_

@@ -1,0 +1,53 @@
+#include "thicklens/image.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "thicklens/base/error.h"
+#include "thicklens/opencv.h"
+
+namespace thicklens {
+namespace {
+
+TEST(ImageTest, BlueFirstIsRearranged) {
+  const Image image = Image::FromEncoded(2, 1, ChannelOrder::kBgr, 8, {1, 2, 3, 4, 5, 6});
+  EXPECT_EQ(image.order(), ChannelOrder::kRgb);
+  EXPECT_EQ(image.encoded().values, (std::vector<std::uint16_t>{3, 2, 1, 6, 5, 4}));
+}
+
+TEST(ImageTest, AlphaStaysLast) {
+  const Image image = Image::FromEncoded(1, 1, ChannelOrder::kBgra, 8, {1, 2, 3, 200});
+  EXPECT_EQ(image.encoded().values, (std::vector<std::uint16_t>{3, 2, 1, 200}));
+  EXPECT_EQ(image.WithoutAlpha().encoded().values, (std::vector<std::uint16_t>{3, 2, 1}));
+}
+
+// What cv::imread gives, read with the wrong order, would change the grey by the difference of the
+// weights of red and blue.
+TEST(ImageTest, MatricesKeepTheirColoursInBothOrders) {
+  cv::Mat mat(2, 2, CV_8UC3, cv::Scalar(10, 20, 30));  // blue, green, red
+  const Image image = ImageFromMat(mat, ChannelOrder::kBgr);
+  EXPECT_EQ(image.encoded().values[0], 30);
+  EXPECT_EQ(image.encoded().values[2], 10);
+  const cv::Mat back = MatFromImage(image, ChannelOrder::kBgr);
+  EXPECT_EQ(cv::countNonZero(back.reshape(1) != mat.reshape(1)), 0);
+  EXPECT_EQ(MatFromImage(image, ChannelOrder::kRgb).at<cv::Vec3b>(1, 1), cv::Vec3b(30, 20, 10));
+}
+
+TEST(ImageTest, RefusesWhatDoesNotFit) {
+  EXPECT_THROW(Image::FromEncoded(0, 1, ChannelOrder::kGrey, 8, {}), Error);
+  EXPECT_THROW(Image::FromEncoded(1, 1, ChannelOrder::kGrey, 12, {1}), Error);
+  EXPECT_THROW(Image::FromEncoded(1, 1, ChannelOrder::kGrey, 8, {256}), Error);
+  EXPECT_THROW(Image::FromEncoded(1, 1, ChannelOrder::kRgb, 8, {1}), Error);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(Image::FromLight(1, 1, ChannelOrder::kGrey, {nan}), Error);
+  EXPECT_THROW(ImageFromMat(cv::Mat(), ChannelOrder::kBgr), Error);
+  EXPECT_THROW(ImageFromMat(cv::Mat(1, 1, CV_8UC3), ChannelOrder::kGrey), Error);
+  EXPECT_THROW(ImageFromMat(cv::Mat(1, 1, CV_64FC1), ChannelOrder::kGrey), Error);
+}
+
+}  // namespace
+}  // namespace thicklens

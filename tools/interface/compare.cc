@@ -1,0 +1,123 @@
+#include "thicklens/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "thicklens/estimator/compare.h"
+#include "thicklens/estimator/estimate_input.h"
+#include "tools/interface/problem.h"
+#include "tools/interface/run_scope.h"
+#include "tools/interface/validation.h"
+
+namespace thicklens {
+namespace {
+
+ImageScores ScoresOf(const estimator::PictureScores& scores) {
+  return {scores.psnr_db, scores.ssim, scores.delta_e94_mean, scores.macade_standin};
+}
+std::optional<ImageScores> ScoresOf(const std::optional<estimator::PictureScores>& scores) {
+  if (!scores) return std::nullopt;
+  return ScoresOf(*scores);
+}
+
+// The baseline's photograph in the channels of the reference, without alpha.
+model::LinearPicture PhotographFor(const Image& photo, const LightField& reference) {
+  const std::string name = photo.source().empty() ? "photo" : photo.source();
+  if (photo.channels() == 1 && reference.channels == 3) {
+    throw Error(
+        fmt::format("{}: a photograph in colour is expected, as the views are; it is grey", name));
+  }
+  model::LinearPicture light = photo.ToLight(reference.transfer);
+  if (reference.channels == 1) return model::ToGrey(light);
+  if (light.channels != 4) return light;
+  model::LinearPicture opaque{light.width_px, light.height_px, 3, {}};
+  opaque.values.reserve(light.values.size() / 4 * 3);
+  for (std::size_t i = 0; i < light.values.size(); ++i) {
+    if (i % 4 != 3) opaque.values.push_back(light.values[i]);
+  }
+  return opaque;
+}
+
+estimator::DibrInput DibrOf(const Baseline& baseline, const LightField& reference, RunScope* run) {
+  estimator::DibrInput dibr;
+  dibr.photograph = PhotographFor(baseline.photo, reference);
+  if (dibr.photograph.width_px != reference.s_count ||
+      dibr.photograph.height_px != reference.t_count) {
+    throw Error(fmt::format(
+        "photograph: it is {}x{} px, the views are {}x{} px: the sizes must be "
+        "equal",
+        dibr.photograph.width_px, dibr.photograph.height_px, reference.s_count, reference.t_count));
+  }
+  // Views are radiance, a photograph is not: its fall-off would count as an error of the warp.
+  if (reference.camera && baseline.remove_falloff) {
+    dibr.photograph = estimator::WithoutFalloff(dibr.photograph, *reference.grid, *reference.camera,
+                                                reference.weights, run->threads());
+  }
+  PreparedDepth prepared =
+      PrepareDepth(baseline.depth, dibr.photograph, reference.camera ? &*reference.camera : nullptr,
+                   reference.grid ? &*reference.grid : nullptr);
+  if (prepared.holes > 0) {
+    run->Warn(
+        fmt::format("depth: {} holes are filled along the surfaces beside them", prepared.holes));
+  }
+  dibr.disparity = std::move(prepared.disparity);
+  return dibr;
+}
+
+LightField CommonViews(const LightField& light_field, int u_count, int v_count, const char* which,
+                       RunScope* run) {
+  if (light_field.u_count == u_count && light_field.v_count == v_count) return light_field;
+  run->Warn(fmt::format("{}: the inner {}x{} of its {}x{} views are compared", which, u_count,
+                        v_count, light_field.u_count, light_field.v_count));
+  return model::InnerViews(light_field, u_count, v_count);
+}
+
+}  // namespace
+
+ImageScores CompareImages(const Image& reference, const Image& other,
+                          const CompareOptions& options) {
+  checks::RequireValid(options);
+  if (options.baseline) throw OptionError("baseline", "baseline: is for light fields");
+  return ScoresOf(estimator::ComparePictures(estimator::StoredValuesOf(reference.encoded()),
+                                             estimator::StoredValuesOf(other.encoded()),
+                                             options.border_px));
+}
+
+LightFieldScores CompareLightFields(const LightField& reference, const LightField& other,
+                                    const CompareOptions& options, const RunControl& control) {
+  checks::RequireValid(control);
+  checks::RequireValid(options);
+  RunScope run(control);
+  const int u_count = std::min(reference.u_count, other.u_count);
+  const int v_count = std::min(reference.v_count, other.v_count);
+  const LightField one = CommonViews(reference, u_count, v_count, "reference", &run);
+  const LightField two = CommonViews(other, u_count, v_count, "other", &run);
+  std::optional<estimator::DibrInput> dibr;
+  if (options.baseline) dibr = DibrOf(*options.baseline, one, &run);
+  const estimator::LightFieldScores found =
+      estimator::CompareLightFields(one, two, options.border_px, dibr, control.threads);
+  LightFieldScores scores;
+  scores.mean = ScoresOf(found.mean);
+  scores.centre = ScoresOf(found.centre);
+  scores.corner = ScoresOf(found.corner);
+  scores.dibr_mean = ScoresOf(found.dibr_mean);
+  scores.dibr_centre = ScoresOf(found.dibr_centre);
+  scores.dibr_corner = ScoresOf(found.dibr_corner);
+  for (const estimator::ViewScores& view : found.views) {
+    scores.views.push_back({view.u, view.v, ScoresOf(view.scores), ScoresOf(view.dibr)});
+  }
+  scores.notices = run.notices();
+  return scores;
+}
+
+std::string LightFieldScores::BriefReport() const {
+  std::string text = fmt::format("{} views: PSNR {:.2f} dB, SSIM {:.4f}, dE94 {:.3f}", views.size(),
+                                 mean.psnr_db, mean.ssim, mean.delta_e94_mean);
+  if (dibr_mean) text += fmt::format("; warping alone: PSNR {:.2f} dB", dibr_mean->psnr_db);
+  return text;
+}
+
+}  // namespace thicklens

@@ -1,0 +1,39 @@
+#include "thicklens/depth.h"
+
+#include <utility>
+
+#include "thicklens/base/output_file.h"
+#include "thicklens/io/depth_io.h"
+#include "tools/interface/validation.h"
+
+namespace thicklens {
+
+std::string LengthUnitName(LengthUnit unit) {
+  switch (unit) {
+    case LengthUnit::kMillimetre:
+      return "mm";
+    case LengthUnit::kCentimetre:
+      return "cm";
+    case LengthUnit::kMetre:
+      return "m";
+    case LengthUnit::kTum5000:
+      return "tum5000";
+    case LengthUnit::kNone:
+      break;
+  }
+  return "";
+}
+
+DepthMap ReadDepth(const std::string& path, const DepthMeaning& meaning) {
+  checks::RequireValid(meaning);
+  model::RawDepthMap map = io::ReadDepthMap(path);
+  return {map.width_px, map.height_px, std::move(map.values), map.integer, meaning, path};
+}
+
+void WriteDepth(const std::string& path, const DepthMap& depth) {
+  checks::RequireValid(depth);
+  WriteFileAtomically(
+      path, io::EncodePfm({depth.width_px, depth.height_px, depth.values, depth.is_integer}));
+}
+
+}  // namespace thicklens

@@ -1,0 +1,340 @@
+#include "thicklens/estimate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <ctime>
+#include <mutex>
+#include <utility>
+
+#include "thicklens/base/output_file.h"
+#include "thicklens/base/parallel.h"
+#include "thicklens/base/utc_time.h"
+#include "thicklens/estimator/estimate_checks.h"
+#include "thicklens/estimator/inpaint.h"
+#include "thicklens/estimator/ray_confidence.h"
+#include "thicklens/io/light_field_io.h"
+#include "thicklens/version.h"
+#include "tools/interface/problem.h"
+#include "tools/interface/solve.h"
+#include "tools/interface/validation.h"
+
+namespace thicklens {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr double kEightBitLevels = 255;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void RequireValidEstimate(const DepthMap& depth, const std::optional<Camera>& camera,
+                          const EstimateOptions& options, const RunControl& run) {
+  checks::RequireValid(run);
+  checks::RequireValid(options);
+  std::string why;
+  if (!depth.IsValid(&why))
+    throw OptionError("depth." + why.substr(0, why.find(':')), "depth." + why);
+  if (camera) return;
+  if (options.sensor_origin) throw OptionError("sensor_origin", "sensor_origin: needs a camera");
+  if (options.st_depth_mm) throw OptionError("st_depth_mm", "st_depth_mm: needs a camera");
+  if (options.exif == ExifCheck::kIgnore) {
+    throw OptionError("exif", "exif: needs a camera, which the EXIF may contradict");
+  }
+}
+
+// The confidence of an estimate whose solver does not report it; it depends on the depth alone.
+template <typename Take>
+void FindConfidence(const estimator::EstimateInput& input, int threads, const Take& take) {
+  const std::vector<estimator::Confidence> of_points = estimator::PointConfidence(input, threads);
+  const estimator::DisparityRenderer renderer(input.disparity);
+  const auto u_count = static_cast<int>(input.weights.cols());
+  const auto v_count = static_cast<int>(input.weights.rows());
+  ParallelFor(u_count * v_count, threads, [&](int i) {
+    const int k = i % u_count, l = i / u_count;
+    const estimator::CompactView view =
+        renderer.RenderCompact(k - (u_count - 1) / 2.0, l - (v_count - 1) / 2.0);
+    take(k, l, estimator::RayConfidence(of_points, view));
+  });
+}
+
+// Counts confidences on their way to a program's sink.
+class CountingSink : public ViewSink {
+ public:
+  explicit CountingSink(ViewSink* sink) : sink_(sink) {}
+  void TakeView(int k, int l, const model::LinearPicture& view) override {
+    sink_->TakeView(k, l, view);
+  }
+  void TakeConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
+                      int width_px) override {
+    sink_->TakeConfidence(k, l, confidence, width_px);
+    Count(confidence.begin(), confidence.end());
+  }
+  double BytesForView(double values) const override { return sink_->BytesForView(values); }
+  template <typename Iterator>
+  void Count(Iterator begin, Iterator end) {
+    std::array<std::size_t, 256> counts{};
+    for (; begin != end; ++begin) ++counts[*begin];
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (std::size_t i = 0; i < counts.size(); ++i) counts_[i] += counts[i];
+  }
+  const std::array<std::size_t, 256>& counts() const { return counts_; }
+
+ private:
+  ViewSink* sink_;
+  std::mutex mutex_;
+  std::array<std::size_t, 256> counts_{};
+};
+
+void Inpaint(const estimator::EstimateInput& input, RunScope* run, LightFieldEstimate* estimate) {
+  estimator::InpaintOptions settings;
+  settings.threads = run->threads();
+  settings.progress = run->ProgressOf("inpainting");
+  estimator::InpaintSummary summary;
+  estimator::InpaintHiddenRays(input.disparity, settings, &estimate->light_field, &summary);
+  estimate->light_field.origin.method += "+telea";
+  estimate->summary.seconds.views += summary.seconds;
+  estimate->diagnostics.inpainted_rays = summary.holes;
+}
+
+void CheckResult(const PreparedProblem& prepared, const Solved& solved,
+                 LightFieldEstimate* estimate) {
+  const estimator::DisparityMap& disparity = prepared.input->disparity;
+  EstimateDiagnostics& found = estimate->diagnostics;
+  const estimator::StepCheck steps =
+      estimator::CheckSteps(disparity, estimate->light_field.landing_step_px);
+  found.largest_step_px = steps.largest_px;
+  found.coarse_share = steps.share;
+  if (!solved.maps) return;
+  const double noise_sigma = found.noise_sigma.value_or(0);
+  for (const estimator::ResidualPatch& patch :
+       estimator::ResidualPatches(solved.maps->residual, solved.maps->hidden_share,
+                                  disparity.width_px, disparity.height_px, noise_sigma)) {
+    found.patches.push_back({patch.x, patch.y, patch.width_px, patch.height_px, patch.rms});
+  }
+  found.unexplained_share =
+      estimator::UnexplainedShare(solved.maps->residual, solved.maps->hidden_share,
+                                  disparity.width_px, disparity.height_px, noise_sigma);
+}
+
+// What may make the result wrong.
+std::vector<std::string> WarningsOf(const DepthMap& depth, const std::optional<Camera>& camera,
+                                    const LightFieldEstimate& estimate) {
+  const EstimateDiagnostics& found = estimate.diagnostics;
+  const EstimateSummary& summary = estimate.summary;
+  const std::string name = depth.source.empty() ? "depth" : depth.source;
+  std::vector<std::string> warnings;
+  constexpr double kMostHoles = 0.5;
+  if (found.holes_share > kMostHoles) {
+    warnings.push_back(
+        fmt::format("{}: {} of its {} values are no depth: they are filled from the "
+                    "others",
+                    name, found.holes_filled, depth.values.size()));
+  }
+  if (found.coarse_share > 0) {
+    warnings.push_back(
+        fmt::format("{:.1f} % of the pixels move by more than {:g} px from view to view (up to "
+                    "{:.1f} px): between such views the blur is sampled too coarsely{}",
+                    100 * found.coarse_share, estimator::kLargestStepPx, found.largest_step_px,
+                    camera ? "; more views make the steps smaller" : ""));
+  }
+  const std::optional<double> noise_px =
+      found.depth_noise_left_px ? found.depth_noise_left_px : found.depth_noise_px;
+  if (noise_px && *noise_px > estimator::kLargestDepthNoisePx) {
+    warnings.push_back(fmt::format(
+        "{}: the depth has a noise of about {:.2f} px of disparity per view step{}, above {:g} px "
+        "it costs more than the estimate gains",
+        name, *noise_px, found.depth_noise_left_px ? " after smoothing" : "",
+        estimator::kLargestDepthNoisePx));
+  }
+  if (summary.iterations && !summary.converged) {
+    warnings.push_back(fmt::format(
+        "not converged: the relative residual is {:.1e} after {} iterations; allow more, or a "
+        "larger tolerance",
+        summary.relative_residual.value_or(0), *summary.iterations));
+  }
+  const double noise_levels = kEightBitLevels * found.noise_sigma.value_or(0);
+  if (!found.patches.empty()) {
+    const UnexplainedPatch& worst = found.patches.front();
+    warnings.push_back(fmt::format(
+        "{} patch(es) of the photograph are not explained, the worst at x {} .. {}, y {} .. {} px "
+        "with a residual of {:.1f} grey levels (noise: {:.1f}): the depth is probably wrong there",
+        found.patches.size(), worst.x, worst.x + worst.width_px - 1, worst.y,
+        worst.y + worst.height_px - 1, kEightBitLevels * worst.residual_rms, noise_levels));
+  }
+  if (found.unexplained_share && *found.unexplained_share > estimator::kMostUnexplained) {
+    warnings.push_back(fmt::format(
+        "{:.0f} % of the photograph is not explained beyond its noise of {:.1f} grey levels: most "
+        "likely it is sharper than this depth and aperture say",
+        100 * *found.unexplained_share, noise_levels));
+  }
+  constexpr double kUnexplained = 1.5;  // times the noise
+  if (found.residual_rms && found.noise_sigma && !found.unexplained_share &&
+      *found.residual_rms > kUnexplained * *found.noise_sigma) {
+    warnings.push_back(fmt::format(
+        "the photograph is explained to {:.1f} grey levels (noise: {:.1f}), and hardly any of it "
+        "is seen by the whole aperture: whether the estimate is right cannot be decided",
+        kEightBitLevels * *found.residual_rms, noise_levels));
+  }
+  return warnings;
+}
+
+// Hands on the views and the confidence that the solver did not.
+void GiveRays(const PreparedProblem& prepared, const Solved& solved, int threads,
+              CountingSink* sink, LightFieldEstimate* estimate) {
+  LightField& light_field = estimate->light_field;
+  const std::size_t view_size = light_field.view_size();
+  const auto index = [&](int k, int l) {
+    return static_cast<std::ptrdiff_t>(static_cast<std::size_t>(l * light_field.u_count + k) *
+                                       view_size);
+  };
+  if (solved.maps && !solved.views_in_sink) {
+    estimate->confidence = solved.maps->confidence;
+  } else if (!solved.maps) {
+    estimate->confidence.resize(view_size * static_cast<std::size_t>(light_field.u_count) *
+                                static_cast<std::size_t>(light_field.v_count));
+    FindConfidence(*prepared.input, threads,
+                   [&](int k, int l, const std::vector<estimator::Confidence>& confidence) {
+                     std::copy(confidence.begin(), confidence.end(),
+                               estimate->confidence.begin() + index(k, l));
+                   });
+  }
+  if (sink == nullptr || solved.views_in_sink) return;
+  ParallelFor(light_field.u_count * light_field.v_count, threads, [&](int i) {
+    const int k = i % light_field.u_count, l = i / light_field.u_count;
+    if (light_field.IsPresent(k, l)) sink->TakeView(k, l, model::ViewPicture(light_field, k, l));
+    const auto first = estimate->confidence.begin() + index(k, l);
+    sink->TakeConfidence(k, l, {first, first + static_cast<std::ptrdiff_t>(view_size)},
+                         light_field.s_count);
+  });
+  light_field.values.clear();
+  estimate->confidence.clear();
+}
+
+void FillSummary(const SolverSummary& solver, const AnySolver& chosen, int threads,
+                 LightFieldEstimate* estimate) {
+  const LightField& light_field = estimate->light_field;
+  EstimateSummary& summary = estimate->summary;
+  summary.message = solver.message;
+  summary.solver = SolverName(chosen);
+  summary.prior = light_field.origin.prior;
+  summary.u_count = light_field.u_count;
+  summary.v_count = light_field.v_count;
+  summary.width_px = light_field.s_count;
+  summary.height_px = light_field.t_count;
+  summary.channels = light_field.channels;
+  summary.iterations = solver.iterations;
+  summary.converged = solver.converged;
+  summary.relative_residual = solver.relative_residual;
+  summary.rcond_min = solver.rcond_min;
+  summary.device = solver.device;
+  summary.threads = ResolveThreads(threads);
+  summary.seconds.setup = solver.setup_seconds;
+  summary.seconds.solve = solver.solve_seconds;
+  summary.seconds.views += solver.views_seconds;
+}
+
+LightFieldEstimate Estimate(ViewSink* given_sink, const Image& photo, const DepthMap& depth,
+                            const std::optional<Camera>& camera, const EstimateOptions& given,
+                            const RunControl& control) {
+  const auto start = Clock::now();
+  RequireValidEstimate(depth, camera, given, control);
+  RunScope run(control);
+  LightFieldEstimate estimate;
+  const PreparedProblem prepared =
+      Prepare(photo, depth, camera, given, &estimate.diagnostics, &run);
+  ThrowIfCancelled();
+  EstimateOptions options = given;
+  if (const auto* chooser = std::get_if<SolverChooser>(&given.solver)) {
+    Problem problem(prepared.input);
+    problem.set_falloff(prepared.effects.on.Has(Effect::kFalloff));
+    const SolverChoice choice = (*chooser)(problem, SecondsSince(start));
+    std::visit([&](const auto& solver) { options.solver = solver; }, choice.solver);
+    options.device = choice.device;
+    checks::RequireValid(options);
+  }
+  estimate.summary.seconds.prepare = SecondsSince(start);
+  std::optional<CountingSink> sink;
+  if (given_sink != nullptr) sink.emplace(given_sink);
+  Solved solved = Solve(prepared, options, sink ? &*sink : nullptr, &estimate.diagnostics, &run);
+  estimate.light_field = std::move(solved.light_field);
+  estimate.blocks = std::move(solved.blocks);
+  if (options.hidden_rays == HiddenRays::kTelea) Inpaint(*prepared.input, &run, &estimate);
+  FillSummary(solved.summary, options.solver, control.threads, &estimate);
+  model::LightFieldOrigin& origin = estimate.light_field.origin;
+  EstimateSeconds& seconds = estimate.summary.seconds;
+  if (solved.blur) {
+    estimate.diagnostics.blur_check = solved.blur->message;
+    seconds.blur_check = solved.blur->seconds;
+  }
+  origin.seconds = seconds.prepare + seconds.setup + seconds.solve + seconds.views;
+  origin.effects = prepared.effects.on.Names();
+  origin.version = LibraryVersion();
+  origin.date = NowIso8601();
+  estimate.summary.effects = origin.effects;
+  CheckResult(prepared, solved, &estimate);
+  ThrowIfCancelled();
+  GiveRays(prepared, solved, control.threads, sink ? &*sink : nullptr, &estimate);
+  CountingSink own(nullptr);
+  if (!sink) own.Count(estimate.confidence.begin(), estimate.confidence.end());
+  const estimator::ConfidenceShares shares =
+      estimator::SharesOf(sink ? sink->counts() : own.counts());
+  estimate.diagnostics.rays_seen = shares.seen;
+  estimate.diagnostics.rays_partly_seen = shares.partly_seen;
+  estimate.diagnostics.rays_blurred = shares.blurred;
+  estimate.diagnostics.rays_filled_in = shares.filled_in;
+  estimate.summary.warnings = WarningsOf(depth, camera, estimate);
+  for (const std::string& warning : estimate.summary.warnings) run.Warn(warning);
+  estimate.diagnostics.notices = run.notices();
+  return estimate;
+}
+
+}  // namespace
+
+ViewSink::~ViewSink() = default;
+double ViewSink::BytesForView(double /*values*/) const { return 0; }
+
+LightFieldEstimate EstimateLightField(const Image& photo, const DepthMap& depth,
+                                      const std::optional<Camera>& camera,
+                                      const EstimateOptions& options, const RunControl& run) {
+  return Estimate(nullptr, photo, depth, camera, options, run);
+}
+
+LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, const Image& photo, const DepthMap& depth,
+                                        const std::optional<Camera>& camera,
+                                        const EstimateOptions& options, const RunControl& run) {
+  if (sink == nullptr) throw Error("sink: a sink is expected, found null");
+  return Estimate(sink, photo, depth, camera, options, run);
+}
+
+Problem PrepareProblem(const Image& photo, const DepthMap& depth,
+                       const std::optional<Camera>& camera, const EstimateOptions& options,
+                       EstimateDiagnostics* diagnostics, const RunControl& run) {
+  RequireValidEstimate(depth, camera, options, run);
+  RunScope scope(run);
+  EstimateDiagnostics found;
+  const PreparedProblem prepared = Prepare(photo, depth, camera, options, &found, &scope);
+  found.notices = scope.notices();
+  if (diagnostics != nullptr) *diagnostics = std::move(found);
+  Problem problem(prepared.input);
+  problem.set_falloff(prepared.effects.on.Has(Effect::kFalloff));
+  return problem;
+}
+
+std::string EstimateSummary::BriefReport() const {
+  if (u_count == 0) return "light field: " + message;
+  std::string text = fmt::format("light field: {} x {} views of {} x {} px by {}", u_count, v_count,
+                                 width_px, height_px, solver);
+  if (!prior.empty()) text += fmt::format(" ({})", prior);
+  text += fmt::format(" in {:.2f} s", seconds.total());
+  if (iterations) text += fmt::format(", {} iterations", *iterations);
+  if (relative_residual) text += fmt::format(", relative residual {:.1e}", *relative_residual);
+  if (iterations && !converged) text += ", not converged";
+  if (!warnings.empty()) text += fmt::format("; {} warning(s)", warnings.size());
+  return text;
+}
+
+}  // namespace thicklens

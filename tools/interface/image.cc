@@ -1,0 +1,197 @@
+#include "thicklens/image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <opencv2/core/mat.hpp>
+#include <utility>
+
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/io/image_io.h"
+#include "thicklens/io/light_field_io.h"
+#include "thicklens/io/picture_description.h"
+#include "tools/interface/validation.h"
+
+namespace thicklens {
+namespace {
+
+constexpr double kStoredLevels = 255;
+
+int ChannelsOf(ChannelOrder order) {
+  switch (order) {
+    case ChannelOrder::kGrey:
+      return 1;
+    case ChannelOrder::kRgb:
+    case ChannelOrder::kBgr:
+      return 3;
+    case ChannelOrder::kRgba:
+    case ChannelOrder::kBgra:
+      return 4;
+  }
+  throw Error(fmt::format("image: the channel order {} is unknown", static_cast<int>(order)));
+}
+
+void RequireSize(int width_px, int height_px, int channels, std::size_t values,
+                 const std::string& source) {
+  const std::string where = source.empty() ? "image" : source;
+  if (width_px < 1 || height_px < 1) {
+    throw Error(
+        fmt::format("{}: sizes >= 1 are expected, found {} x {} px", where, width_px, height_px));
+  }
+  const std::size_t expected = static_cast<std::size_t>(width_px) *
+                               static_cast<std::size_t>(height_px) *
+                               static_cast<std::size_t>(channels);
+  if (values != expected) {
+    throw Error(fmt::format("{}: {} values are expected ({} x {} px, {} channel(s)), found {}",
+                            where, expected, width_px, height_px, channels, values));
+  }
+}
+
+// Puts red first.
+template <typename Value>
+void ArrangeChannels(ChannelOrder order, std::vector<Value>* values) {
+  if (order != ChannelOrder::kBgr && order != ChannelOrder::kBgra) return;
+  const auto channels = static_cast<std::size_t>(ChannelsOf(order));
+  for (std::size_t i = 0; i + channels <= values->size(); i += channels) {
+    std::swap((*values)[i], (*values)[i + 2]);
+  }
+}
+
+}  // namespace
+
+std::string ChannelOrderName(ChannelOrder order) {
+  constexpr const char* kNames[] = {"grey", "rgb", "rgba", "bgr", "bgra"};
+  ChannelsOf(order);  // throws for what is no order
+  return kNames[static_cast<int>(order)];
+}
+
+Image Image::FromEncoded(int width_px, int height_px, ChannelOrder order, int bits,
+                         std::vector<std::uint16_t> values, std::optional<TransferCurve> transfer,
+                         std::string source) {
+  const int channels = ChannelsOf(order);
+  RequireSize(width_px, height_px, channels, values.size(), source);
+  if (bits != 8 && bits != 16) {
+    throw Error(fmt::format("{}: 8 or 16 bits are expected, found {}",
+                            source.empty() ? "image" : source, bits));
+  }
+  if (bits == 8) {
+    const auto above =
+        std::find_if(values.begin(), values.end(), [](std::uint16_t value) { return value > 255; });
+    if (above != values.end()) {
+      throw Error(fmt::format("{}: values of 8 bits are expected, found {}",
+                              source.empty() ? "image" : source, *above));
+    }
+  }
+  ArrangeChannels(order, &values);
+  Image image;
+  image.pixels_ = model::StoredPicture{width_px, height_px, channels, bits, std::move(values)};
+  image.transfer_ = transfer;
+  image.source_ = std::move(source);
+  return image;
+}
+
+Image Image::FromLight(int width_px, int height_px, ChannelOrder order, std::vector<float> values,
+                       TransferCurve transfer, std::string source) {
+  const int channels = ChannelsOf(order);
+  RequireSize(width_px, height_px, channels, values.size(), source);
+  if (!std::all_of(values.begin(), values.end(),
+                   [](float value) { return std::isfinite(value); })) {
+    throw Error(fmt::format("{}: finite values are expected, found NaN or an infinity",
+                            source.empty() ? "image" : source));
+  }
+  ArrangeChannels(order, &values);
+  Image image;
+  image.pixels_ = model::LinearPicture{width_px, height_px, channels, std::move(values)};
+  image.transfer_ = transfer;
+  image.source_ = std::move(source);
+  return image;
+}
+
+int Image::width_px() const {
+  return std::visit([](const auto& pixels) { return pixels.width_px; }, pixels_);
+}
+int Image::height_px() const {
+  return std::visit([](const auto& pixels) { return pixels.height_px; }, pixels_);
+}
+int Image::channels() const {
+  return std::visit([](const auto& pixels) { return pixels.channels; }, pixels_);
+}
+ChannelOrder Image::order() const {
+  const int count = channels();
+  return count == 1 ? ChannelOrder::kGrey : count == 3 ? ChannelOrder::kRgb : ChannelOrder::kRgba;
+}
+int Image::bits() const { return is_linear() ? 32 : encoded().bits; }
+
+const model::StoredPicture& Image::encoded() const {
+  const auto* stored = std::get_if<model::StoredPicture>(&pixels_);
+  if (stored == nullptr) {
+    throw Error(fmt::format("{}: encoded values are expected, found linear light",
+                            source_.empty() ? "image" : source_));
+  }
+  return *stored;
+}
+const model::LinearPicture& Image::light() const {
+  const auto* light = std::get_if<model::LinearPicture>(&pixels_);
+  if (light == nullptr) {
+    throw Error(fmt::format("{}: linear light is expected, found encoded values",
+                            source_.empty() ? "image" : source_));
+  }
+  return *light;
+}
+
+model::LinearPicture Image::ToLight(const TransferCurve& transfer) const {
+  return is_linear() ? light() : model::ToLinear(encoded(), transfer);
+}
+
+Image Image::WithoutAlpha() const {
+  if (channels() != 4) return *this;
+  Image opaque = *this;
+  if (is_linear()) {
+    const model::LinearPicture& four = light();
+    model::LinearPicture three{four.width_px, four.height_px, 3, {}};
+    three.values.reserve(four.values.size() / 4 * 3);
+    for (std::size_t i = 0; i < four.values.size(); ++i) {
+      if (i % 4 != 3) three.values.push_back(four.values[i]);
+    }
+    opaque.pixels_ = std::move(three);
+  } else {
+    opaque.pixels_ = io::WithoutAlpha(encoded());
+  }
+  return opaque;
+}
+
+Image ReadImage(const std::string& path, std::optional<TransferCurve> transfer) {
+  Image image;
+  image.pixels_ = io::ToStoredPicture(io::ReadPictureFile(path));
+  image.transfer_ = transfer;
+  image.source_ = path;
+  image.is_from_file_ = true;
+  return image;
+}
+
+std::size_t WriteImage(const std::string& path, const Image& image,
+                       const ImageFileOptions& options) {
+  checks::RequireValid(options);
+  OutputFile output(path);
+  std::size_t clipped = 0;
+  model::StoredPicture stored;
+  if (image.is_linear()) {
+    const TransferCurve transfer = image.transfer().value_or(TransferCurve::Srgb());
+    clipped = io::CountClipped(image.light(), transfer, options.bits);
+    stored = model::ToStoredWithNoise(image.light(), transfer, options.bits,
+                                      options.noise_levels / kStoredLevels, options.seed);
+  } else {
+    if (options.noise_levels != 0) {
+      throw OptionError("noise_levels", "noise_levels: is for linear light only");
+    }
+    stored = image.encoded();
+  }
+  const std::string png = io::EncodePng(stored);
+  output.Commit(options.description.empty() ? png : io::WithDescription(png, options.description));
+  return clipped;
+}
+
+}  // namespace thicklens

@@ -1,0 +1,70 @@
+#ifndef THICKLENS_COMPARE_H_
+#define THICKLENS_COMPARE_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/depth.h"
+#include "thicklens/export.h"
+#include "thicklens/image.h"
+#include "thicklens/light_field.h"
+#include "thicklens/run.h"
+
+namespace thicklens {
+
+// Metrics of an image against a reference, on stored values in [0, 1]. The definitions are those of
+// thicklens/estimator/compare.h ([L19], Wang et al. 2004, CIE94, [D119]).
+struct ImageScores {
+  double psnr_db = 0;                    // +inf for equal images
+  double ssim = 0;                       // NaN if the image is smaller than the window of 11 px
+  double delta_e94_mean = 0;             // grey is taken as R = G = B
+  std::optional<double> macade_standin;  // absent if the reference has no edges
+};
+
+struct ViewScores {
+  int k = 0, l = 0;  // index of the view
+  ImageScores scores;
+  std::optional<ImageScores> dibr;  // the baseline
+};
+
+struct LightFieldScores {
+  ImageScores mean, centre, corner;  // over all views, the middle ones, the outermost ones
+  std::optional<ImageScores> dibr_mean, dibr_centre, dibr_corner;
+  std::vector<ViewScores> views;  // the views that both have
+  std::vector<Notice> notices;
+
+  // One line: mean PSNR, SSIM and dE94, and that of the baseline.
+  THICKLENS_EXPORT std::string BriefReport() const;
+};
+
+// The baseline of a comparison: a photograph warped to each view by its depth (DIBR).
+struct Baseline {
+  Image photo;
+  DepthMap depth;
+  bool remove_falloff = true;  // divide the fall-off [S12] out of the photograph, with a camera
+};
+
+struct CompareOptions {
+  int border_px = 0;  // 0 to 100000; a border that is left out
+  std::optional<Baseline> baseline;
+
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+// Compares an image with the reference, both encoded. Throws Error if sizes or channels differ or
+// the border leaves nothing.
+THICKLENS_EXPORT ImageScores CompareImages(const Image& reference, const Image& other,
+                                           const CompareOptions& options = {});
+
+// Compares two light fields view by view, as the reference's transfer curve would store them. Of
+// light fields with different counts the inner views of the larger one are taken, which a notice
+// reports. Throws OptionError, and Error if they do not fit.
+THICKLENS_EXPORT LightFieldScores CompareLightFields(const LightField& reference,
+                                                     const LightField& other,
+                                                     const CompareOptions& options = {},
+                                                     const RunControl& run = {});
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_COMPARE_H_

@@ -1,0 +1,231 @@
+#ifndef THICKLENS_ESTIMATE_H_
+#define THICKLENS_ESTIMATE_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "thicklens/camera.h"
+#include "thicklens/depth.h"
+#include "thicklens/effects.h"
+#include "thicklens/export.h"
+#include "thicklens/image.h"
+#include "thicklens/light_field.h"
+#include "thicklens/run.h"
+#include "thicklens/solver.h"
+
+namespace thicklens {
+
+// How the aperture of the photograph weighs the views. Without a statement the camera's PSF says it
+// and, without a camera, the weights are equal, which a notice reports.
+struct ApertureOptions {
+  std::optional<model::ApertureShape> shape;
+  // Take the positions of the views (and, if they are stated, their weights) from this light field.
+  std::shared_ptr<const ApertureViews> views_of;
+};
+
+// The sensor pixel of the image's top-left pixel, px; for an image of a part of the sensor.
+struct SensorOrigin {
+  int x = 0, y = 0;
+};
+
+enum class ExifCheck {
+  kRequire,  // throw Error if the photograph's EXIF contradicts the camera
+  kIgnore,   // report contradictions as notices
+};
+
+// How rays are filled that the centre view does not show.
+enum class HiddenRays {
+  kSolver,  // as the solver estimates them
+  kTelea,   // by the inpainting of section 6 of the supplement [D99], for comparison
+};
+
+// Everything of `thicklens estimate` that determines its result, with the same defaults.
+struct EstimateOptions {
+  // Numbers of views, at least two in all. Absent: 7 x 7, or those of aperture.views_of.
+  std::optional<ViewCounts> views;
+  std::optional<PixelRect> crop;  // take only this rectangle of photograph and depth, px
+  std::optional<SensorOrigin> sensor_origin;  // needs a camera; 0 to 100000 px
+  ExifCheck exif = ExifCheck::kRequire;
+  ApertureOptions aperture;
+  // Depth of the ST plane from Ap, mm, 0 < st_depth_mm <= 1e9; absent: the plane of focus. Needs a
+  // camera.
+  std::optional<double> st_depth_mm;
+  bool smooth_depth = true;  // smooth a noisy depth along its surfaces [D94]
+  EffectSelection effects;
+  AnySolver solver = SceneSolver{};
+  HiddenRays hidden_rays = HiddenRays::kSolver;
+  // "auto", "cpu", "opencl", "opencl:PLATFORM" or "opencl:PLATFORM:DEVICE". auto: the processor for
+  // SceneSolver, the best device for BlockSolver.
+  std::string device = "auto";
+  // Limit for the whole process, MiB, 0 < limit <= 1e9. SceneSolver then solves in bands; absent:
+  // four fifths of the available memory for SceneSolver, none for the others.
+  std::optional<double> memory_limit_mib;
+
+  // Returns true if all members are valid and do not contradict each other. Otherwise `why`, if not
+  // null, gets the field, the value and the constraint. NaN is never valid.
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+// ---- What comes back.
+
+struct EstimateSeconds {
+  double prepare = 0;  // camera, aperture, depth, effects
+  double setup = 0, blur_check = 0, solve = 0;
+  double views = 0;  // making the views, and inpainting
+  double total() const { return prepare + setup + blur_check + solve + views; }
+};
+
+// The result in numbers.
+struct EstimateSummary {
+  std::string message = "not run";  // of the solver
+  std::string solver;               // "scene", "blocks", "functional", "grid" or a program's own
+  std::string prior;                // of SceneSolver; otherwise empty
+  int u_count = 0, v_count = 0, width_px = 0, height_px = 0, channels = 0;
+  std::optional<int> iterations;
+  bool converged = false;
+  std::optional<double> relative_residual, rcond_min;
+  std::string device;
+  int threads = 0;
+  std::vector<std::string> effects;   // names of the effects that were taken into account
+  std::vector<std::string> warnings;  // what may make the result wrong, one line each
+  EstimateSeconds seconds;
+
+  // One line: solver, views, size, residual, time, and the number of warnings.
+  THICKLENS_EXPORT std::string BriefReport() const;
+};
+
+// One quantity in which the photograph's EXIF and the camera were compared, both as text with
+// units: "35 mm", "50 +- 0.1 mm".
+struct ExifComparison {
+  enum class Verdict {
+    kAgrees,
+    kUndecided,    // the difference is within rounding and nominal values, or cannot be compared
+    kContradicts,  // the photograph is of another lens, setting or sensor
+  };
+  std::string quantity, photo, camera;
+  Verdict verdict = Verdict::kAgrees;
+  std::string remark;  // what a disagreement may mean
+};
+
+// A part of the photograph that the estimate does not explain, px; rms in stored values, 1 at full
+// scale.
+struct UnexplainedPatch {
+  int x = 0, y = 0, width_px = 0, height_px = 0;
+  double residual_rms = 0;
+};
+
+// How far the estimate can be trusted, and what its input was like.
+struct EstimateDiagnostics {
+  TransferCurve transfer = TransferCurve::Srgb();
+  std::string transfer_from;  // "image", "camera" or "assumed"
+  bool has_exif = false;      // EXIF was found and compared
+  std::vector<ExifComparison> exif;
+  std::string aperture_shape;  // "uniform", "gaussian", "disc", ...
+  std::string aperture_from;   // "option", "light-field", "camera", "assumed"
+  std::optional<double> aperture_calibrated_sigma_mm;  // kappa r, with a camera
+  Eigen::Vector2d aperture_sigma_mm{0, 0};             // that the views have, along u and v [D30]
+  Eigen::Vector2d aperture_corner_change{0, 0};  // relative change of it in the corners, largest
+  model::EffectDecision effects;
+  std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
+  std::size_t holes_filled = 0;
+  double holes_share = 0;
+  std::pair<double, double> disparity_range_px{0, 0};         // px per view step
+  std::optional<double> depth_noise_px, depth_noise_left_px;  // px per view step [D93], [D94]
+  double largest_step_px = 0;  // displacement between neighbouring views
+  double coarse_share = 0;     // share of the pixels whose step is above 3 px
+  std::optional<double> strength, noise_sigma, residual_rms;  // noise, residual in stored values
+  std::optional<double> row_share, hidden_share, unexplained_share;
+  std::vector<UnexplainedPatch> patches;  // by descending residual
+  int bands = 1;
+  int reweightings = 0;
+  double predicted_memory_mib = 0;
+  std::optional<double> gamma, ridge;
+  std::optional<int> block_px;
+  // Shares of all rays: seen by the whole aperture, in part, blurred too strongly for details, and
+  // filled in. The sum is 1.
+  double rays_seen = 0, rays_partly_seen = 0, rays_blurred = 0, rays_filled_in = 0;
+  std::size_t inpainted_rays = 0;
+  std::string blur_check;  // what SceneSolver::check_blur found, one line; empty: not asked for
+  std::vector<Notice> notices;
+};
+
+// One block of BlockSolver: position and size in px.
+struct BlockRecord {
+  int x = 0, y = 0, width_px = 0, height_px = 0, unknowns = 0, iterations = 0;
+  std::optional<double> rcond;
+  double relative_residual = 0;
+};
+
+struct LightFieldEstimate {
+  LightField light_field;
+  EstimateSummary summary;
+  EstimateDiagnostics diagnostics;
+  std::vector<BlockRecord> blocks;
+  // One byte per ray, view by view (index l * U + k), row by row: how well the photograph shows it
+  // (docs/file-formats.md).
+  std::vector<std::uint8_t> confidence;
+};
+
+// Receives the views of an estimate as they are made: each once, in any order, from several threads
+// at once. May throw to end the estimate.
+class THICKLENS_EXPORT ViewSink {
+ public:
+  virtual ~ViewSink();
+  virtual void TakeView(int k, int l, const model::LinearPicture& view) = 0;
+  // One byte per ray of the view, row by row.
+  virtual void TakeConfidence(int k, int l, const std::vector<std::uint8_t>& confidence,
+                              int width_px) = 0;
+  // Memory that the sink needs for one view of `values` numbers while it takes it, bytes.
+  virtual double BytesForView(double values) const;
+};
+
+// ---- The estimate, at once or in its two steps.
+
+// Estimates the light field of one photograph and its depth. It is what `thicklens estimate` does
+// with the same options, bit for bit. `camera` is the calibrated camera (lengths from Ap); without
+// one the depth must be a disparity, and the light field is relative.
+//
+// Steps: crop; camera, EXIF and part of the sensor; linear light; aperture weights; grid; depth to
+// disparity, holes filled; noise smoothed; effects chosen; solver; hidden rays; checks. Sources:
+// the paper's (10), (16), (18) to (21) for the model and the functional, [D101] for SceneSolver.
+//
+// The result does not depend on the number of threads. Throws OptionError for options, Error for
+// inputs that do not fit each other (sizes, units, EXIF that contradicts the camera, disparities
+// larger than the image) and for what the solver refuses, and Interrupted.
+THICKLENS_EXPORT LightFieldEstimate EstimateLightField(const Image& photo, const DepthMap& depth,
+                                                       const std::optional<Camera>& camera,
+                                                       const EstimateOptions& options,
+                                                       const RunControl& run = {});
+
+// The same, with the views given to `sink`: the returned light field and confidence have no values.
+// SceneSolver never holds more than a few views. Same bits, except that a memory limit may need
+// fewer bands.
+THICKLENS_EXPORT LightFieldEstimate EstimateLightFieldTo(ViewSink* sink, const Image& photo,
+                                                         const DepthMap& depth,
+                                                         const std::optional<Camera>& camera,
+                                                         const EstimateOptions& options,
+                                                         const RunControl& run = {});
+
+// The steps before the solver. `diagnostics` (may be null) gets what they found.
+THICKLENS_EXPORT Problem PrepareProblem(const Image& photo, const DepthMap& depth,
+                                        const std::optional<Camera>& camera,
+                                        const EstimateOptions& options,
+                                        EstimateDiagnostics* diagnostics,
+                                        const RunControl& run = {});
+
+// Writes the light field with its confidence as `thicklens estimate` does, completely or not at
+// all. Returns the number of clipped values.
+THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
+                                             const LightFieldEstimate& estimate,
+                                             LightFieldFormat format = LightFieldFormat::kPng,
+                                             const RunControl& run = {});
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_ESTIMATE_H_

@@ -1,0 +1,103 @@
+#ifndef THICKLENS_IMAGE_H_
+#define THICKLENS_IMAGE_H_
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "thicklens/export.h"
+#include "thicklens/model/scene.h"
+#include "thicklens/model/transfer_curve.h"
+
+namespace thicklens {
+
+// The curve between linear light and stored values: Linear(), Srgb() or Gamma(2.2).
+using TransferCurve = model::TransferCurve;
+
+// The order of the channels of one pixel. There is no default: a reader states it.
+enum class ChannelOrder { kGrey, kRgb, kRgba, kBgr, kBgra };
+THICKLENS_EXPORT std::string ChannelOrderName(ChannelOrder order);  // "grey", "rgb", ...
+
+// An image with everything that its values need to be understood: the order of its channels and
+// how light became them. The values are either encoded (whole numbers of 8 or 16 bits, as files
+// store them) or linear light (float, 1 at full scale). Rows go from top to bottom; the centre of
+// the top-left pixel is (0, 0). An Image owns its values; a copy copies them.
+class THICKLENS_EXPORT Image {
+ public:
+  // Makes an image of encoded values: width_px * height_px pixels of the channels of `order`, each
+  // value from 0 to 2^bits - 1. Blue-first orders are rearranged, so that order() is kGrey, kRgb or
+  // kRgba. `transfer` is how light became the values; absent: not stated, and whoever needs light
+  // decides (a camera's curve, or sRGB without a camera). `source` names the image in messages.
+  // Throws Error if a size is < 1, `bits` is not 8 or 16, the number of values does not fit, or a
+  // value is above full scale.
+  static Image FromEncoded(int width_px, int height_px, ChannelOrder order, int bits,
+                           std::vector<std::uint16_t> values,
+                           std::optional<TransferCurve> transfer = std::nullopt,
+                           std::string source = "");
+  // Makes an image of linear light. Values outside [0, 1] are kept. `transfer` is the curve with
+  // which it will be stored. Throws Error if a size is < 1, the number of values does not fit, or a
+  // value is not finite.
+  static Image FromLight(int width_px, int height_px, ChannelOrder order, std::vector<float> values,
+                         TransferCurve transfer = TransferCurve::Srgb(), std::string source = "");
+
+  int width_px() const;
+  int height_px() const;
+  int channels() const;        // 1, 3 or 4
+  ChannelOrder order() const;  // kGrey, kRgb or kRgba
+  bool is_linear() const { return std::holds_alternative<model::LinearPicture>(pixels_); }
+  int bits() const;  // 8 or 16; 32 for linear light
+  const std::optional<TransferCurve>& transfer() const { return transfer_; }
+  // The file that ReadImage read, or the name that was given; empty: none. Messages name it.
+  const std::string& source() const { return source_; }
+  // Whether EXIF can be read from source(): true for images of ReadImage.
+  bool is_from_file() const { return is_from_file_; }
+
+  // The values, channels interleaved in the order order(). encoded() throws Error for linear light,
+  // light() for encoded values.
+  const model::StoredPicture& encoded() const;
+  const model::LinearPicture& light() const;
+
+  // Returns the image in linear light. Encoded values are decoded by `transfer`; it has no effect
+  // on an image that is linear already. Alpha is decoded like a colour, as model::ToLinear does.
+  model::LinearPicture ToLight(const TransferCurve& transfer) const;
+  // Returns a copy without the alpha channel.
+  Image WithoutAlpha() const;
+
+ private:
+  friend THICKLENS_EXPORT Image ReadImage(const std::string& path,
+                                          std::optional<TransferCurve> transfer);
+  std::variant<model::StoredPicture, model::LinearPicture> pixels_;
+  std::optional<TransferCurve> transfer_;
+  std::string source_;
+  bool is_from_file_ = false;
+};
+
+// Reads an image file: 8 or 16 bits; grey, RGB or RGBA; PNG, TIFF, JPEG and what the build's codecs
+// know. The values are exactly those of the file; the image is never rotated by its EXIF.
+// `transfer` states how light became the values, and replaces what a camera's file states. Throws
+// Error that names the file.
+THICKLENS_EXPORT Image ReadImage(const std::string& path,
+                                 std::optional<TransferCurve> transfer = std::nullopt);
+
+struct ImageFileOptions {
+  int bits = 8;  // 8 or 16, of linear light; encoded values keep their own
+  // Standard deviation of normal noise that is added to the encoded values before rounding, in
+  // 1/255 of full scale, finite and >= 0; only for linear light.
+  double noise_levels = 0;
+  std::uint64_t seed = 0;  // of the noise, which depends on nothing else
+  // Written into the file as its description; empty: none.
+  std::string description;
+
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+// Writes a PNG file. Linear light is encoded by the image's transfer curve and clipped. The file
+// appears completely or not at all. Returns the number of clipped values (half a level beyond the
+// range, or NaN); 0 for encoded values. Throws OptionError, and Error that names the file.
+THICKLENS_EXPORT std::size_t WriteImage(const std::string& path, const Image& image,
+                                        const ImageFileOptions& options = {});
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_IMAGE_H_

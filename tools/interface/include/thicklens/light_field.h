@@ -1,0 +1,73 @@
+#ifndef THICKLENS_LIGHT_FIELD_H_
+#define THICKLENS_LIGHT_FIELD_H_
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "thicklens/export.h"
+#include "thicklens/image.h"
+#include "thicklens/model/light_field.h"
+#include "thicklens/run.h"
+
+namespace thicklens {
+
+// U x V views of S x T samples in linear light (thicklens/model/light_field.h). The view (k, l) is
+// seen from a = k - (U-1)/2 steps to the right and b = l - (V-1)/2 steps down on the aperture. With
+// a camera the steps are in mm; without one a unit of disparity is 1 px per view step.
+using LightField = model::LightField;
+using PixelRect = model::PixelRect;  // px; (x, y) is the top-left pixel
+
+// Numbers of views across and down, each from 1 to 99.
+struct ViewCounts {
+  int u = 0, v = 0;
+};
+
+struct LightFieldReadOptions {
+  // Row length of the HCI numbering input_CamNNN.png, 1 to 1000; 0: parameters.cfg says it, or the
+  // views are a full square.
+  int hci_grid = 0;
+  bool allow_missing_views = false;
+  std::optional<ViewCounts> inner_views;  // take only these views in the middle
+  std::optional<PixelRect> crop;          // take only this rectangle of each view
+
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+// Reads the folder of a light field: ours (lightfield.yaml) or the HCI layout, which is read as
+// sRGB with equal weights. Throws OptionError, and Error that names the folder and the view.
+THICKLENS_EXPORT LightField ReadLightField(const std::string& folder,
+                                           const LightFieldReadOptions& options = {},
+                                           const RunControl& run = {});
+
+enum class LightFieldFormat {
+  kPng,   // views of 16 bits, encoded by the light field's transfer curve and clipped
+  kTiff,  // views in float, linear light, not clipped
+  kHci,   // the HCI layout: views of 8 bits in sRGB, and parameters.cfg
+};
+
+// Writes a light field into a folder, completely or not at all. A folder that this program did not
+// write is not replaced. Returns the number of clipped values. Throws Error.
+THICKLENS_EXPORT std::size_t WriteLightField(const std::string& folder,
+                                             const LightField& light_field,
+                                             LightFieldFormat format = LightFieldFormat::kPng,
+                                             const RunControl& run = {});
+
+// The view (k, l) as an image in linear light. Throws Error if there is no such view.
+THICKLENS_EXPORT Image ViewOf(const LightField& light_field, int k, int l);
+
+// The positions of views on the aperture and the share of each in a photograph, taken from another
+// light field.
+struct ApertureViews {
+  LightField description;       // without values; its present views count
+  bool weights_stated = false;  // whether its file states the weights (HCI's does not)
+  std::string source;           // its folder; messages name it
+};
+// Reads a light field and keeps its description. All of its views are checked.
+THICKLENS_EXPORT ApertureViews ReadApertureViews(const std::string& folder,
+                                                 const LightFieldReadOptions& options = {},
+                                                 const RunControl& run = {});
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_LIGHT_FIELD_H_

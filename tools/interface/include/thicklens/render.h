@@ -1,0 +1,69 @@
+#ifndef THICKLENS_RENDER_H_
+#define THICKLENS_RENDER_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/camera.h"
+#include "thicklens/effects.h"
+#include "thicklens/export.h"
+#include "thicklens/image.h"
+#include "thicklens/light_field.h"
+#include "thicklens/run.h"
+
+namespace thicklens {
+
+// The aperture of a rendered image: one of the two, or the light field's own weights.
+struct RenderAperture {
+  std::optional<model::ApertureShape> shape;
+  // Finite and >= 0. With a camera: mm, at most the captured radius [D23]; without: view steps.
+  std::optional<double> radius;
+
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+struct PhotographOptions {
+  RenderAperture aperture;
+  EffectSelection effects;
+  // As EstimateOptions::device.
+  std::string device = "auto";
+
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+// Each function returns linear light with the light field's transfer curve, ready for WriteImage.
+// They throw OptionError, and Error for a light field that is not valid.
+
+// The photograph that the whole aperture would take of the light field: `thicklens render
+// --as-captured` [S12], [D23]. `effects_on`, if not null, gets the names of the effects.
+THICKLENS_EXPORT Image RenderPhotograph(const LightField& light_field,
+                                        const PhotographOptions& options = {},
+                                        const RunControl& run = {},
+                                        std::vector<std::string>* effects_on = nullptr);
+
+struct FocusOptions {
+  // Exactly one: the depth to focus at, mm from Ap, finite, > 0, with a camera; or a disparity, px
+  // per view step along u, finite.
+  std::optional<double> depth_mm, disparity_px;
+  RenderAperture aperture;
+
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+// Shifts the views so that points at that depth coincide, and averages them [D98].
+THICKLENS_EXPORT Image Refocus(const LightField& light_field, const FocusOptions& options,
+                               const RunControl& run = {});
+
+// All views side by side, (0, 0) at the top left, with `gap_px` >= 0 black pixels between them.
+THICKLENS_EXPORT Image RenderMosaic(const LightField& light_field, int gap_px = 2);
+
+// Row t of all views in the view row l, one above the other, or column s of all views in the view
+// column k, side by side; each repeated `repeat_px` >= 1 times.
+THICKLENS_EXPORT Image RenderEpipolarRow(const LightField& light_field, int t, int l,
+                                         int repeat_px = 8);
+THICKLENS_EXPORT Image RenderEpipolarColumn(const LightField& light_field, int s, int k,
+                                            int repeat_px = 8);
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_RENDER_H_

@@ -1,0 +1,66 @@
+#ifndef THICKLENS_RUN_H_
+#define THICKLENS_RUN_H_
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "thicklens/base/cancel.h"
+#include "thicklens/base/error.h"
+#include "thicklens/export.h"
+
+// How a long call is run: the one protocol for threads, cancellation, progress and notices. It
+// never changes a result. Every function of this interface that may take longer than 0.2 s takes a
+// RunControl as its last argument.
+namespace thicklens {
+
+// An option whose value is not valid, or that contradicts another option. `field()` is the name of
+// the member, for example "solver.tolerance"; the message begins with it and states the value and
+// the constraint. It is thrown before any file is read or written.
+class THICKLENS_EXPORT OptionError : public Error {
+ public:
+  OptionError(std::string field, const std::string& message);
+  ~OptionError() override;
+  const std::string& field() const { return field_; }
+
+ private:
+  std::string field_;
+};
+
+// A step of a long call.
+struct Progress {
+  std::string stage;  // "measuring", "checking the blur", "estimating", "inpainting", "rendering"
+  int done = 0;       // steps of the stage that are done, 0 to `total`
+  int total = 0;      // steps of the stage, >= 1
+};
+
+// A remark of a call on what it found or assumed. It does not end the call.
+struct Notice {
+  enum class Level {
+    kInformation,  // an assumption that is usually right
+    kWarning,      // something that may make the result wrong
+  };
+  Level level = Level::kWarning;
+  std::string text;  // one line
+};
+
+struct RunControl {
+  int threads = 0;  // maximum number of threads, 0 to 1024; 0: one per core
+  // A cancelled token ends the call, which throws Interrupted at its next safe point
+  // (thicklens/base/cancel.h). Null: the token of the calling thread's CancelScope, if it has one.
+  // Not owned.
+  const CancelToken* cancel = nullptr;
+  // Called for each step, from any thread, never by two threads at once. An exception that it
+  // throws ends the call and is thrown by the call. Empty: none.
+  std::function<void(const Progress&)> progress;
+  // Called with each notice when it arises, on the calling thread. The summaries also keep them.
+  // Empty: none.
+  std::function<void(const Notice&)> notice;
+
+  // Returns true if `threads` is in its range. Otherwise `why`, if not null, gets the reason.
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_RUN_H_

@@ -1,0 +1,75 @@
+#ifndef THICKLENS_SWEEP_H_
+#define THICKLENS_SWEEP_H_
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/camera.h"
+#include "thicklens/export.h"
+#include "thicklens/image.h"
+#include "thicklens/model/sweep_file.h"
+
+namespace thicklens {
+
+// Where the frames of a sweep come from, if not from its files. The functions are called from
+// several threads at once.
+class THICKLENS_EXPORT FrameSource {
+ public:
+  virtual ~FrameSource();
+  // Returns the frame `index`, encoded, of the sensor's size. Throws Error that names the frame.
+  virtual Image Read(std::size_t index) const = 0;
+};
+
+// A focus sweep: photographs of one flat target at known readings of a bench. The frames are read
+// one by one while they are measured; they are never all in memory.
+struct Sweep {
+  // What the sweep's file describes: frames, readings in mm, offset, direction, target, floor and
+  // region (thicklens/model/sweep_file.h).
+  model::SweepFile description;
+  // The camera without calibration; its lens and sensor are used.
+  Camera camera;
+  // Null: the frames are the image files that `description` names.
+  std::shared_ptr<const FrameSource> frames;
+  // The truth of a simulated sweep, if it is known; a calibration does not use it.
+  std::optional<model::SweepTruth> truth;
+  // What was assumed when the sweep was read, one line each.
+  std::vector<std::string> notices;
+
+  // Returns true if a calibration can be attempted: the camera, the readings and the options of
+  // the description are possible and finite. Does not open a frame.
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+// Statements that replace those of the sweep's file. An absent or empty value keeps the file's.
+struct SweepOverrides {
+  std::string camera_path;
+  std::string truth_path;
+  bool offset_unknown = false;            // the bench zero is to be found from the image scale
+  std::optional<double> offset_mm;        // finite
+  std::optional<double> offset_sigma_mm;  // finite, >= 0; needs an offset
+  std::optional<model::BenchDirection> direction;
+  std::optional<double> reading_sigma_mm;  // finite, >= 0
+  bool floor_unknown = false;
+  std::optional<Measured> floor_px;    // value and sigma finite and >= 0
+  std::string floor_from_calibration;  // a camera file; excludes floor_px and floor_unknown
+  std::optional<model::SweepTarget> target;
+  std::optional<model::RegionOfInterest> roi;  // px, inside the sensor
+
+  THICKLENS_EXPORT bool IsValid(std::string* why) const;
+};
+
+// Reads a sweep's description (schema thicklens/sweep/1), or the sweep.yaml of a folder, and its
+// camera; checks that the frames exist and opens none. Throws OptionError, and Error with
+// file:line:column.
+THICKLENS_EXPORT Sweep ReadSweep(const std::string& path, const SweepOverrides& overrides = {});
+// Reads a folder of frames with a table of readings in mm (columns file, reading).
+// `overrides.camera_path` is required.
+THICKLENS_EXPORT Sweep ReadSweepFolder(const std::string& folder, const std::string& readings_csv,
+                                       const SweepOverrides& overrides);
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_SWEEP_H_

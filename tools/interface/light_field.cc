@@ -1,0 +1,103 @@
+#include "thicklens/light_field.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <vector>
+
+#include "thicklens/base/error.h"
+#include "thicklens/base/output_file.h"
+#include "thicklens/estimate.h"
+#include "thicklens/io/aperture_statement.h"
+#include "thicklens/io/light_field_io.h"
+#include "tools/interface/run_scope.h"
+#include "tools/interface/validation.h"
+
+namespace thicklens {
+namespace {
+
+io::LightFieldReading ReadingOf(const LightFieldReadOptions& options) {
+  io::LightFieldReading reading;
+  reading.grid = options.hci_grid;
+  reading.sparse = options.allow_missing_views;
+  if (options.inner_views) {
+    reading.u_count = options.inner_views->u;
+    reading.v_count = options.inner_views->v;
+  }
+  reading.crop = options.crop;
+  return reading;
+}
+
+ChannelOrder OrderOf(const model::LinearPicture& picture) {
+  if (picture.channels == 1) return ChannelOrder::kGrey;
+  if (picture.channels == 3) return ChannelOrder::kRgb;
+  throw Error(fmt::format("image: 1 or 3 channels are expected, found {}", picture.channels));
+}
+
+}  // namespace
+
+LightField ReadLightField(const std::string& folder, const LightFieldReadOptions& options,
+                          const RunControl& run) {
+  checks::RequireValid(options);
+  const RunScope scope(run);
+  return io::ReadLightField(folder, ReadingOf(options));
+}
+
+ApertureViews ReadApertureViews(const std::string& folder, const LightFieldReadOptions& options,
+                                const RunControl& run) {
+  const LightField light_field = ReadLightField(folder, options, run);
+  return {model::DescriptionOf(light_field), io::StatesAperture(folder), folder};
+}
+
+Image ViewOf(const LightField& light_field, int k, int l) {
+  model::LinearPicture view = model::ViewPicture(light_field, k, l);
+  const ChannelOrder order = OrderOf(view);
+  return Image::FromLight(view.width_px, view.height_px, order, std::move(view.values),
+                          light_field.transfer, fmt::format("view ({}, {})", k, l));
+}
+
+std::size_t WriteLightField(const std::string& folder, const LightField& light_field,
+                            LightFieldFormat format, const RunControl& run) {
+  const RunScope scope(run);
+  if (format == LightFieldFormat::kHci) {
+    OutputFolder output = io::ClaimHciFolder(folder);
+    const std::size_t clipped = io::WriteHciLightField(light_field, &output);
+    ThrowIfCancelled();
+    output.Commit();
+    return clipped;
+  }
+  OutputFolder output(folder, io::kLightFieldMarker, io::LightFieldEntries());
+  const std::size_t clipped = io::WriteLightField(
+      light_field, format == LightFieldFormat::kPng ? io::ViewFormat::kPng : io::ViewFormat::kTiff,
+      &output);
+  ThrowIfCancelled();
+  output.Commit();
+  return clipped;
+}
+
+std::size_t WriteLightField(const std::string& folder, const LightFieldEstimate& estimate,
+                            LightFieldFormat format, const RunControl& run) {
+  const LightField& light_field = estimate.light_field;
+  if (format == LightFieldFormat::kHci || estimate.confidence.empty()) {
+    return WriteLightField(folder, light_field, format, run);
+  }
+  const RunScope scope(run);
+  OutputFolder output(folder, io::kLightFieldMarker, io::LightFieldEntries());
+  io::LightFieldWriter writer(
+      light_field.transfer,
+      format == LightFieldFormat::kPng ? io::ViewFormat::kPng : io::ViewFormat::kTiff, &output);
+  io::WriteViews(light_field, &writer);
+  const auto view_size = static_cast<std::ptrdiff_t>(light_field.view_size());
+  for (int i = 0; i < light_field.u_count * light_field.v_count; ++i) {
+    ThrowIfCancelled();
+    const auto first = estimate.confidence.begin() + i * view_size;
+    writer.WriteConfidence(i % light_field.u_count, i / light_field.u_count,
+                           {first, first + view_size}, light_field.s_count);
+  }
+  const std::size_t clipped = writer.Finish(light_field);
+  ThrowIfCancelled();
+  output.Commit();
+  return clipped;
+}
+
+}  // namespace thicklens

@@ -1,0 +1,327 @@
+// The checks of every option struct of the interface.
+#include <limits>
+#include <set>
+#include <type_traits>
+
+#include "thicklens/calibrate.h"
+#include "thicklens/compare.h"
+#include "thicklens/depth.h"
+#include "thicklens/effects.h"
+#include "thicklens/estimate.h"
+#include "thicklens/image.h"
+#include "thicklens/kernels/device.h"
+#include "thicklens/light_field.h"
+#include "thicklens/render.h"
+#include "thicklens/solver.h"
+#include "thicklens/sweep.h"
+#include "tools/interface/validation.h"
+
+namespace thicklens {
+namespace {
+
+using namespace checks;  // NOLINT: this file is about nothing else
+
+constexpr int kMaxThreads = 1024;
+constexpr int kMaxIterations = 1000000;
+constexpr int kMaxPixels = 100000;
+constexpr int kMaxViews = 99;   // one way; the number of rays is far beyond any memory before
+constexpr int kMaxGrid = 1000;  // row length of the HCI numbering
+constexpr double kMaxLengthMm = 1e9;
+constexpr double kMaxMemoryMib = 1e9;
+
+// An enumerator that a cast made of a number without a name is not valid.
+template <typename Enum>
+bool OneOf(std::string* why, const std::string& field, Enum last, Enum value) {
+  using Number = std::underlying_type_t<Enum>;
+  const auto number = static_cast<Number>(value);
+  return (number >= 0 && number <= static_cast<Number>(last)) ||
+         Unexpected(why, field, "an enumerator", static_cast<int>(number));
+}
+
+bool IsRect(std::string* why, const std::string& field, const PixelRect& rect) {
+  return WholeBetween(why, field + ".x", 0, kMaxPixels, rect.x) &&
+         WholeBetween(why, field + ".y", 0, kMaxPixels, rect.y) &&
+         WholeBetween(why, field + ".width", 1, kMaxPixels, rect.width) &&
+         WholeBetween(why, field + ".height", 1, kMaxPixels, rect.height);
+}
+
+bool AreViews(std::string* why, const std::string& field, const ViewCounts& views) {
+  return WholeBetween(why, field + ".u", 1, kMaxViews, views.u) &&
+         WholeBetween(why, field + ".v", 1, kMaxViews, views.v);
+}
+
+bool IsDevice(std::string* why, const std::string& device) {
+  try {
+    kernels::ParseDeviceRequest(device);
+    return true;
+  } catch (const Error& error) {
+    return Fail(why, "device", error.what());
+  }
+}
+
+bool IsIterative(BlockSolver::Linear linear) {
+  return linear == BlockSolver::Linear::kCg || linear == BlockSolver::Linear::kBicgstab ||
+         linear == BlockSolver::Linear::kViennaCl;
+}
+
+bool IsStatement(std::string* why, const std::string& field, const Measured& number) {
+  return NonNegative(why, field + ".value", number.value) &&
+         NonNegative(why, field + ".sigma", number.sigma);
+}
+
+}  // namespace
+
+bool RunControl::IsValid(std::string* why) const {
+  return WholeBetween(why, "threads", 0, kMaxThreads, threads);
+}
+
+bool ImageFileOptions::IsValid(std::string* why) const {
+  if (bits != 8 && bits != 16) return Unexpected(why, "bits", "8 or 16", bits);
+  return NonNegative(why, "noise_levels", noise_levels);
+}
+
+bool DepthMeaning::IsValid(std::string* why) const {
+  if (!OneOf(why, "kind", DepthKind::kDisparity, kind)) return false;
+  if (!OneOf(why, "unit", LengthUnit::kTum5000, unit)) return false;
+  if (kind == DepthKind::kDisparity) {
+    if (unit != LengthUnit::kNone) {
+      return Fail(why, "unit",
+                  "a disparity has none, it is px per view step; found " + LengthUnitName(unit));
+    }
+    if (!Finite(why, "disparity_scale", disparity_scale)) return false;
+    if (disparity_scale == 0) {
+      return Fail(why, "disparity_scale",
+                  "a number that is not 0 is expected: all points would lie in the plane of focus");
+    }
+    return Finite(why, "disparity_offset_px", disparity_offset_px);
+  }
+  if (unit == LengthUnit::kNone) {
+    return Fail(why, "unit", "kZ and kRange need one: mm, cm, m or tum5000; it is never guessed");
+  }
+  // NaN differs from both defaults.
+  if (!(disparity_scale == 1)) {
+    return Fail(why, "disparity_scale", "is for kDisparity only");
+  }
+  if (!(disparity_offset_px == 0)) {
+    return Fail(why, "disparity_offset_px", "is for kDisparity only");
+  }
+  return true;
+}
+
+bool DepthMap::IsValid(std::string* why) const {
+  if (!WholeBetween(why, "width_px", 1, kMaxPixels, width_px)) return false;
+  if (!WholeBetween(why, "height_px", 1, kMaxPixels, height_px)) return false;
+  const auto expected = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  if (values.size() != expected) {
+    return Fail(
+        why, "values",
+        fmt::format("{} x {} numbers are expected, found {}", width_px, height_px, values.size()));
+  }
+  return Member(why, "meaning", meaning);
+}
+
+bool SweepOverrides::IsValid(std::string* why) const {
+  if (offset_unknown && offset_mm) {
+    return Fail(why, "offset_mm", "an offset is given, and offset_unknown says that it is not");
+  }
+  if (offset_unknown && offset_sigma_mm) {
+    return Fail(why, "offset_sigma_mm", "an unknown offset has no sigma");
+  }
+  if (!floor_from_calibration.empty() && (floor_px || floor_unknown)) {
+    return Fail(why, "floor_from_calibration", "excludes floor_px and floor_unknown");
+  }
+  if (floor_px && floor_unknown) {
+    return Fail(why, "floor_px", "a floor is given, and floor_unknown says that it is not");
+  }
+  const auto finite = [why](const char* field) {
+    return [why, field](double value) { return Finite(why, field, value); };
+  };
+  const auto non_negative = [why](const char* field) {
+    return [why, field](double value) { return NonNegative(why, field, value); };
+  };
+  return IfGiven(offset_mm, finite("offset_mm")) &&
+         IfGiven(offset_sigma_mm, non_negative("offset_sigma_mm")) &&
+         IfGiven(reading_sigma_mm, non_negative("reading_sigma_mm")) &&
+         IfGiven(floor_px,
+                 [why](const Measured& floor) { return IsStatement(why, "floor_px", floor); }) &&
+         IfGiven(roi,
+                 [why](const model::RegionOfInterest& region) {
+                   return IsRect(why, "roi", {region.x, region.y, region.width, region.height});
+                 }) &&
+         IfGiven(direction,
+                 [why](model::BenchDirection given) {
+                   return OneOf(why, "direction", model::BenchDirection::kToward, given);
+                 }) &&
+         IfGiven(target, [why](model::SweepTarget given) {
+           return OneOf(why, "target", model::SweepTarget::kKnifeEdge, given);
+         });
+}
+
+bool CalibrateOptions::IsValid(std::string* why) const {
+  return OneOf(why, "method", CalibrationMethod::kPaper, method) &&
+         OneOf(why, "on_refusal", OnRefusal::kReturn, on_refusal);
+}
+
+bool LightFieldReadOptions::IsValid(std::string* why) const {
+  return WholeBetween(why, "hci_grid", 0, kMaxGrid, hci_grid) &&
+         IfGiven(inner_views,
+                 [why](const ViewCounts& views) { return AreViews(why, "inner_views", views); }) &&
+         IfGiven(crop, [why](const PixelRect& rect) { return IsRect(why, "crop", rect); });
+}
+
+bool EffectSelection::IsValid(std::string* why) const {
+  if (!OneOf(why, "base", Base::kGiven, base)) return false;
+  if (base != Base::kGiven && !given.empty()) {
+    return Fail(why, "given", "effects are given, but the base is not kGiven");
+  }
+  if (tolerance && base != Base::kAuto) {
+    return Fail(why, "tolerance", "is for the base kAuto only");
+  }
+  std::string reason;
+  if (tolerance && !tolerance->IsValid(&reason)) return Fail(why, "tolerance", reason);
+  return true;
+}
+
+bool EffectSelection::LeavesOut(Effect effect) const {
+  return without.Has(effect) || (base == Base::kGiven && !given.Has(effect));
+}
+
+bool SceneSolver::IsValid(std::string* why) const {
+  if (!OneOf(why, "prior", Prior::kPatches, prior)) return false;
+  if (!OneOf(why, "strength_rule", StrengthRule::kGiven, strength_rule)) return false;
+  if (strength_rule == StrengthRule::kGiven) {
+    if (!Positive(why, "strength", strength)) return false;
+  } else if (!(strength == 0)) {  // NaN too
+    return Fail(why, "strength", "is for StrengthRule::kGiven only");
+  }
+  return IfGiven(tolerance, [why](double given) { return Residual(why, "tolerance", given); }) &&
+         WholeBetween(why, "max_iterations", 1, kMaxIterations, max_iterations);
+}
+
+bool BlockSolver::IsValid(std::string* why) const {
+  if (!OneOf(why, "linear", Linear::kViennaCl, linear)) return false;
+  if (!OneOf(why, "stencil", Stencil::kPaper, stencil)) return false;
+  if (!OneOf(why, "splat", Splat::kNearest, splat)) return false;
+  if (!IsIterative(linear)) {
+    if (tolerance) return Fail(why, "tolerance", "is for iterative linear solvers only");
+    if (max_iterations) return Fail(why, "max_iterations", "is for iterative linear solvers only");
+  }
+  return Positive(why, "gamma", gamma) &&
+         IfGiven(ridge, [why](double given) { return NonNegative(why, "ridge", given); }) &&
+         IfGiven(
+             block_px,
+             [why](int given) { return WholeBetween(why, "block_px", 1, kMaxPixels, given); }) &&
+         IfGiven(tolerance, [why](double given) { return Residual(why, "tolerance", given); }) &&
+         IfGiven(max_iterations, [why](int given) {
+           return WholeBetween(why, "max_iterations", 1, kMaxIterations, given);
+         });
+}
+
+bool FunctionalSolver::IsValid(std::string* why) const {
+  return Positive(why, "gamma", gamma) &&
+         IfGiven(ridge, [why](double given) { return Positive(why, "ridge", given); }) &&
+         Residual(why, "tolerance", tolerance) &&
+         WholeBetween(why, "max_iterations", 1, kMaxIterations, max_iterations);
+}
+
+bool EstimateOptions::IsValid(std::string* why) const {
+  if (views) {
+    if (!AreViews(why, "views", *views)) return false;
+    if (views->u * views->v < 2 && !aperture.views_of) {
+      return Fail(why, "views", "at least two are expected, found 1 x 1: one view is the image");
+    }
+  }
+  if (crop && !IsRect(why, "crop", *crop)) return false;
+  if (sensor_origin && !(WholeBetween(why, "sensor_origin.x", 0, kMaxPixels, sensor_origin->x) &&
+                         WholeBetween(why, "sensor_origin.y", 0, kMaxPixels, sensor_origin->y))) {
+    return false;
+  }
+  if (!OneOf(why, "exif", ExifCheck::kIgnore, exif)) return false;
+  if (aperture.shape &&
+      !OneOf(why, "aperture.shape", model::ApertureShape::kDisc, *aperture.shape)) {
+    return false;
+  }
+  if (st_depth_mm && !AboveUpTo(why, "st_depth_mm", 0, kMaxLengthMm, *st_depth_mm)) return false;
+  if (!Member(why, "effects", effects)) return false;
+  if (effects.LeavesOut(Effect::kApertureShape) && (aperture.shape || aperture.views_of)) {
+    return Fail(why, "aperture",
+                "states which shape the aperture has, and effects leave the shape out");
+  }
+  if (!OneOf(why, "hidden_rays", HiddenRays::kTelea, hidden_rays)) return false;
+  if (memory_limit_mib &&
+      !AboveUpTo(why, "memory_limit_mib", 0, kMaxMemoryMib, *memory_limit_mib)) {
+    return false;
+  }
+  if (!IsDevice(why, device)) return false;
+  const bool is_opencl = device.rfind("opencl", 0) == 0;
+  return std::visit(
+      [&](const auto& given) {
+        using Given = std::decay_t<decltype(given)>;
+        if constexpr (std::is_same_v<Given, std::shared_ptr<const Solver>>) {
+          if (given == nullptr) return Fail(why, "solver", "a solver is expected, found null");
+          return Member(why, "solver", *given);
+        } else if constexpr (std::is_same_v<Given, SolverChooser>) {
+          if (!given) return Fail(why, "solver", "a function is expected, found an empty one");
+          return true;
+        } else {
+          if constexpr (std::is_same_v<Given, BlockSolver>) {
+            if (given.linear == BlockSolver::Linear::kViennaCl && device != "auto") {
+              return Fail(why, "device",
+                          "kViennaCl takes a device for itself: auto is expected, found " + device);
+            }
+          } else if constexpr (!std::is_same_v<Given, SceneSolver>) {
+            if (is_opencl) {
+              return Fail(why, "device",
+                          "this solver computes on the processor: auto or cpu is expected, found " +
+                              device);
+            }
+          }
+          return Member(why, "solver", given);
+        }
+      },
+      solver);
+}
+
+bool RenderAperture::IsValid(std::string* why) const {
+  if (shape && radius) return Fail(why, "radius", "shape and radius exclude each other");
+  return IfGiven(radius, [why](double given) { return NonNegative(why, "radius", given); }) &&
+         IfGiven(shape, [why](model::ApertureShape given) {
+           return OneOf(why, "shape", model::ApertureShape::kDisc, given);
+         });
+}
+
+bool PhotographOptions::IsValid(std::string* why) const {
+  if (!Member(why, "aperture", aperture) || !Member(why, "effects", effects)) return false;
+  for (const Effect effect : {Effect::kDefocus, Effect::kApertureShape}) {
+    if ((aperture.shape || aperture.radius) && effects.LeavesOut(effect)) {
+      return Fail(why, "aperture",
+                  fmt::format("needs the effect {}, which is left out", model::EffectName(effect)));
+    }
+  }
+  return IsDevice(why, device);
+}
+
+bool FocusOptions::IsValid(std::string* why) const {
+  if (depth_mm.has_value() == disparity_px.has_value()) {
+    return Fail(why, "depth_mm", "exactly one of depth_mm and disparity_px is expected");
+  }
+  return IfGiven(
+             depth_mm,
+             [why](double given) { return AboveUpTo(why, "depth_mm", 0, kMaxLengthMm, given); }) &&
+         IfGiven(disparity_px,
+                 [why](double given) { return Finite(why, "disparity_px", given); }) &&
+         Member(why, "aperture", aperture);
+}
+
+bool CompareOptions::IsValid(std::string* why) const {
+  if (!WholeBetween(why, "border_px", 0, kMaxPixels, border_px)) return false;
+  return !baseline || Member(why, "baseline.depth", baseline->depth);
+}
+
+bool Solver::IsValid(std::string* /*why*/) const { return true; }
+
+OptionError::OptionError(std::string field, const std::string& message)
+    : Error(message), field_(std::move(field)) {}
+OptionError::~OptionError() = default;
+
+}  // namespace thicklens

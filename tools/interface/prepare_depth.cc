@@ -1,0 +1,88 @@
+// From a depth map to the disparity of a photograph's pixels.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "thicklens/estimator/fill_holes.h"
+#include "tools/interface/problem.h"
+#include "tools/interface/validation.h"
+#include "tools/interface/with_file_context.h"
+
+namespace thicklens {
+namespace {
+
+std::string NameOf(const DepthMap& map) { return map.source.empty() ? "depth" : map.source; }
+
+model::RawDepthMap RawOf(const DepthMap& map) {
+  return {map.width_px, map.height_px, map.values, map.is_integer};
+}
+
+double UnitMm(LengthUnit unit) {
+  return unit == LengthUnit::kNone ? 1 : model::DepthUnitMm(LengthUnitName(unit));
+}
+
+// Step between views on the aperture, mm, along u, or along v where there is one view in u.
+double ApertureStepMm(const model::LightFieldGrid& grid, const Camera& camera) {
+  const Eigen::Vector2d step = model::ApertureStepsMm(grid, camera);
+  return std::abs(step.x() != 0 ? step.x() : step.y());
+}
+
+estimator::DisparityMap WithoutHoles(const estimator::DisparityMap& map,
+                                     const model::LinearPicture& picture, double at_infinity,
+                                     PreparedDepth* prepared) {
+  for (const float disparity : map.disparity) prepared->was_hole.push_back(std::isnan(disparity));
+  return estimator::FillHoles(map, picture, &prepared->holes, at_infinity);
+}
+
+PreparedDepth PrepareByCamera(const DepthMap& map, const model::LinearPicture& picture,
+                              const Camera& camera, const model::LightFieldGrid& grid) {
+  model::DepthConvention convention;
+  convention.kind = map.meaning.kind;
+  convention.unit_mm = UnitMm(map.meaning.unit);
+  convention.disparity_scale = map.meaning.disparity_scale;
+  convention.disparity_offset_px = map.meaning.disparity_offset_px;
+  if (convention.kind == DepthKind::kDisparity) {
+    convention.aperture_step_mm = ApertureStepMm(grid, camera);
+  }
+  // Of the image, only its size counts here.
+  model::LinearPicture empty{map.width_px, map.height_px, 1, {}};
+  empty.values.assign(map.values.size(), 0.0F);
+  const model::Scene scene =
+      model::MakeScene(camera, std::move(empty), RawOf(map), convention, NameOf(map));
+  PreparedDepth prepared;
+  prepared.depth = scene.depth;
+  prepared.disparity = WithFileContext(NameOf(map), [&] {
+    return WithoutHoles(
+        estimator::DisparityOnGrid(grid, scene.depth_mm, map.width_px, map.height_px), picture,
+        estimator::DisparityAtInfinity(grid), &prepared);
+  });
+  return prepared;
+}
+
+}  // namespace
+
+PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearPicture& picture,
+                           const Camera* camera, const model::LightFieldGrid* grid) {
+  if (map.width_px != picture.width_px || map.height_px != picture.height_px) {
+    throw Error(fmt::format("{}: it is {}x{} px, the image {}x{} px: the sizes must be equal",
+                            NameOf(map), map.width_px, map.height_px, picture.width_px,
+                            picture.height_px));
+  }
+  if (camera != nullptr) return PrepareByCamera(map, picture, *camera, *grid);
+  if (map.meaning.kind != DepthKind::kDisparity) {
+    throw OptionError("depth.meaning.kind",
+                      "depth.meaning.kind: millimetres need a camera; without one the map must be "
+                      "a disparity");
+  }
+  PreparedDepth prepared;
+  prepared.disparity = WithFileContext(NameOf(map), [&] {
+    return WithoutHoles(estimator::DisparityFromMap(RawOf(map), map.meaning.disparity_scale,
+                                                    map.meaning.disparity_offset_px),
+                        picture, -std::numeric_limits<double>::infinity(), &prepared);
+  });
+  return prepared;
+}
+
+}  // namespace thicklens

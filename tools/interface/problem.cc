@@ -1,0 +1,332 @@
+// The steps from a photograph, its depth and its camera to what a solver starts from. Their order
+// is that of `thicklens estimate`; it determines the result and the first error that is reported.
+#include "tools/interface/problem.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "thicklens/estimator/aperture_blur.h"
+#include "thicklens/estimator/depth_noise.h"
+#include "thicklens/estimator/estimate_checks.h"
+#include "thicklens/io/exif.h"
+#include "thicklens/model/effect_impact.h"
+#include "tools/interface/effects_choice.h"
+#include "tools/interface/exif_comparison.h"
+#include "tools/interface/prepare_aperture.h"
+#include "tools/interface/validation.h"
+#include "tools/interface/with_file_context.h"
+
+namespace thicklens {
+namespace {
+
+std::string NameOf(const Image& photo) { return photo.source().empty() ? "photo" : photo.source(); }
+std::string NameOf(const DepthMap& depth) { return depth.source.empty() ? "depth" : depth.source; }
+std::string NameOf(const Camera& camera) { return fmt::format("camera '{}'", camera.name); }
+
+// ---- 1. Sizes and crop.
+
+Image Cropped(const Image& photo, const PixelRect& rect) {
+  if (photo.is_linear()) {
+    model::LinearPicture part = model::CropPicture(photo.light(), rect);
+    return Image::FromLight(part.width_px, part.height_px, photo.order(), std::move(part.values),
+                            photo.transfer().value_or(TransferCurve::Srgb()), photo.source());
+  }
+  model::StoredPicture part = model::CropPicture(photo.encoded(), rect);
+  return Image::FromEncoded(part.width_px, part.height_px, photo.order(), part.bits,
+                            std::move(part.values), photo.transfer(), photo.source());
+}
+
+DepthMap Cropped(const DepthMap& depth, const PixelRect& rect) {
+  model::RawDepthMap part =
+      model::CropDepth({depth.width_px, depth.height_px, depth.values, depth.is_integer}, rect);
+  return {part.width_px, part.height_px, std::move(part.values),
+          part.integer,  depth.meaning,  depth.source};
+}
+
+// Photograph and depth are cut alike. If only one of them has the crop's size, it was cut before.
+void CutToCrop(const std::optional<PixelRect>& crop, Image* photo, DepthMap* depth, RunScope* run) {
+  if (!crop) return;
+  const bool differ =
+      photo->width_px() != depth->width_px || photo->height_px() != depth->height_px;
+  const auto was_cut = [&](int width_px, int height_px, const std::string& name) {
+    const bool cut = width_px == crop->width && height_px == crop->height && differ;
+    if (cut) run->Warn(fmt::format("{}: has the size of the crop and is taken as it is", name));
+    return cut;
+  };
+  const bool cut_photo = !was_cut(photo->width_px(), photo->height_px(), NameOf(*photo));
+  const bool cut_depth = !was_cut(depth->width_px, depth->height_px, NameOf(*depth));
+  if (cut_photo) {
+    *photo = WithFileContext("crop: " + NameOf(*photo), [&] { return Cropped(*photo, *crop); });
+  }
+  if (cut_depth) {
+    *depth = WithFileContext("crop: " + NameOf(*depth), [&] { return Cropped(*depth, *crop); });
+  }
+}
+
+// ---- 2. The camera of this photograph.
+
+void CheckExif(const Image& photo, const Camera& camera, const PhotoSize& size, ExifCheck check,
+               EstimateDiagnostics* diagnostics, RunScope* run) {
+  if (!photo.is_from_file()) return;
+  std::string damaged;
+  const io::PhotoExif exif =
+      io::ReadExifIfAny(photo.source(), camera.sensor.width_px, camera.sensor.height_px, &damaged);
+  if (!damaged.empty()) {
+    run->Warn(damaged + "; it is not compared with the camera");
+    return;
+  }
+  if (exif.IsEmpty()) return;
+  diagnostics->has_exif = true;
+  std::string contradictions;
+  diagnostics->exif = CompareExif(exif, camera, size);
+  for (const ExifComparison& finding : diagnostics->exif) {
+    if (finding.verdict == ExifComparison::Verdict::kAgrees) continue;
+    const std::string text =
+        fmt::format("{}: the photograph's EXIF says {}, the camera {} ({})", finding.quantity,
+                    finding.photo, finding.camera, finding.remark);
+    const bool contradicts = finding.verdict == ExifComparison::Verdict::kContradicts;
+    if (contradicts && check == ExifCheck::kRequire) {
+      contradictions += (contradictions.empty() ? "" : "; ") + text;
+    } else {
+      run->Warn(fmt::format("{}: {}{}", NameOf(photo), text, contradicts ? "; ignored" : ""));
+    }
+  }
+  if (contradictions.empty()) return;
+  throw Error(fmt::format(
+      "{}: it was not taken with the camera and setting of {}: {}; calibrate that setting, use its "
+      "camera, or ignore the EXIF if it is wrong",
+      NameOf(photo), NameOf(camera), contradictions));
+}
+
+void NoteAssumedFields(const Camera& camera, RunScope* run) {
+  for (const std::string& notice : camera.notices) run->Warn(notice);
+  const std::vector<std::string> fields = model::AssumedFields(camera);
+  if (fields.empty()) return;
+  run->Warn(fmt::format("{}: assumed, neither published nor measured: {}", NameOf(camera),
+                        fmt::join(fields, ", ")));
+}
+
+// The camera behind an image of the full size, which may be a part of its sensor, and of that the
+// crop.
+Camera CameraFor(const Image& photo, int width_px, int height_px, Camera camera,
+                 const EstimateOptions& options, EstimateDiagnostics* diagnostics, RunScope* run) {
+  if (photo.transfer()) camera.sensor.transfer = *photo.transfer();
+  NoteAssumedFields(camera, run);
+  CheckExif(photo, camera, {width_px, height_px, options.sensor_origin.has_value()}, options.exif,
+            diagnostics, run);
+  if (options.sensor_origin) {
+    const PixelRect part{options.sensor_origin->x, options.sensor_origin->y, width_px, height_px};
+    camera = WithFileContext("sensor_origin: " + NameOf(camera),
+                             [&] { return model::CropCamera(camera, part); });
+  } else if (camera.sensor.width_px != width_px || camera.sensor.height_px != height_px) {
+    throw Error(fmt::format(
+        "{}: the image is {}x{} px, the sensor of {} has {}x{} px: they must be equal, or "
+        "sensor_origin must state which part of the sensor it is",
+        NameOf(photo), width_px, height_px, NameOf(camera), camera.sensor.width_px,
+        camera.sensor.height_px));
+  }
+  return options.crop ? model::CropCamera(camera, *options.crop) : camera;
+}
+
+TransferCurve TransferFor(const Image& photo, const std::optional<Camera>& camera,
+                          EstimateDiagnostics* diagnostics, RunScope* run) {
+  diagnostics->transfer_from = photo.transfer() ? "image" : camera ? "camera" : "assumed";
+  if (camera) return camera->sensor.transfer;
+  if (photo.transfer()) return *photo.transfer();
+  run->Inform(fmt::format("{}: stored values are taken as sRGB", NameOf(photo)));
+  return TransferCurve::Srgb();
+}
+
+// ---- 3. The grid of the light field.
+
+// UV on the aperture, where each view has one transmission; ST in the plane of focus unless a depth
+// is given.
+model::LightFieldGrid GridFor(const EstimateOptions& options, const Camera& camera,
+                              const Eigen::ArrayXXd& weights) {
+  const model::ApertureSamples samples =
+      model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm);
+  const double st_depth_mm = options.st_depth_mm.value_or(camera.focus_depth_mm());
+  if (std::isinf(st_depth_mm)) {
+    throw Error(fmt::format(
+        "{}: it is focused at infinity, where no ST plane can lie: st_depth_mm must state where it "
+        "lies",
+        NameOf(camera)));
+  }
+  return model::GridOnPlanes(camera, {0, st_depth_mm}, samples);
+}
+
+void CheckViewCounts(const Eigen::ArrayXXd& weights, RunScope* run) {
+  if (weights.size() < 2) {
+    throw OptionError("views",
+                      "views: at least two are expected, found 1 x 1: one view is the "
+                      "image");
+  }
+  for (const auto& [count, axis] :
+       {std::pair{weights.cols(), "u (across)"}, std::pair{weights.rows(), "v (down)"}}) {
+    if (count == 1) {
+      run->Warn(fmt::format("views: one view along {}: no blur is modelled that way", axis));
+    }
+  }
+}
+
+// ---- 4. The depth.
+
+// A depth far from what the camera is focused at is possible, but more often its unit is wrong.
+void WarnOfUnlikelyDepth(const DepthMap& map, const Camera& camera,
+                         const model::DepthStatistics& depth, RunScope* run) {
+  constexpr double kUsual = 4;
+  const double focus_depth_mm = camera.focus_depth_mm();
+  if (std::isinf(focus_depth_mm)) return;  // any depth is far from it
+  if (depth.median_mm <= kUsual * focus_depth_mm && depth.median_mm >= focus_depth_mm / kUsual) {
+    return;
+  }
+  run->Warn(fmt::format(
+      "{}: the median depth is {:.6g} mm, the camera is focused at {:.6g} mm; is its unit right?",
+      NameOf(map), depth.median_mm, focus_depth_mm));
+}
+
+std::pair<double, double> DisparityRangePx(const estimator::DisparityMap& map) {
+  const auto [least, most] = std::minmax_element(map.disparity.begin(), map.disparity.end());
+  const double step = map.step.x() != 0 ? map.step.x() : map.step.y();
+  return std::minmax({static_cast<double>(*least) * step, static_cast<double>(*most) * step});
+}
+
+// A disparity as large as the image is none of a scene.
+void CheckDisparities(const DepthMap& map, const estimator::DisparityMap& disparity) {
+  const auto [low_px, high_px] = DisparityRangePx(disparity);
+  const int size_px = std::max(disparity.width_px, disparity.height_px);
+  if (std::max(std::abs(low_px), std::abs(high_px)) <= size_px) return;
+  throw Error(fmt::format(
+      "{}: disparities from {:.4g} to {:.4g} px per view step, which must be within the {} px of "
+      "the image; {}",
+      NameOf(map), low_px, high_px, size_px,
+      map.meaning.kind == DepthKind::kDisparity
+          ? "are disparity_scale and disparity_offset_px right?"
+          : "are the depth's unit, and the camera's aperture and focus, right?"));
+}
+
+void SmoothNoisyDepth(const EstimateOptions& options, estimator::DisparityMap* disparity,
+                      EstimateDiagnostics* diagnostics, int threads) {
+  diagnostics->depth_noise_px = estimator::DepthNoisePx(*disparity);
+  if (!options.smooth_depth || !diagnostics->depth_noise_px ||
+      !(*diagnostics->depth_noise_px > estimator::kSmoothedNoisePx)) {
+    return;
+  }
+  estimator::SmoothedDepth smoothed =
+      estimator::SmoothDepth(*disparity, *diagnostics->depth_noise_px, threads);
+  *disparity = std::move(smoothed.map);
+  diagnostics->depth_noise_left_px = smoothed.noise_left_px;
+}
+
+// ---- 5. The effects.
+
+EffectSet EffectsOfModel(const AnySolver& solver, bool camera) {
+  EffectSet effects = {Effect::kDefocus, Effect::kApertureShape};
+  if (!std::holds_alternative<FunctionalSolver>(solver)) effects.Add(Effect::kOcclusion);
+  return camera ? effects.With({Effect::kThickness, Effect::kFalloff}) : effects;
+}
+
+model::EffectDecision DecideEffects(const EstimateOptions& options,
+                                    const std::optional<Camera>& camera,
+                                    const std::optional<model::DepthStatistics>& depth) {
+  const EffectSet of_model = EffectsOfModel(options.solver, camera.has_value());
+  RequireEffectsOf(options.effects, of_model);
+  model::EffectChoice choice = ChoiceOf(options.effects);
+  // The solution's own, which cost what they bring.
+  choice.kept = EffectsOfModel(options.solver, false);
+  const bool is_gaussian = !options.aperture.shape && options.aperture.views_of == nullptr &&
+                           camera && camera->psf == model::Psf::kGaussian;
+  if (is_gaussian) choice.kept.Remove(Effect::kApertureShape);
+  if (options.effects.LeavesOut(Effect::kDefocus)) {
+    throw OptionError("effects",
+                      "effects: defocus is what an estimate undoes and cannot be left "
+                      "out");
+  }
+  if (of_model.Has(Effect::kOcclusion) && options.effects.LeavesOut(Effect::kOcclusion)) {
+    throw OptionError("effects",
+                      "effects: occlusion cannot be left out of an estimate, whose views show the "
+                      "depth as each of them sees it");
+  }
+  if (!camera) return DecideWithoutCamera(options.effects, of_model);
+  model::EffectConditions conditions;
+  conditions.camera = *camera;
+  const double focus_depth_mm = camera->focus_depth_mm();
+  return model::DecideEffects(choice, conditions,
+                              model::PlacesBetween(*camera, depth ? depth->min_mm : focus_depth_mm,
+                                                   depth ? depth->max_mm : focus_depth_mm, true),
+                              of_model);
+}
+
+}  // namespace
+
+PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
+                        const std::optional<Camera>& camera, const EstimateOptions& options,
+                        EstimateDiagnostics* diagnostics, RunScope* run) {
+  if (photo.channels() == 4) {
+    run->Warn(fmt::format("{}: its alpha channel is left out", NameOf(photo)));
+  }
+  // `part` is what is estimated; `photo` remains the whole image, whose EXIF is checked.
+  Image part = photo.WithoutAlpha();
+  DepthMap map = depth;
+  const int full_width_px = std::max(part.width_px(), map.width_px);
+  const int full_height_px = std::max(part.height_px(), map.height_px);
+  CutToCrop(options.crop, &part, &map, run);
+  if (map.width_px != part.width_px() || map.height_px != part.height_px()) {
+    throw Error(fmt::format("{}: it is {}x{} px, the image {} {}x{} px: the sizes must be equal",
+                            NameOf(map), map.width_px, map.height_px, NameOf(part), part.width_px(),
+                            part.height_px()));
+  }
+  PreparedProblem prepared;
+  prepared.input = std::make_shared<estimator::EstimateInput>();
+  estimator::EstimateInput& input = *prepared.input;
+  if (camera) {
+    input.camera =
+        CameraFor(photo, full_width_px, full_height_px, *camera, options, diagnostics, run);
+  }
+  input.transfer = TransferFor(photo, input.camera, diagnostics, run);
+  diagnostics->transfer = input.transfer;
+  input.picture = part.ToLight(input.transfer);
+  const Camera* const known = input.camera ? &*input.camera : nullptr;
+  const PreparedAperture aperture = PrepareAperture(options, known, run);
+  diagnostics->aperture_shape = aperture.shape;
+  diagnostics->aperture_from = aperture.from;
+  input.weights = aperture.weights;
+  CheckViewCounts(input.weights, run);
+  if (input.camera) {
+    input.grid = GridFor(options, *input.camera, input.weights);
+    WarnOfOtherSteps(options, aperture, *input.grid, *input.camera, run);
+  }
+  PreparedDepth prepared_depth =
+      PrepareDepth(map, input.picture, known, input.grid ? &*input.grid : nullptr);
+  input.disparity = std::move(prepared_depth.disparity);
+  prepared.was_hole = std::move(prepared_depth.was_hole);
+  diagnostics->depth = prepared_depth.depth;
+  diagnostics->holes_filled = prepared_depth.holes;
+  diagnostics->holes_share = static_cast<double>(prepared_depth.holes) /
+                             static_cast<double>(input.disparity.disparity.size());
+  if (prepared_depth.depth && map.meaning.kind != DepthKind::kDisparity) {
+    WarnOfUnlikelyDepth(map, *input.camera, *prepared_depth.depth, run);
+  }
+  CheckDisparities(map, input.disparity);
+  SmoothNoisyDepth(options, &input.disparity, diagnostics, run->threads());
+  diagnostics->disparity_range_px = DisparityRangePx(input.disparity);
+  prepared.effects = DecideEffects(options, input.camera, prepared_depth.depth);
+  diagnostics->effects = prepared.effects;
+  if (input.camera && !prepared.effects.on.Has(Effect::kThickness)) {
+    input.falloff_camera = model::ThinTwin(*input.camera);
+  }
+  if (input.grid) {
+    const bool falloff = prepared.effects.on.Has(Effect::kFalloff);
+    const estimator::ApertureBlur blur = estimator::MeasureApertureBlur(
+        *input.grid, *input.camera, input.weights, falloff ? &input.camera_of_falloff() : nullptr);
+    diagnostics->aperture_calibrated_sigma_mm = blur.calibrated_sigma_mm;
+    diagnostics->aperture_sigma_mm = blur.sigma_mm;
+    diagnostics->aperture_corner_change = blur.corner_change;
+  }
+  return prepared;
+}
+
+}  // namespace thicklens

@@ -1,0 +1,41 @@
+#ifndef THICKLENS_TOOLS_INTERFACE_PROBLEM_H_
+#define THICKLENS_TOOLS_INTERFACE_PROBLEM_H_
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "thicklens/estimate.h"
+#include "thicklens/estimator/estimate_input.h"
+#include "tools/interface/run_scope.h"
+
+namespace thicklens {
+
+// What the steps before the solver make.
+struct PreparedProblem {
+  std::shared_ptr<estimator::EstimateInput> input;
+  model::EffectDecision effects;
+  std::vector<bool> was_hole;  // per pixel of the depth map
+};
+
+// The steps of PrepareProblem. The options are valid.
+PreparedProblem Prepare(const Image& photo, const DepthMap& depth,
+                        const std::optional<Camera>& camera, const EstimateOptions& options,
+                        EstimateDiagnostics* diagnostics, RunScope* run);
+
+// ---- Steps that compare shares.
+
+// The disparity of a map on the grid of its light field, without holes.
+struct PreparedDepth {
+  estimator::DisparityMap disparity;
+  std::size_t holes = 0;
+  std::vector<bool> was_hole;
+  std::optional<model::DepthStatistics> depth;  // mm from Ap, with a camera
+};
+// `camera` and `grid` are both null or both set. Throws Error that names the map's source.
+PreparedDepth PrepareDepth(const DepthMap& map, const model::LinearPicture& picture,
+                           const Camera* camera, const model::LightFieldGrid* grid);
+
+}  // namespace thicklens
+
+#endif  // THICKLENS_TOOLS_INTERFACE_PROBLEM_H_
