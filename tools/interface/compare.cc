@@ -8,6 +8,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/estimator/compare.h"
 #include "thicklens/estimator/estimate_input.h"
+#include "thicklens/model/stored_values.h"
 #include "tools/interface/problem.h"
 #include "tools/interface/run_scope.h"
 #include "tools/interface/validation.h"
@@ -81,8 +82,8 @@ ImageScores CompareImages(const Image& reference, const Image& other,
                           const CompareOptions& options) {
   checks::RequireValid(options);
   if (options.baseline) throw OptionError("baseline", "baseline: is for light fields");
-  return ScoresOf(estimator::ComparePictures(estimator::StoredValuesOf(reference.encoded()),
-                                             estimator::StoredValuesOf(other.encoded()),
+  return ScoresOf(estimator::ComparePictures(model::StoredValuesOf(reference.encoded()),
+                                             model::StoredValuesOf(other.encoded()),
                                              options.border_px));
 }
 

@@ -270,6 +270,7 @@ TEST(RunProgram, IsInterruptedWithItsChild) {
   EXPECT_EXIT(
       {
         CatchSignals();
+        const CancelScope scope(ProgramToken());
         try {
           RunProgram("/bin/sh", {"-c", "kill -INT $PPID $$"}, folder.path(), 60);
         } catch (const Interrupted&) {
