@@ -12,6 +12,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/explanation.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/explain_scene.h"
 #include "tools/options/command_frame.h"
@@ -44,7 +45,7 @@ struct ExplainOptions {
   std::string figure_path;
 };
 
-DepthRange ParseDepthRange(const std::string& text) {
+model::DepthRange ParseDepthRange(const std::string& text) {
   const std::string form = "NEAR:FAR in mm, with 0 < NEAR < FAR and FAR a number or inf,";
   const std::string inf_ending = ":inf";
   const bool to_infinity =
@@ -53,7 +54,7 @@ DepthRange ParseDepthRange(const std::string& text) {
   const auto numbers =
       SplitNumbers("--depth-range",
                    to_infinity ? text.substr(0, text.size() - inf_ending.size()) : text, ':', form);
-  DepthRange range{numbers[0], std::numeric_limits<double>::infinity()};
+  model::DepthRange range{numbers[0], std::numeric_limits<double>::infinity()};
   if (!to_infinity && numbers.size() > 1) range.far_mm = numbers[1];
   if (numbers.size() != (to_infinity ? 1 : 2) || !(range.near_mm > 0) ||
       !(range.far_mm > range.near_mm)) {
@@ -64,13 +65,13 @@ DepthRange ParseDepthRange(const std::string& text) {
 
 // The known part of what is photographed.
 struct ExplainedScene {
-  DepthRange range;
+  model::DepthRange range;
   std::vector<model::EffectPlace> places;
 };
 
 ExplainedScene SceneOf(const ExplainOptions& options, const model::Camera& camera) {
   if (options.depth_path.empty()) {
-    const DepthRange range = ParseDepthRange(options.depth_range);
+    const model::DepthRange range = ParseDepthRange(options.depth_range);
     return {range, model::PlacesBetween(camera, range.near_mm, range.far_mm, !options.as_sweep)};
   }
   const model::RawDepthMap map = io::ReadDepthMap(options.depth_path);
@@ -107,7 +108,7 @@ model::EffectDecision Decide(const ExplainOptions& options, const model::Camera&
 }
 
 EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
-                    const DepthRange& range, const model::EffectDecision& decision) {
+                    const model::DepthRange& range, const model::EffectDecision& decision) {
   model::SceneSimulationOptions sensor;
   sensor.full_well_electrons = options.full_well_electrons;
   sensor.read_noise_electrons = options.read_noise_electrons;
@@ -152,7 +153,7 @@ CommandResult Explain(const ExplainOptions& options) {
   const model::Camera camera = model::ReadCamera(options.camera_path);
   TellAssumedFields(camera);
   const ExplainedScene scene = SceneOf(options, camera);
-  const Explanation explanation = ExplainCamera(camera, scene.range, options.steps);
+  const model::Explanation explanation = model::ExplainCamera(camera, scene.range, options.steps);
   const model::EffectDecision decision = Decide(options, camera, scene.places);
   CommandResult result{ExplanationJson(explanation), ""};
   result.summary["effects"] = EffectsJson(decision);

@@ -23,7 +23,7 @@ model::SceneLayer Leaves(double depth_mm) {
   return layer;
 }
 
-model::SceneSimulationOptions PatchOf(const model::Camera& camera, const DepthRange& range,
+model::SceneSimulationOptions PatchOf(const model::Camera& camera, const model::DepthRange& range,
                                       const model::SceneSimulationOptions& sensor) {
   model::SceneSimulationOptions patch = sensor;
   const model::Sensor& whole = camera.sensor;
@@ -57,7 +57,7 @@ double Median(std::vector<double> values) {
 
 }  // namespace
 
-EffectCosts MeasureEffectCosts(const model::Camera& camera, const DepthRange& range,
+EffectCosts MeasureEffectCosts(const model::Camera& camera, const model::DepthRange& range,
                                const model::SceneSimulationOptions& sensor,
                                const model::EffectDecision& decision,
                                const std::function<void(int done, int total)>& tell) {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "thicklens/model/effect_choice.h"
+#include "thicklens/model/explanation.h"
 #include "thicklens/model/scene_simulator.h"
-#include "tools/report/explain_table.h"
 
 namespace thicklens::tools {
 
@@ -25,7 +25,7 @@ struct EffectCosts {
 // of the image is that of the patch times the ratio of their pixels. From `sensor` only the noise
 // and the bits are used, not the camera, layers and effects. `tell` is called before each
 // simulation and may throw to stop. Throws Error for a camera or depths that cannot be simulated.
-EffectCosts MeasureEffectCosts(const model::Camera& camera, const DepthRange& range,
+EffectCosts MeasureEffectCosts(const model::Camera& camera, const model::DepthRange& range,
                                const model::SceneSimulationOptions& sensor,
                                const model::EffectDecision& decision,
                                const std::function<void(int done, int total)>& tell);

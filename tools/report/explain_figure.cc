@@ -27,8 +27,8 @@ PlotSeries Curve(const std::string& label, Ink ink, Stroke stroke) {
 
 }  // namespace
 
-std::string BlurCurveSvg(const model::Camera& camera, const DepthRange& range) {
-  const Explanation known = ExplainCamera(camera, range, kPoints);
+std::string BlurCurveSvg(const model::Camera& camera, const model::DepthRange& range) {
+  const model::Explanation known = model::ExplainCamera(camera, range, kPoints);
   const bool by_inverse = !(range.far_mm < kFarRatio * range.near_mm);
   const auto abscissa = [by_inverse](double depth_mm) {
     return by_inverse ? 1000 / depth_mm : depth_mm;
@@ -47,7 +47,7 @@ std::string BlurCurveSvg(const model::Camera& camera, const DepthRange& range) {
   PlotBand band;
   band.label = fmt::format("\u00B1{:g} standard errors of d1 and kappa", kStandardErrors);
   bool has_errors = false;
-  for (const DepthRow& row : known.rows) {
+  for (const model::DepthRow& row : known.rows) {
     const double x = abscissa(row.depth_mm);
     curve.x.push_back(x);
     curve.y.push_back(row.defocus_sigma_px);

@@ -3,13 +3,13 @@
 
 #include <string>
 
-#include "tools/report/explain_table.h"
+#include "thicklens/model/explanation.h"
 
 namespace thicklens::tools {
 
 // Draws the curve of blur against depth as an SVG file, with the band of two standard errors from
 // the errors of d1 and kappa. A wide range of depths is drawn against 1/depth.
-std::string BlurCurveSvg(const model::Camera& camera, const DepthRange& range);
+std::string BlurCurveSvg(const model::Camera& camera, const model::DepthRange& range);
 
 }  // namespace thicklens::tools
 

@@ -2,9 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -88,52 +86,6 @@ TEST_F(ExplainCostsTest, DrawsTheCurve) {
       Run({"--depth-range", "200:inf", "--figure", folder_ / "camera.yaml"});
   EXPECT_EQ(clash.exit_code, 2);
   EXPECT_EQ(ContentOf(folder_ / "camera.yaml"), kCamera);
-}
-
-// The band's width against the scatter over cameras that are drawn as their covariance says.
-TEST(BlurBandTest, IsTheScatterOfWhatTheCovarianceAllows) {
-  model::Camera camera;
-  camera.lens = thicklens::testing::ThickMacroLens(10);
-  camera.sensor.pixel_pitch_mm = 0.005;
-  camera.sensor.width_px = camera.sensor.height_px = 100;
-  const double distance_mm = 4 + 52 * 1000 / 950.0, ratio = 0.45;
-  const double distance_sd = 0.002, ratio_sd = 0.004;
-  for (const double correlation : {-0.8, 0.0, 0.6}) {
-    SCOPED_TRACE(correlation);
-    camera.calibration.emplace();
-    camera.calibration->image_distance_mm = model::Estimate{distance_mm, distance_sd};
-    camera.calibration->blur_ratio = model::Estimate{ratio, ratio_sd};
-    camera.calibration->covariance_order = {"image_distance_mm", "blur_ratio"};
-    const double shared = correlation * distance_sd * ratio_sd;
-    camera.calibration->covariance.resize(2, 2);
-    camera.calibration->covariance << distance_sd * distance_sd, shared, shared,
-        ratio_sd * ratio_sd;
-    const Explanation known = ExplainCamera(camera, {600, 3000}, 4);  // none of them in focus
-    std::mt19937 engine(7);
-    std::normal_distribution<double> normal;
-    constexpr int kDraws = 4000;
-    std::vector<double> sums(known.rows.size()), squares(known.rows.size());
-    for (int i = 0; i < kDraws; ++i) {
-      const double first = normal(engine);
-      const double second =
-          correlation * first + std::sqrt(1 - correlation * correlation) * normal(engine);
-      for (std::size_t row = 0; row < known.rows.size(); ++row) {
-        const double sigma_px = (ratio + ratio_sd * second) *
-                                model::BlurRadiusMm(camera.lens, distance_mm + distance_sd * first,
-                                                    known.rows[row].depth_mm) /
-                                camera.sensor.pixel_pitch_mm;
-        sums[row] += sigma_px;
-        squares[row] += sigma_px * sigma_px;
-      }
-    }
-    for (std::size_t row = 0; row < known.rows.size(); ++row) {
-      const double mean = sums[row] / kDraws;
-      const double sd = std::sqrt(squares[row] / kDraws - mean * mean);
-      // The scatter of 4000 draws has a standard error of 1.1 %.
-      EXPECT_NEAR(known.rows[row].defocus_sigma_error_px / sd, 1, 0.045)
-          << known.rows[row].depth_mm;
-    }
-  }
 }
 
 }  // namespace

@@ -1,0 +1,76 @@
+#ifndef THICKLENS_MODEL_EXPLANATION_H_
+#define THICKLENS_MODEL_EXPLANATION_H_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "thicklens/model/camera.h"
+
+namespace thicklens::model {
+
+// Depths from Ap; far_mm may be +inf.
+struct DepthRange {
+  double near_mm = 0;
+  double far_mm = 0;
+};
+
+// The blur and magnification of a calibrated camera at one depth.
+struct DepthRow {
+  double depth_mm = 0;  // may be +inf
+  double blur_radius_mm = 0;
+  double blur_radius_px = 0;
+  double defocus_sigma_px = 0;        // kappa r_defocus/p
+  double defocus_sigma_error_px = 0;  // its standard deviation from those of kappa and d1
+  double sigma_px = 0;                // with the lens floor; without the pixel box
+  double magnification = 0;           // of the chief ray, absolute value
+  double thin_blur_radius_px = 0;     // of a thin lens at the same image distance
+  double thin_magnification = 0;      // likewise
+};
+
+struct DepthOfFieldRow {
+  double blur_radius_px = 0;
+  double near_mm = 0;
+  double far_mm = 0;  // may be +inf
+};
+
+// The camera treated as a thin lens (f1 = f2 = the front value, rho = 0) whose sensor does not
+// move.
+struct ThinComparison {
+  bool same_lens = false;                // the lens is already thin
+  std::optional<double> focus_depth_mm;  // absent: the sensor is in front of every image
+  double scale_ratio = 1;                // magnification, thin over thick, at every depth
+  double corner_shift_px = 0;            // the resulting shift at the farthest corner
+  // Between the front focal length and this depth, rays through the rim of the aperture land within
+  // kThinTolerancePx of where they land behind the thick lens, relative to the chief ray; may be
+  // +inf.
+  double alike_up_to_mm = 0;
+};
+constexpr double kThinTolerancePx = 0.1;
+
+// What a calibrated camera does to points at several depths.
+struct Explanation {
+  std::string camera_name;
+  double front_focal_length_mm = 0;
+  double image_distance_mm = 0;
+  double image_distance_sigma_mm = 0;
+  double focus_depth_mm = 0;  // may be +inf
+  double blur_ratio = 0;
+  double blur_ratio_sigma = 0;
+  std::optional<double> blur_floor_px;
+  std::vector<DepthRow> rows;
+  std::vector<DepthOfFieldRow> depth_of_field;
+  double hyperfocal_mm = 0;     // plane of focus whose blur radius at infinity is 1 px
+  double working_f_number = 0;  // D/(2 r)
+  ThinComparison thin;
+};
+
+// Returns `count` depths (>= 2), equally spaced in 1/z, where the blur changes by equal steps.
+std::vector<double> InverselySpacedDepthsMm(const DepthRange& range, int count);
+
+// Throws Error naming the field if the camera has no image distance or no blur ratio.
+Explanation ExplainCamera(const Camera& camera, const DepthRange& range, int count);
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_EXPLANATION_H_
