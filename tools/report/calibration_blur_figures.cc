@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "tools/report/blur_law.h"
+#include "thicklens/calib/blur_model.h"
 #include "tools/report/calibration_figures.h"
 #include "tools/report/calibration_sections.h"
 #include "tools/report/calibration_words.h"
@@ -31,7 +31,7 @@ struct BlurPoints {
   double largest_residual = 0;
 };
 
-BlurPoints BlurPointsOf(const Calibration& calibration, const std::optional<BlurLaw>& law,
+BlurPoints BlurPointsOf(const Calibration& calibration, const std::optional<calib::BlurModel>& law,
                         const Abscissa& abscissa) {
   BlurPoints points;
   for (const FrameMeasurement& frame : calibration.frames) {
@@ -39,7 +39,7 @@ BlurPoints BlurPointsOf(const Calibration& calibration, const std::optional<Blur
     if (frame.rejection.empty() && frame.source_blur_sigma_px > 0)
       AddPoint(&points.zhuo_sim, x, frame.source_blur_sigma_px,
                PointName(frame, abscissa, "Zhuo-Sim sigma [px]", frame.source_blur_sigma_px));
-    if (!HasBlur(frame)) continue;
+    if (!calib::HasBlur(frame)) continue;
     const bool in_fit = frame.in_blur_fit && frame.rejection.empty();
     const bool full = frame.blur_fit_weight >= 0.5;
     PlotSeries* series = !in_fit ? &points.left_out : full ? &points.fitted : &points.doubted;
@@ -57,16 +57,16 @@ BlurPoints BlurPointsOf(const Calibration& calibration, const std::optional<Blur
   return points;
 }
 
-CurvePoints LawCurve(const BlurLaw& law, const std::pair<double, double>& x_range) {
+CurvePoints LawCurve(const calib::BlurModel& law, const std::pair<double, double>& x_range) {
   CurvePoints curve;
   for (int i = 0; i <= kCurveSteps; ++i) {
     const double z_mm = x_range.first + (x_range.second - x_range.first) * i / kCurveSteps;
-    if (IsDepth(z_mm)) curve.emplace_back(z_mm, law.SigmaPx(z_mm));
+    if (calib::IsDepth(z_mm)) curve.emplace_back(z_mm, law.SigmaPx(z_mm));
   }
   return curve;
 }
 
-PlotBand LawBand(const BlurLaw& law, const CurvePoints& curve) {
+PlotBand LawBand(const calib::BlurModel& law, const CurvePoints& curve) {
   PlotBand band;
   band.label = "its uncertainty, ± 2 sd";
   for (const auto& [z_mm, sigma_px] : curve) {
@@ -79,7 +79,7 @@ PlotBand LawBand(const BlurLaw& law, const CurvePoints& curve) {
   return band;
 }
 
-PlotSeries SideCurve(std::string label, Stroke stroke, const BlurLaw& law,
+PlotSeries SideCurve(std::string label, Stroke stroke, const calib::BlurModel& law,
                      const std::pair<double, double>& x_range) {
   PlotSeries series = Curve(std::move(label), Ink::kData, stroke, LawCurve(law, x_range));
   series.thin = true;
@@ -99,20 +99,20 @@ std::pair<double, double> XRange(const std::vector<double>& xs,
 }
 
 void AddLaws(const FocusSweep& sweep, const Calibration& calibration,
-             const std::optional<BlurLaw>& law, const std::pair<double, double>& x_range,
+             const std::optional<calib::BlurModel>& law, const std::pair<double, double>& x_range,
              Plot* plot) {
   if (law) {
     const CurvePoints curve = LawCurve(*law, x_range);
     plot->series.push_back(Curve("fitted law", Ink::kFit, Stroke::kSolid, curve));
     plot->bands.push_back(LawBand(*law, curve));
   }
-  if (const auto side = BlurLaw::OfSide(sweep, calibration, calibration.nearer))
+  if (const auto side = calib::BlurModel::OfSide(sweep, calibration, calibration.nearer))
     plot->series.push_back(SideCurve("nearer side alone", Stroke::kSolid, *side, x_range));
-  if (const auto side = BlurLaw::OfSide(sweep, calibration, calibration.farther))
+  if (const auto side = calib::BlurModel::OfSide(sweep, calibration, calibration.farther))
     plot->series.push_back(SideCurve("farther side alone", Stroke::kDashed, *side, x_range));
 }
 
-std::string BlurCaption(const std::optional<BlurLaw>& law) {
+std::string BlurCaption(const std::optional<calib::BlurModel>& law) {
   if (!law)
     return "No law was fitted to these points: look for a smallest blur with frames on both sides "
            "of it.";
@@ -154,8 +154,8 @@ ReportFigure ResidualFigure(const calib::BlurFit& fit, BlurPoints points, const 
 std::vector<ReportFigure> BlurFigures(const FocusSweep& sweep, const Calibration& calibration,
                                       const std::vector<ResultRow>& rows,
                                       const model::SweepTruth* truth, const Abscissa& abscissa) {
-  const std::optional<BlurLaw> law =
-      abscissa.is_depth ? BlurLaw::Of(sweep, calibration) : std::nullopt;
+  const std::optional<calib::BlurModel> law =
+      abscissa.is_depth ? calib::BlurModel::Of(sweep, calibration) : std::nullopt;
   BlurPoints points = BlurPointsOf(calibration, law, abscissa);
   if (points.xs.size() < 2) return {};
   Plot plot;
@@ -172,7 +172,7 @@ std::vector<ReportFigure> BlurFigures(const FocusSweep& sweep, const Calibration
   if (abscissa.is_depth) AddLaws(sweep, calibration, law, x_range, &plot);
   if (truth != nullptr && abscissa.is_depth)
     plot.series.push_back(Curve("true law", Ink::kTruth, Stroke::kDashed,
-                                LawCurve(BlurLaw::OfTruth(sweep, *truth), x_range)));
+                                LawCurve(calib::BlurModel::OfTruth(sweep, *truth), x_range)));
   const double pad = 0.04 * (x_range.second - x_range.first);
   x_range = {x_range.first - pad, x_range.second + pad};
   plot.x_axis.range = x_range;

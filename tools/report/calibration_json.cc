@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "thicklens/base/printable_text.h"
-#include "tools/report/blur_law.h"
+#include "thicklens/calib/blur_model.h"
 #include "tools/report/calibration_summary.h"
 #include "tools/report/calibration_words.h"
 #include "tools/report/determined.h"
@@ -89,11 +89,11 @@ json StatisticsJson(const calib::FrameStatistics& statistics) {
 }
 
 // Frame by frame what the figures show. `law` may be null.
-json FrameJson(const calib::FrameMeasurement& frame, const BlurLaw* law) {
+json FrameJson(const calib::FrameMeasurement& frame, const calib::BlurModel* law) {
   const bool has_blur = frame.blur_sigma_error_px != 0;
   const bool has_edges = frame.edge_count > 0 || frame.mean_edge_slope != 0;
   const bool has_reading_error = frame.reading_error_sigma_mm > 0;
-  const bool has_law = law != nullptr && IsDepth(frame.depth_mm);
+  const bool has_law = law != nullptr && calib::IsDepth(frame.depth_mm);
   json out = {
       {"image", PrintableUtf8(frame.image)},
       {"reading_mm", Number(frame.reading_mm)},
@@ -313,7 +313,7 @@ json FitJson(const calib::Calibration& calibration) {
 }
 
 json FramesJson(const calib::FocusSweep& sweep, const calib::Calibration& calibration) {
-  const std::optional<BlurLaw> law = BlurLaw::Of(sweep, calibration);
+  const std::optional<calib::BlurModel> law = calib::BlurModel::Of(sweep, calibration);
   json frames = json::array();
   for (const calib::FrameMeasurement& frame : calibration.frames)
     frames.push_back(FrameJson(frame, law ? &*law : nullptr));

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tools/report/blur_law.h"
+#include "thicklens/calib/blur_model.h"
 
 namespace thicklens::tools {
 
@@ -66,7 +66,7 @@ Abscissa AbscissaOf(const Calibration& calibration) {
   int depths = 0;
   double lo = 0, hi = 0;
   for (const FrameMeasurement& frame : calibration.frames) {
-    if (!IsDepth(frame.depth_mm)) continue;
+    if (!calib::IsDepth(frame.depth_mm)) continue;
     lo = depths == 0 ? frame.depth_mm : std::min(lo, frame.depth_mm);
     hi = depths == 0 ? frame.depth_mm : std::max(hi, frame.depth_mm);
     ++depths;

@@ -7,10 +7,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "thicklens/base/printable_text.h"
+#include "thicklens/calib/rejection_groups.h"
 #include "tools/report/calibration_sections.h"
 #include "tools/report/page_pictures.h"
 #include "tools/report/page_style.h"
-#include "tools/report/rejection_groups.h"
+#include "tools/report/rejection_words.h"
 
 namespace thicklens::tools {
 namespace {
@@ -23,12 +24,12 @@ constexpr std::size_t kMostThumbnails = 12;
 constexpr std::size_t kMostRuns = 12;  // of one kind in the table
 constexpr int kThumbnailPx = 220;      // longest edge
 
-std::string GroupRows(const Calibration& calibration, const RejectionGroup& group) {
+std::string GroupRows(const Calibration& calibration, const calib::RejectionGroup& group) {
   const std::vector<std::string> details = TextsOfRuns(calibration.frames, group);
   std::string html;
   int told = 0;
   for (std::size_t i = 0; i < std::min(group.runs.size(), kMostRuns); ++i) {
-    const RejectionRun& run = group.runs[i];
+    const calib::RejectionRun& run = group.runs[i];
     html += "<tr>" + TableCell(i == 0 ? group.kind : "", "name") +
             TableCell(i == 0 ? fmt::format("{}", group.frames) : "") +
             TableCell(Typeset(RunName(calibration.frames, run)), "name") +
@@ -43,11 +44,12 @@ std::string GroupRows(const Calibration& calibration, const RejectionGroup& grou
   return html;
 }
 
-std::string GroupsTable(const Calibration& calibration, const std::vector<RejectionGroup>& groups) {
+std::string GroupsTable(const Calibration& calibration,
+                        const std::vector<calib::RejectionGroup>& groups) {
   std::string html =
       "<div class=\"wide\"><table>\n<thead><tr><th>reason</th><th class=\"number\">how many</th>"
       "<th>frames</th><th>in each</th></tr></thead>\n<tbody>\n";
-  for (const RejectionGroup& group : groups) html += GroupRows(calibration, group);
+  for (const calib::RejectionGroup& group : groups) html += GroupRows(calibration, group);
   return html + "</tbody></table></div>\n";
 }
 
@@ -70,19 +72,19 @@ std::string LevelsTable(const Calibration& calibration, std::size_t rejected) {
   return html + "</tbody></table></div></details>\n";
 }
 
-std::vector<int> FramesOf(const RejectionGroup& group) {
+std::vector<int> FramesOf(const calib::RejectionGroup& group) {
   std::vector<int> frames;
-  for (const RejectionRun& run : group.runs)
+  for (const calib::RejectionRun& run : group.runs)
     for (int i = run.first; i <= run.last; ++i) frames.push_back(i);
   return frames;
 }
 
 // The first of every kind, then the second of every kind, and so on: each kind of damage is seen.
-std::vector<std::size_t> ChosenForShow(const std::vector<RejectionGroup>& groups) {
+std::vector<std::size_t> ChosenForShow(const std::vector<calib::RejectionGroup>& groups) {
   std::vector<std::size_t> chosen;
   for (std::size_t turn = 0;; ++turn) {
     const std::size_t before = chosen.size();
-    for (const RejectionGroup& group : groups) {
+    for (const calib::RejectionGroup& group : groups) {
       const std::vector<int> frames = FramesOf(group);
       if (turn < frames.size() && chosen.size() < kMostThumbnails)
         chosen.push_back(static_cast<std::size_t>(frames[turn]));
@@ -140,12 +142,12 @@ std::string Thumbnails(const FocusSweep& sweep, const Calibration& calibration,
 
 // Frames that passed the gates and still say nothing of the blur, by reason.
 std::string NotInFit(const Calibration& calibration) {
-  std::map<std::string, RejectionGroup> groups;
+  std::map<std::string, calib::RejectionGroup> groups;
   int count = 0;
   for (int i = 0; i < static_cast<int>(calibration.frames.size()); ++i) {
     const FrameMeasurement& frame = calibration.frames[static_cast<std::size_t>(i)];
     if (frame.not_in_fit.empty() || !frame.rejection.empty()) continue;
-    RejectionGroup& group = groups[frame.not_in_fit];
+    calib::RejectionGroup& group = groups[frame.not_in_fit];
     if (!group.runs.empty() && group.runs.back().last == i - 1)
       group.runs.back().last = i;
     else
@@ -159,7 +161,7 @@ std::string NotInFit(const Calibration& calibration) {
                   count == 1 ? "frame passed" : "frames passed", count == 1 ? "says" : "say");
   for (const auto& [reason, group] : groups) {
     std::vector<std::string> names;
-    for (const RejectionRun& run : group.runs)
+    for (const calib::RejectionRun& run : group.runs)
       names.push_back(Typeset(RunName(calibration.frames, run)));
     html += fmt::format("<li class=\"words\">{} ({}): {}</li>\n", EscapeXml(Typeset(reason)),
                         group.frames, EscapeXml(fmt::format("{}", fmt::join(names, ", "))));
@@ -171,7 +173,7 @@ std::string NotInFit(const Calibration& calibration) {
 
 std::string RejectedSection(const FocusSweep& sweep, const Calibration& calibration,
                             const FramePictures& pictures) {
-  const std::vector<RejectionGroup> groups = RejectionGroups(calibration.frames);
+  const std::vector<calib::RejectionGroup> groups = calib::RejectionGroups(calibration.frames);
   std::string html = "<h2>Rejected frames</h2>\n";
   if (groups.empty()) return html + "<p>None.</p>\n" + NotInFit(calibration);
   const auto rejected = static_cast<std::size_t>(

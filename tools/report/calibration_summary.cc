@@ -10,7 +10,7 @@
 #include "thicklens/base/printable_text.h"
 #include "tools/report/calibration_words.h"
 #include "tools/report/determined.h"
-#include "tools/report/rejection_groups.h"
+#include "tools/report/rejection_words.h"
 
 namespace thicklens::tools {
 namespace {

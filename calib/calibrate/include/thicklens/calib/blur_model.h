@@ -1,32 +1,30 @@
-#ifndef THICKLENS_TOOLS_REPORT_BLUR_LAW_H_
-#define THICKLENS_TOOLS_REPORT_BLUR_LAW_H_
+#ifndef THICKLENS_CALIB_BLUR_MODEL_H_
+#define THICKLENS_CALIB_BLUR_MODEL_H_
 
 #include <Eigen/Core>
 #include <optional>
 
-#include "thicklens/calib/calibrate.h"
+#include "thicklens/calib/calibration.h"
 #include "thicklens/calib/focus_sweep.h"
 #include "thicklens/model/sweep_file.h"
 
-namespace thicklens::tools {
+namespace thicklens::calib {
 
 bool IsDepth(double depth_mm);  // finite and in front of the camera
-bool HasBlur(const calib::FrameMeasurement& frame);
+bool HasBlur(const FrameMeasurement& frame);
 
 // Blur by the fitted law, sigma = sqrt(S0 + (kappa r_defocus/p)^2), px for each axis, without the
 // pixel box. The law is exact for all depths z > 0; at z = zf it is the floor. The sweep must
 // outlive the object.
-class BlurLaw {
+class BlurModel {
  public:
   // Returns nothing if the fit gave no image distance or no blur ratio that a lens can have.
-  static std::optional<BlurLaw> Of(const calib::FocusSweep& sweep,
-                                   const calib::Calibration& calibration);
-  // Makes the law from one side's depth of focus and blur ratio, with the floor of the fit.
-  static std::optional<BlurLaw> OfSide(const calib::FocusSweep& sweep,
-                                       const calib::Calibration& calibration,
-                                       const calib::SideFit& side);
-  // Returns the law that a simulated sweep was made with.
-  static BlurLaw OfTruth(const calib::FocusSweep& sweep, const model::SweepTruth& truth);
+  static std::optional<BlurModel> Of(const FocusSweep& sweep, const Calibration& calibration);
+  // Makes the model from one side's depth of focus and blur ratio, with the floor of the fit.
+  static std::optional<BlurModel> OfSide(const FocusSweep& sweep, const Calibration& calibration,
+                                         const SideFit& side);
+  // Returns the model that a simulated sweep was made with.
+  static BlurModel OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth);
 
   double SigmaPx(double depth_mm) const;
   // Derivative d sigma/d z, px per mm: the effect of an error of the reading on the blur. It is 0
@@ -37,20 +35,20 @@ class BlurLaw {
   std::optional<double> SigmaErrorPx(double depth_mm) const;
   // Measured minus predicted blur, divided by the standard deviation of both measured blur and
   // reading, for a frame of the fit.
-  std::optional<double> ResidualSigmas(const calib::FrameMeasurement& frame) const;
+  std::optional<double> ResidualSigmas(const FrameMeasurement& frame) const;
 
   bool floor_from_frames() const { return floor_from_frames_; }
 
  private:
-  BlurLaw(const calib::FocusSweep& sweep, double image_distance_mm)
+  BlurModel(const FocusSweep& sweep, double image_distance_mm)
       : sweep_(&sweep), image_distance_mm_(image_distance_mm) {}
 
-  void TakeFloor(const calib::Calibration& calibration);
-  void TakeCovariance(const calib::Calibration& calibration);
+  void TakeFloor(const Calibration& calibration);
+  void TakeCovariance(const Calibration& calibration);
   double SignedDefocusPx(double depth_mm) const;
-  double FloorSquaredFromFrames(const calib::Calibration& calibration) const;
+  double FloorSquaredFromFrames(const Calibration& calibration) const;
 
-  const calib::FocusSweep* sweep_;
+  const FocusSweep* sweep_;
   double image_distance_mm_ = 0;
   double kappa_ = 0;
   double floor_squared_px2_ = 0;
@@ -60,6 +58,6 @@ class BlurLaw {
   std::optional<Eigen::Matrix4d> covariance_;
 };
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::calib
 
-#endif  // THICKLENS_TOOLS_REPORT_BLUR_LAW_H_
+#endif  // THICKLENS_CALIB_BLUR_MODEL_H_

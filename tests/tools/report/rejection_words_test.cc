@@ -1,5 +1,5 @@
-// How rejected frames are put together without losing what each of them has of its own.
-#include "tools/report/rejection_groups.h"
+// The text about rejected frames, which shortens what they have in common and keeps each amount.
+#include "tools/report/rejection_words.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,31 +19,6 @@ std::vector<FrameMeasurement> Frames(int count) {
   for (std::size_t i = 0; i < frames.size(); ++i)
     frames[i].image = "/somewhere/f" + std::to_string(i) + ".png";
   return frames;
-}
-
-TEST(RejectionGroups, PutsFramesOfOneKindTogetherWhereverTheyStand) {
-  std::vector<FrameMeasurement> frames = Frames(9);
-  frames[0].rejection = "dark: mean 0.001 below 0.016";
-  frames[1].rejection = "dark: mean 0.002 below 0.016";
-  frames[2].rejection = "saturated: 12 % of samples";
-  frames[4].rejection = "dark: mean 0.002 below 0.016";
-  frames[5].rejection = "dark: mean 0.002 below 0.016";
-  frames[7].rejection = "blank";
-  frames[8].rejection = "blank";
-  const std::vector<RejectionGroup> groups = RejectionGroups(frames);
-  ASSERT_EQ(groups.size(), 3u);
-  EXPECT_EQ(groups[0].kind, "dark");
-  EXPECT_EQ(groups[0].frames, 4);
-  ASSERT_EQ(groups[0].runs.size(), 3u);
-  EXPECT_EQ(groups[0].runs[0].detail, "mean 0.001 below 0.016");
-  EXPECT_EQ(groups[0].runs[1].last, 1) << "frame 4 is no neighbour of frame 1";
-  EXPECT_EQ(groups[0].runs[2].first, 4);
-  EXPECT_EQ(groups[0].runs[2].last, 5);
-  EXPECT_EQ(groups[1].kind, "saturated");
-  EXPECT_EQ(groups[2].kind, "blank");
-  ASSERT_EQ(groups[2].runs.size(), 1u);
-  EXPECT_EQ(groups[2].runs[0].detail, "");
-  EXPECT_EQ(groups[2].runs[0].count(), 2);
 }
 
 TEST(RejectionLines, ShowEveryFramesOwnAmount) {

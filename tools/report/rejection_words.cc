@@ -1,11 +1,11 @@
-#include "tools/report/rejection_groups.h"
+#include "tools/report/rejection_words.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 
 #include "thicklens/base/printable_text.h"
-#include "thicklens/calib/frame_gates.h"
 #include "tools/report/calibration_summary.h"
 
 namespace thicklens::tools {
@@ -14,11 +14,6 @@ namespace {
 constexpr std::size_t kMostRuns = 6;     // of one kind in the text
 constexpr std::size_t kLongEnding = 20;  // characters that are worth leaving out
 constexpr char kLeftOut[] = "...";
-
-std::string DetailOf(const std::string& reason, const std::string& kind) {
-  const std::size_t begin = reason.find_first_not_of(" :;,", std::min(kind.size(), reason.size()));
-  return begin == std::string::npos ? "" : reason.substr(begin);
-}
 
 std::string Reason(const std::string& kind, const std::string& detail) {
   return detail.empty() ? kind : kind + ": " + detail;
@@ -37,10 +32,10 @@ std::size_t CommonEnding(const std::string& a, const std::string& b) {
 
 // Of what differs in a group: how many characters at the end are the same in all, whole words
 // alone and without the first of them, which may be a unit. 0 if they are not worth leaving out.
-std::size_t CommonEnding(const RejectionGroup& group) {
+std::size_t CommonEnding(const calib::RejectionGroup& group) {
   const std::string& first = group.runs.front().detail;
   std::size_t common = first.size();
-  for (const RejectionRun& run : group.runs) {
+  for (const calib::RejectionRun& run : group.runs) {
     if (run.detail != first) common = std::min(common, CommonEnding(first, run.detail));
   }
   const std::size_t before_unit = first.find(' ', first.size() - common);
@@ -51,8 +46,8 @@ std::size_t CommonEnding(const RejectionGroup& group) {
 }
 
 std::string GroupLines(const std::vector<calib::FrameMeasurement>& frames,
-                       const RejectionGroup& group) {
-  const RejectionRun& first = group.runs.front();
+                       const calib::RejectionGroup& group) {
+  const calib::RejectionRun& first = group.runs.front();
   if (group.runs.size() == 1) {
     return fmt::format("  {}: {}\n", RunName(frames, first),
                        PrintableUtf8(frames[static_cast<std::size_t>(first.first)].rejection));
@@ -61,7 +56,7 @@ std::string GroupLines(const std::vector<calib::FrameMeasurement>& frames,
   const std::vector<std::string> details = TextsOfRuns(frames, group);
   int told = 0;
   for (std::size_t i = 0; i < std::min(group.runs.size(), kMostRuns); ++i) {
-    const RejectionRun& run = group.runs[i];
+    const calib::RejectionRun& run = group.runs[i];
     text += fmt::format("    {}\n", PrintableUtf8(Reason(RunName(frames, run), details[i])));
     told += run.count();
   }
@@ -74,30 +69,9 @@ std::string GroupLines(const std::vector<calib::FrameMeasurement>& frames,
 
 }  // namespace
 
-std::vector<RejectionGroup> RejectionGroups(const std::vector<calib::FrameMeasurement>& frames) {
-  std::vector<RejectionGroup> groups;
-  for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
-    const std::string& reason = frames[static_cast<std::size_t>(i)].rejection;
-    if (reason.empty()) continue;
-    const std::string kind = calib::RejectionKind(reason);
-    auto group = std::find_if(groups.begin(), groups.end(),
-                              [&](const RejectionGroup& g) { return g.kind == kind; });
-    if (group == groups.end()) group = groups.insert(groups.end(), {kind, 0, {}});
-    ++group->frames;
-    const std::string detail = DetailOf(reason, kind);
-    if (!group->runs.empty() && group->runs.back().last == i - 1 &&
-        group->runs.back().detail == detail) {
-      group->runs.back().last = i;
-    } else {
-      group->runs.push_back({i, i, detail});
-    }
-  }
-  return groups;
-}
-
 std::vector<std::string> TextsOfRuns(const std::vector<calib::FrameMeasurement>& frames,
-                                     const RejectionGroup& group) {
-  const RejectionRun& first = group.runs.front();
+                                     const calib::RejectionGroup& group) {
+  const calib::RejectionRun& first = group.runs.front();
   const std::size_t ending = CommonEnding(group);
   std::vector<std::string> texts = {first.detail};
   for (std::size_t i = 1; i < group.runs.size(); ++i) {
@@ -111,7 +85,8 @@ std::vector<std::string> TextsOfRuns(const std::vector<calib::FrameMeasurement>&
   return texts;
 }
 
-std::string RunName(const std::vector<calib::FrameMeasurement>& frames, const RejectionRun& run) {
+std::string RunName(const std::vector<calib::FrameMeasurement>& frames,
+                    const calib::RejectionRun& run) {
   const std::string first = NameOf(frames, run.first);
   if (run.count() == 1) return first;
   return fmt::format("{} .. {} ({} frames)", first, NameOf(frames, run.last), run.count());
@@ -119,7 +94,8 @@ std::string RunName(const std::vector<calib::FrameMeasurement>& frames, const Re
 
 std::string RejectionLines(const std::vector<calib::FrameMeasurement>& frames) {
   std::string text;
-  for (const RejectionGroup& group : RejectionGroups(frames)) text += GroupLines(frames, group);
+  for (const calib::RejectionGroup& group : calib::RejectionGroups(frames))
+    text += GroupLines(frames, group);
   return text;
 }
 

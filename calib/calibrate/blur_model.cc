@@ -1,4 +1,4 @@
-#include "tools/report/blur_law.h"
+#include "thicklens/calib/blur_model.h"
 
 #include <algorithm>
 #include <array>
@@ -7,11 +7,7 @@
 
 #include "thicklens/model/thick_lens.h"
 
-namespace thicklens::tools {
-
-using calib::Calibration;
-using calib::FocusSweep;
-using calib::FrameMeasurement;
+namespace thicklens::calib {
 
 bool IsDepth(double depth_mm) { return std::isfinite(depth_mm) && depth_mm > 0; }
 
@@ -27,54 +23,54 @@ bool IsImageDistance(const FocusSweep& sweep, double image_distance_mm) {
 
 }  // namespace
 
-std::optional<BlurLaw> BlurLaw::Of(const FocusSweep& sweep, const Calibration& calibration) {
+std::optional<BlurModel> BlurModel::Of(const FocusSweep& sweep, const Calibration& calibration) {
   if (!calibration.blur.done || !calibration.image_distance_mm || !calibration.blur_ratio)
     return std::nullopt;
   const double image_distance_mm = calibration.image_distance_mm->value;
   if (!std::isfinite(calibration.blur_ratio->value) || !IsImageDistance(sweep, image_distance_mm))
     return std::nullopt;
-  BlurLaw law(sweep, image_distance_mm);
-  law.kappa_ = calibration.blur_ratio->value;
-  law.TakeFloor(calibration);
-  law.TakeCovariance(calibration);
-  return law;
+  BlurModel blur(sweep, image_distance_mm);
+  blur.kappa_ = calibration.blur_ratio->value;
+  blur.TakeFloor(calibration);
+  blur.TakeCovariance(calibration);
+  return blur;
 }
 
-std::optional<BlurLaw> BlurLaw::OfSide(const FocusSweep& sweep, const Calibration& calibration,
-                                       const calib::SideFit& side) {
+std::optional<BlurModel> BlurModel::OfSide(const FocusSweep& sweep, const Calibration& calibration,
+                                           const SideFit& side) {
   const model::ThickLens& lens = sweep.camera.lens;
   if (!side.done || !(side.focus_depth_mm.value > lens.front_focal_length_mm) ||
       !std::isfinite(side.blur_ratio.value))
     return std::nullopt;
-  BlurLaw law(sweep, model::ImageDistanceMm(lens, side.focus_depth_mm.value));
-  law.kappa_ = side.blur_ratio.value;
-  if (!IsImageDistance(sweep, law.image_distance_mm_)) return std::nullopt;
-  law.TakeFloor(calibration);
-  return law;
+  BlurModel blur(sweep, model::ImageDistanceMm(lens, side.focus_depth_mm.value));
+  blur.kappa_ = side.blur_ratio.value;
+  if (!IsImageDistance(sweep, blur.image_distance_mm_)) return std::nullopt;
+  blur.TakeFloor(calibration);
+  return blur;
 }
 
-BlurLaw BlurLaw::OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth) {
-  BlurLaw law(sweep, truth.image_distance_mm);
-  law.floor_squared_px2_ = truth.blur_floor_px * truth.blur_floor_px;
+BlurModel BlurModel::OfTruth(const FocusSweep& sweep, const model::SweepTruth& truth) {
+  BlurModel blur(sweep, truth.image_distance_mm);
+  blur.floor_squared_px2_ = truth.blur_floor_px * truth.blur_floor_px;
   // Whether defocus was simulated, the frames tell.
   double product = 0, square = 0;
   for (const model::SweepTruth::Frame& frame : truth.frames) {
     if (!IsDepth(frame.depth_mm)) continue;
-    const double defocus_px2 = std::pow(law.SignedDefocusPx(frame.depth_mm), 2);
-    product += defocus_px2 * (frame.blur_sigma_px * frame.blur_sigma_px - law.floor_squared_px2_);
+    const double defocus_px2 = std::pow(blur.SignedDefocusPx(frame.depth_mm), 2);
+    product += defocus_px2 * (frame.blur_sigma_px * frame.blur_sigma_px - blur.floor_squared_px2_);
     square += defocus_px2 * defocus_px2;
   }
-  law.kappa_ = square > 0 ? std::sqrt(std::max(0.0, product / square)) : truth.blur_ratio;
-  return law;
+  blur.kappa_ = square > 0 ? std::sqrt(std::max(0.0, product / square)) : truth.blur_ratio;
+  return blur;
 }
 
-double BlurLaw::SigmaPx(double depth_mm) const {
+double BlurModel::SigmaPx(double depth_mm) const {
   return std::sqrt(floor_squared_px2_ + kappa_ * kappa_ * std::pow(SignedDefocusPx(depth_mm), 2));
 }
 
 // With the signed q = r c(z)/p and c(z) = [f1 D - (D - f2) z]/(f2 z): sigma^2 = S0 + (kappa q)^2,
 // so that d sigma/d z = kappa^2 q dq/dz / sigma, dc/dz = -f1 D/(f2 z^2) (derived here, [D88]).
-double BlurLaw::SlopePxPerMm(double depth_mm) const {
+double BlurModel::SlopePxPerMm(double depth_mm) const {
   const model::ThickLens& lens = sweep_->camera.lens;
   const double sigma_px = SigmaPx(depth_mm);
   if (!(sigma_px > 0)) return 0;
@@ -88,7 +84,7 @@ double BlurLaw::SlopePxPerMm(double depth_mm) const {
 // Derivatives of sigma, besides that along z, through which the offset acts (derived here, [D88]):
 // by kappa kappa q^2/sigma, by the floor floor/sigma, by d1 kappa^2 q dq/dD / sigma with dc/dD =
 // (f1 - z)/(f2 z).
-std::optional<double> BlurLaw::SigmaErrorPx(double depth_mm) const {
+std::optional<double> BlurModel::SigmaErrorPx(double depth_mm) const {
   const double sigma_px = SigmaPx(depth_mm);
   if (!covariance_ || !(sigma_px > 0)) return std::nullopt;
   const model::ThickLens& lens = sweep_->camera.lens;
@@ -104,7 +100,7 @@ std::optional<double> BlurLaw::SigmaErrorPx(double depth_mm) const {
   return std::sqrt(std::max(0.0, variance_px2));
 }
 
-std::optional<double> BlurLaw::ResidualSigmas(const FrameMeasurement& frame) const {
+std::optional<double> BlurModel::ResidualSigmas(const FrameMeasurement& frame) const {
   if (!HasBlur(frame) || !frame.in_blur_fit || !frame.rejection.empty() || !IsDepth(frame.depth_mm))
     return std::nullopt;
   const double sd_px = std::hypot(frame.blur_sigma_error_px,
@@ -112,7 +108,7 @@ std::optional<double> BlurLaw::ResidualSigmas(const FrameMeasurement& frame) con
   return (frame.blur_sigma_px - SigmaPx(frame.depth_mm)) / sd_px;
 }
 
-void BlurLaw::TakeFloor(const Calibration& calibration) {
+void BlurModel::TakeFloor(const Calibration& calibration) {
   if (calibration.blur_floor_px && std::isfinite(calibration.blur_floor_px->value)) {
     floor_squared_px2_ = std::pow(calibration.blur_floor_px->value, 2);
     return;
@@ -121,7 +117,7 @@ void BlurLaw::TakeFloor(const Calibration& calibration) {
   floor_from_frames_ = true;
 }
 
-void BlurLaw::TakeCovariance(const Calibration& calibration) {
+void BlurModel::TakeCovariance(const Calibration& calibration) {
   const auto count = static_cast<Eigen::Index>(calibration.covariance_order.size());
   if (count == 0 || calibration.covariance.rows() != count ||
       calibration.covariance.cols() != count)
@@ -142,7 +138,7 @@ void BlurLaw::TakeCovariance(const Calibration& calibration) {
             calibration.covariance(at[i], at[j]);
 }
 
-double BlurLaw::SignedDefocusPx(double depth_mm) const {
+double BlurModel::SignedDefocusPx(double depth_mm) const {
   return sweep_->camera.lens.aperture_radius_mm *
          model::DefocusPerAperture(sweep_->camera.lens, image_distance_mm_, depth_mm) /
          sweep_->camera.sensor.pixel_pitch_mm;
@@ -150,7 +146,7 @@ double BlurLaw::SignedDefocusPx(double depth_mm) const {
 
 // Weighted mean of sigma^2 - (kappa r_defocus/p)^2: the floor that best continues the fit where it
 // gives none of its own. var(sigma^2) = (2 sigma)^2 var(sigma).
-double BlurLaw::FloorSquaredFromFrames(const Calibration& calibration) const {
+double BlurModel::FloorSquaredFromFrames(const Calibration& calibration) const {
   double sum = 0, weight_sum = 0;
   for (const FrameMeasurement& frame : calibration.frames) {
     if (!frame.in_blur_fit || !IsDepth(frame.depth_mm) || !HasBlur(frame) ||
@@ -165,4 +161,4 @@ double BlurLaw::FloorSquaredFromFrames(const Calibration& calibration) const {
   return weight_sum > 0 ? std::max(0.0, sum / weight_sum) : 0;
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::calib
