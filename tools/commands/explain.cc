@@ -12,6 +12,7 @@
 #include "thicklens/base/output_file.h"
 #include "thicklens/io/depth_io.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/effect_costs.h"
 #include "thicklens/model/explanation.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/explain_scene.h"
@@ -19,7 +20,6 @@
 #include "tools/options/effect_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
-#include "tools/report/effect_costs.h"
 #include "tools/report/explain_figure.h"
 #include "tools/report/explain_table.h"
 #include "tools/system/progress_line.h"
@@ -107,18 +107,19 @@ model::EffectDecision Decide(const ExplainOptions& options, const model::Camera&
   return model::DecideEffects(choice, conditions, places, model::EffectSet::All());
 }
 
-EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
-                    const model::DepthRange& range, const model::EffectDecision& decision) {
+model::EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
+                           const model::DepthRange& range, const model::EffectDecision& decision) {
   model::SceneSimulationOptions sensor;
   sensor.full_well_electrons = options.full_well_electrons;
   sensor.read_noise_electrons = options.read_noise_electrons;
   sensor.bits = options.bits <= 8 ? 8 : 16;  // what simulations store; the time is the same
   ProgressLine progress("measuring costs", options.common.quiet);
   try {
-    return MeasureEffectCosts(camera, range, sensor, decision, [&progress](int done, int total) {
-      ThrowIfCancelled();
-      progress.Show(done, total);
-    });
+    return model::MeasureEffectCosts(camera, range, sensor, decision,
+                                     [&progress](int done, int total) {
+                                       ThrowIfCancelled();
+                                       progress.Show(done, total);
+                                     });
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
@@ -129,7 +130,7 @@ EffectCosts CostsOf(const ExplainOptions& options, const model::Camera& camera,
   }
 }
 
-void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {
+void AddCosts(const model::EffectCosts& costs, nlohmann::json* summary) {
   (*summary)["picture_seconds"] = costs.seconds;
   (*summary)["seconds_are"] = "extrapolated from a part of the picture";
   for (nlohmann::json& effect : (*summary)["effects"]) {
@@ -139,7 +140,7 @@ void AddCosts(const EffectCosts& costs, nlohmann::json* summary) {
   }
 }
 
-std::string CostsText(const EffectCosts& costs) {
+std::string CostsText(const model::EffectCosts& costs) {
   return fmt::format(
       "cost: additional time of the effect for a simulated picture of this size, extrapolated "
       "from\na part of it, in seconds on one core of this machine, with all other effects as "
@@ -157,7 +158,7 @@ CommandResult Explain(const ExplainOptions& options) {
   const model::EffectDecision decision = Decide(options, camera, scene.places);
   CommandResult result{ExplanationJson(explanation), ""};
   result.summary["effects"] = EffectsJson(decision);
-  std::optional<EffectCosts> costs;
+  std::optional<model::EffectCosts> costs;
   if (options.costs) {
     costs = CostsOf(options, camera, scene.range, decision);
     AddCosts(*costs, &result.summary);

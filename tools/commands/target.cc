@@ -13,12 +13,12 @@
 #include "thicklens/base/cancel.h"
 #include "thicklens/base/output_file.h"
 #include "thicklens/model/camera_file.h"
+#include "thicklens/model/target_page.h"
+#include "thicklens/model/target_texture.h"
 #include "tools/commands/commands.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/option_values.h"
 #include "tools/report/target_drawing.h"
-#include "tools/report/target_page.h"
-#include "tools/report/target_texture.h"
 
 namespace thicklens::tools {
 namespace {
@@ -50,7 +50,7 @@ struct TargetOptions {
   double dots_per_inch = 600;
   std::optional<double> feature_mm;
   std::int64_t seed = 1;
-  TargetRequest request;
+  model::TargetRequest request;
 };
 
 Format FormatOf(const std::string& path) {
@@ -61,7 +61,7 @@ Format FormatOf(const std::string& path) {
   throw UsageError(fmt::format("{}: a name that ends in .pdf, .svg or .png is expected", path));
 }
 
-SheetSize ParseSheet(const std::string& text) {
+model::SheetSize ParseSheet(const std::string& text) {
   for (const NamedSheet& sheet : kNamedSheets) {
     if (text == sheet.name) return {sheet.width_mm, sheet.height_mm, true};
   }
@@ -77,12 +77,12 @@ SheetSize ParseSheet(const std::string& text) {
   return {sides_mm[0], sides_mm[1], false};
 }
 
-nlohmann::json RectangleJson(const Rectangle& area) {
+nlohmann::json RectangleJson(const model::SheetRectangle& area) {
   return {{"x_mm", area.x}, {"y_mm", area.y}, {"width_mm", area.width}, {"height_mm", area.height}};
 }
 
-nlohmann::json Summary(const TargetOptions& options, const TargetRequest& request,
-                       const TargetPage& page, std::size_t leaves) {
+nlohmann::json Summary(const TargetOptions& options, const model::TargetRequest& request,
+                       const model::TargetPage& page, std::size_t leaves) {
   nlohmann::json summary = {{"status", "ok"},
                             {"reason", ""},
                             {"output", options.output_path},
@@ -109,18 +109,19 @@ nlohmann::json Summary(const TargetOptions& options, const TargetRequest& reques
   return summary;
 }
 
-CommandResult MakeTarget(const TargetOptions& options, Format format, TargetRequest request) {
+CommandResult MakeTarget(const TargetOptions& options, Format format,
+                         model::TargetRequest request) {
   if (!options.camera_path.empty()) {
     const model::Camera camera = model::ReadCamera(options.camera_path);
     TellAssumedFields(camera);
-    request.view = ViewOfTarget(camera, options.distance_mm);
+    request.view = model::ViewOfTarget(camera, options.distance_mm);
   }
-  const TargetPage page = LayOutTarget(request);
+  const model::TargetPage page = model::LayOutTarget(request);
   std::optional<PngSize> png_size;
   if (format == Format::kPng) png_size = TargetPngSize(page, options.dots_per_inch);
 
   OutputFile output(options.output_path);
-  const std::vector<Leaf> leaves = DeadLeaves(page);
+  const std::vector<model::TargetLeaf> leaves = model::DeadLeaves(page);
   const std::string bytes = format == Format::kPdf   ? TargetPdf(page, leaves)
                             : format == Format::kSvg ? TargetSvg(page, leaves)
                                                      : TargetPng(page, leaves, *png_size);
@@ -202,7 +203,7 @@ void AddTargetCommand(CLI::App* program, CommandAction* action) {
   command->callback([options, action] {
     *action = [options] {
       const Format format = FormatOf(options->output_path);
-      TargetRequest request = options->request;
+      model::TargetRequest request = options->request;
       request.sheet = ParseSheet(options->size);
       request.feature_mm = options->feature_mm;
       request.seed = static_cast<std::uint64_t>(options->seed);

@@ -55,22 +55,23 @@ void SetGrey(cairo_t* context, int grey) {
   cairo_set_source_rgb(context, level, level, level);
 }
 
-void FillRectangle(const Rectangle& area, int grey, cairo_t* context) {
+void FillRectangle(const model::SheetRectangle& area, int grey, cairo_t* context) {
   SetGrey(context, grey);
   cairo_rectangle(context, area.x, area.y, area.width, area.height);
   cairo_fill(context);
 }
 
-void DrawTexture(const TargetPage& page, const std::vector<Leaf>& leaves, cairo_t* context) {
-  const Rectangle& pattern = page.pattern;
+void DrawTexture(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves,
+                 cairo_t* context) {
+  const model::SheetRectangle& pattern = page.pattern;
   cairo_save(context);
   cairo_rectangle(context, pattern.x, pattern.y, pattern.width, pattern.height);
   cairo_clip(context);
-  FillRectangle(pattern, GreyBehindLeaves(page), context);
+  FillRectangle(pattern, model::GreyBehindLeaves(page), context);
   // A line without length and with round ends is a disc, and a fifth of the bytes of four arcs.
   cairo_set_line_cap(context, CAIRO_LINE_CAP_ROUND);
   int drawn = 0;
-  for (const Leaf& leaf : leaves) {
+  for (const model::TargetLeaf& leaf : leaves) {
     if (drawn++ % kLeavesPerLook == 0) ThrowIfCancelled();
     SetGrey(context, leaf.grey);
     cairo_set_line_width(context, 2 * leaf.radius_mm);
@@ -81,8 +82,8 @@ void DrawTexture(const TargetPage& page, const std::vector<Leaf>& leaves, cairo_
   cairo_restore(context);
 }
 
-void DrawEdge(const TargetPage& page, cairo_t* context) {
-  const Rectangle& patch = page.patch;
+void DrawEdge(const model::TargetPage& page, cairo_t* context) {
+  const model::SheetRectangle& patch = page.patch;
   const double bottom_mm = patch.y + patch.height;
   FillRectangle(patch, 255, context);
   SetGrey(context, 0);
@@ -94,7 +95,7 @@ void DrawEdge(const TargetPage& page, cairo_t* context) {
   cairo_fill(context);
 }
 
-void DrawCaption(const TargetPage& page, cairo_antialias_t antialias, cairo_t* context) {
+void DrawCaption(const model::TargetPage& page, cairo_antialias_t antialias, cairo_t* context) {
   FillRectangle(page.bar, 0, context);
   // Letters lie where the page says, not where a screen's pixels would like them.
   const FontOptions options(cairo_font_options_create());
@@ -108,13 +109,13 @@ void DrawCaption(const TargetPage& page, cairo_antialias_t antialias, cairo_t* c
   for (const std::string& line : page.caption) {
     cairo_move_to(context, page.bar.x, baseline_y_mm);
     cairo_show_text(context, line.c_str());
-    baseline_y_mm += kLineHeight * page.text_size_mm;
+    baseline_y_mm += model::kLineHeight * page.text_size_mm;
   }
 }
 
 // Everything, in mm, on a surface that has `units_per_mm`.
-void DrawPage(const TargetPage& page, const std::vector<Leaf>& leaves, double units_per_mm,
-              cairo_surface_t* surface) {
+void DrawPage(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves,
+              double units_per_mm, cairo_surface_t* surface) {
   const Context context(cairo_create(surface));
   cairo_scale(context.get(), units_per_mm, units_per_mm);
   const cairo_antialias_t antialias = page.two_tone ? CAIRO_ANTIALIAS_NONE : CAIRO_ANTIALIAS_GRAY;
@@ -126,7 +127,7 @@ void DrawPage(const TargetPage& page, const std::vector<Leaf>& leaves, double un
   RequireSuccess(cairo_status(context.get()));
 }
 
-std::string JoinedCaption(const TargetPage& page) {
+std::string JoinedCaption(const model::TargetPage& page) {
   return fmt::format("{}", fmt::join(page.caption, "; "));
 }
 
@@ -137,7 +138,7 @@ cairo_status_t Append(void* bytes, const unsigned char* data, unsigned int lengt
 
 }  // namespace
 
-std::string TargetPdf(const TargetPage& page, const std::vector<Leaf>& leaves) {
+std::string TargetPdf(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves) {
   std::string bytes;
   const Surface surface(cairo_pdf_surface_create_for_stream(
       Append, &bytes, page.width_mm * kPointsPerMm, page.height_mm * kPointsPerMm));
@@ -152,16 +153,16 @@ std::string TargetPdf(const TargetPage& page, const std::vector<Leaf>& leaves) {
   return bytes;
 }
 
-std::string TargetSvg(const TargetPage& page, const std::vector<Leaf>& leaves) {
+std::string TargetSvg(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves) {
   std::string svg;
   const auto add = [&](const auto&... parts) { fmt::format_to(std::back_inserter(svg), parts...); };
-  const auto add_rectangle = [&](const char* id, const Rectangle& area, int grey) {
+  const auto add_rectangle = [&](const char* id, const model::SheetRectangle& area, int grey) {
     add("<rect id=\"{}\" x=\"{:.4f}\" y=\"{:.4f}\" width=\"{:.4f}\" height=\"{:.4f}\" "
         "fill=\"#{:02x}{:02x}{:02x}\"/>\n",
         id, area.x, area.y, area.width, area.height, grey, grey, grey);
   };
-  const Rectangle& pattern = page.pattern;
-  const Rectangle& patch = page.patch;
+  const model::SheetRectangle& pattern = page.pattern;
+  const model::SheetRectangle& patch = page.patch;
   add("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}mm\" height=\"{1}mm\" "
       "viewBox=\"0 0 {0} {1}\">\n<title>thicklens target</title>\n<desc>{2}</desc>\n",
       page.width_mm, page.height_mm, EscapeXml(JoinedCaption(page)));
@@ -169,10 +170,10 @@ std::string TargetSvg(const TargetPage& page, const std::vector<Leaf>& leaves) {
   add("<clipPath id=\"clip\"><rect x=\"{:.4f}\" y=\"{:.4f}\" width=\"{:.4f}\" "
       "height=\"{:.4f}\"/></clipPath>\n",
       pattern.x, pattern.y, pattern.width, pattern.height);
-  add_rectangle("pattern", pattern, GreyBehindLeaves(page));
+  add_rectangle("pattern", pattern, model::GreyBehindLeaves(page));
   add("<g clip-path=\"url(#clip)\">\n");
   int drawn = 0;
-  for (const Leaf& leaf : leaves) {
+  for (const model::TargetLeaf& leaf : leaves) {
     if (drawn++ % kLeavesPerLook == 0) ThrowIfCancelled();
     add("<circle cx=\"{0:.4f}\" cy=\"{1:.4f}\" r=\"{2:.4f}\" fill=\"#{3:02x}{3:02x}{3:02x}\"/>\n",
         leaf.x_mm, leaf.y_mm, leaf.radius_mm, leaf.grey);
@@ -189,12 +190,12 @@ std::string TargetSvg(const TargetPage& page, const std::vector<Leaf>& leaves) {
     add("<text x=\"{:.4f}\" y=\"{:.4f}\" font-family=\"sans-serif\" font-size=\"{:.4f}\">{}"
         "</text>\n",
         page.bar.x, baseline_y_mm, page.text_size_mm, EscapeXml(line));
-    baseline_y_mm += kLineHeight * page.text_size_mm;
+    baseline_y_mm += model::kLineHeight * page.text_size_mm;
   }
   return svg + "</svg>\n";
 }
 
-PngSize TargetPngSize(const TargetPage& page, double dots_per_inch) {
+PngSize TargetPngSize(const model::TargetPage& page, double dots_per_inch) {
   const double pixels_per_metre = std::round(dots_per_inch * kInchesPerMetre);
   const double width_px = std::round(page.width_mm * pixels_per_metre / kMmPerMetre);
   const double height_px = std::round(page.height_mm * pixels_per_metre / kMmPerMetre);
@@ -217,7 +218,7 @@ PngSize TargetPngSize(const TargetPage& page, double dots_per_inch) {
           static_cast<int>(height_px)};
 }
 
-std::string TargetPng(const TargetPage& page, const std::vector<Leaf>& leaves,
+std::string TargetPng(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves,
                       const PngSize& size) {
   model::StoredPicture picture{size.width_px, size.height_px, 1, 8, {}};
   {

@@ -4,15 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "tools/report/target_page.h"
-#include "tools/report/target_texture.h"
+#include "thicklens/model/target_page.h"
+#include "thicklens/model/target_texture.h"
 
 namespace thicklens::tools {
 
 // Return the bytes of a file that shows the target at true scale. Equal pages give equal bytes on
 // one machine; text in PDF and PNG uses the sans serif font of the machine.
-std::string TargetPdf(const TargetPage& page, const std::vector<Leaf>& leaves);
-std::string TargetSvg(const TargetPage& page, const std::vector<Leaf>& leaves);
+std::string TargetPdf(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves);
+std::string TargetSvg(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves);
 
 // Image size at a resolution. PNG states whole px per metre, and the image is drawn at the stated
 // resolution, so that its scale is true to half a px over the sheet.
@@ -22,8 +22,9 @@ struct PngSize {
   int height_px = 0;
 };
 // Throws Error for too many px, or too few for the smallest feature.
-PngSize TargetPngSize(const TargetPage& page, double dots_per_inch);
-std::string TargetPng(const TargetPage& page, const std::vector<Leaf>& leaves, const PngSize& size);
+PngSize TargetPngSize(const model::TargetPage& page, double dots_per_inch);
+std::string TargetPng(const model::TargetPage& page, const std::vector<model::TargetLeaf>& leaves,
+                      const PngSize& size);
 
 }  // namespace thicklens::tools
 

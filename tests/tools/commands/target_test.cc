@@ -17,10 +17,10 @@
 #include "support/temporary_folder.h"
 #include "thicklens/base/error.h"
 #include "thicklens/io/image_io.h"
+#include "thicklens/model/target_page.h"
+#include "thicklens/model/target_texture.h"
 #include "tools/io/png_check.h"
 #include "tools/report/target_drawing.h"
-#include "tools/report/target_page.h"
-#include "tools/report/target_texture.h"
 #include "tools/support/child_process.h"
 #include "tools/support/xml_elements.h"
 
@@ -36,11 +36,11 @@ using thicklens::testing::TemporaryFolder;
 
 constexpr double kMmPerInch = 25.4;
 using thicklens::testing::kPi;
-constexpr SheetSize kSheet = {210, 297, true};
+constexpr model::SheetSize kSheet = {210, 297, true};
 
 // Half an A4 sheet: quick, and with all that a whole one has.
-TargetRequest SmallRequest() {
-  TargetRequest request;
+model::TargetRequest SmallRequest() {
+  model::TargetRequest request;
   request.sheet = {148, 120, false};
   request.feature_mm = 0.5;
   return request;
@@ -61,21 +61,21 @@ std::vector<std::int64_t> StatedResolution(const std::string& png) {
 
 // A target as a printer at `dpi` would get it.
 struct Drawn {
-  TargetPage page;
-  std::vector<Leaf> leaves;
+  model::TargetPage page;
+  std::vector<model::TargetLeaf> leaves;
   cv::Mat picture;  // CV_8U
   double px_per_mm = 0;
 
   int Px(double mm) const { return static_cast<int>(std::lround(mm * px_per_mm)); }
-  cv::Mat Part(const Rectangle& area) const {
+  cv::Mat Part(const model::SheetRectangle& area) const {
     return picture(cv::Rect(Px(area.x), Px(area.y), Px(area.width), Px(area.height)));
   }
 };
 
-Drawn Draw(const TargetRequest& request, double dpi) {
+Drawn Draw(const model::TargetRequest& request, double dpi) {
   Drawn drawn;
-  drawn.page = LayOutTarget(request);
-  drawn.leaves = DeadLeaves(drawn.page);
+  drawn.page = model::LayOutTarget(request);
+  drawn.leaves = model::DeadLeaves(drawn.page);
   const std::string png = TargetPng(drawn.page, drawn.leaves, TargetPngSize(drawn.page, dpi));
   drawn.picture = io::DecodePicture(png, "target.png");
   drawn.px_per_mm = static_cast<double>(StatedResolution(png)[0]) / 1000;
@@ -90,7 +90,7 @@ struct EdgeLine {
   double largest_px = 0;  // distance of a row from the line
 };
 EdgeLine FitEdge(const Drawn& drawn) {
-  const Rectangle& patch = drawn.page.patch;
+  const model::SheetRectangle& patch = drawn.page.patch;
   const double centre_y_px = (patch.y + patch.height / 2) * drawn.px_per_mm - 0.5;
   const int left_px = drawn.Px(patch.x) + 3;
   const int right_px = drawn.Px(patch.x + patch.width) - 3;
@@ -119,56 +119,18 @@ EdgeLine FitEdge(const Drawn& drawn) {
   return line;
 }
 
-TEST(DeadLeaves, KeepsItsBoundsAndUsesTheWholeContrast) {
-  const TargetPage page = LayOutTarget(SmallRequest());
-  const std::vector<Leaf> leaves = DeadLeaves(page);
-  ASSERT_GT(leaves.size(), 5000U);
-  double smallest_mm = 1e9, largest_mm = 0, mean = 0;
-  std::set<int> greys;
-  for (const Leaf& leaf : leaves) {
-    smallest_mm = std::min(smallest_mm, leaf.radius_mm);
-    largest_mm = std::max(largest_mm, leaf.radius_mm);
-    mean += leaf.grey / static_cast<double>(leaves.size());
-    greys.insert(leaf.grey);
-  }
-  EXPECT_GE(smallest_mm, page.feature_mm / 2);
-  EXPECT_LT(smallest_mm, 1.002 * page.feature_mm / 2);
-  EXPECT_GT(largest_mm, 10 * page.feature_mm);
-  EXPECT_LE(largest_mm, 0.1 * page.pattern.height + 1e-9);
-  EXPECT_EQ(*greys.begin(), 51);    // 0.2
-  EXPECT_EQ(*greys.rbegin(), 230);  // 0.9
-  EXPECT_EQ(greys.size(), 180U);
-  EXPECT_NEAR(mean, 140.5, 3);
-}
-
-// Among leaves that lie wholly in front, whose radii nothing but the law decides, as many as r^-3
-// says: the foremost ones of the pile, before any was left out.
-TEST(DeadLeaves, HasRadiiOfTheInverseCube) {
-  TargetRequest request = SmallRequest();
-  request.feature_mm = 0.3;
-  const TargetPage page = LayOutTarget(request);
-  std::vector<Leaf> leaves = DeadLeaves(page);
-  std::reverse(leaves.begin(), leaves.end());
-  leaves.resize(3000);
-  const double a = page.feature_mm / 2, b = 0.1 * page.pattern.height;
-  const double up_to_twice = (1 - 0.25) / (1 - a * a / (b * b));  // part with r <= 2 a
-  const auto count = std::count_if(leaves.begin(), leaves.end(),
-                                   [&](const Leaf& leaf) { return leaf.radius_mm <= 2 * a; });
-  EXPECT_NEAR(static_cast<double>(count) / 3000, up_to_twice, 0.03);
-}
-
 // A slow twin: at each point the last leaf that holds it. Points on a leaf's border are left out.
 TEST(TargetPng, ShowsAtEachPointTheForemostLeaf) {
   const Drawn drawn = Draw(SmallRequest(), 300);
-  const Rectangle& pattern = drawn.page.pattern;
+  const model::SheetRectangle& pattern = drawn.page.pattern;
   int compared = 0, background = 0, wrong = 0;
   for (int row = drawn.Px(pattern.y) + 2; row < drawn.Px(pattern.y + 25); row += 9) {
     for (int column = drawn.Px(pattern.x) + 2; column < drawn.Px(pattern.x + 100); column += 11) {
       const double x_mm = (column + 0.5) / drawn.px_per_mm;
       const double y_mm = (row + 0.5) / drawn.px_per_mm;
-      int grey = GreyBehindLeaves(drawn.page);
+      int grey = model::GreyBehindLeaves(drawn.page);
       bool plain = true, covered = false;
-      for (const Leaf& leaf : drawn.leaves) {
+      for (const model::TargetLeaf& leaf : drawn.leaves) {
         const double beyond_px =
             (std::hypot(leaf.x_mm - x_mm, leaf.y_mm - y_mm) - leaf.radius_mm) * drawn.px_per_mm;
         if (std::abs(beyond_px) < 1) plain = false;
@@ -188,8 +150,8 @@ TEST(TargetPng, ShowsAtEachPointTheForemostLeaf) {
 }
 
 TEST(TargetPng, HasTrueScaleAndSaysSo) {
-  const TargetPage page = LayOutTarget(SmallRequest());
-  const std::string png = TargetPng(page, DeadLeaves(page), TargetPngSize(page, 300));
+  const model::TargetPage page = model::LayOutTarget(SmallRequest());
+  const std::string png = TargetPng(page, model::DeadLeaves(page), TargetPngSize(page, 300));
   io::RequireWholePng(png, "target.png");
   EXPECT_THAT(StatedResolution(png), ElementsAre(11811, 11811, 1));  // 300/0.0254
   const cv::Mat picture = io::DecodePicture(png, "target.png");
@@ -204,8 +166,8 @@ TEST(TargetPng, HasTrueScaleAndSaysSo) {
 }
 
 TEST(TargetPng, StatesWholePixelsPerMetreAndDrawsByThem) {
-  TargetRequest request = SmallRequest();
-  const TargetPage page = LayOutTarget(request);
+  model::TargetRequest request = SmallRequest();
+  const model::TargetPage page = model::LayOutTarget(request);
   const PngSize size = TargetPngSize(page, 254.003);
   EXPECT_EQ(size.pixels_per_metre, 10000);
   EXPECT_EQ(size.width_px, 1480);
@@ -213,14 +175,14 @@ TEST(TargetPng, StatesWholePixelsPerMetreAndDrawsByThem) {
 }
 
 TEST(TargetPng, RefusesTooManyPixelsAndTooFew) {
-  const TargetPage page = LayOutTarget(SmallRequest());
+  const model::TargetPage page = model::LayOutTarget(SmallRequest());
   EXPECT_THROW(TargetPngSize(page, 4000), Error);
   EXPECT_THROW(TargetPngSize(page, 72), Error);  // features of 0.5 mm: 1.4 px
 }
 
 TEST(TargetPng, TheEdgeHasItsStatedAngle) {
   for (const double angle_deg : {5.0, 2.0, 20.0}) {
-    TargetRequest request = SmallRequest();
+    model::TargetRequest request = SmallRequest();
     request.edge_angle_deg = angle_deg;
     const Drawn drawn = Draw(request, 300);
     const EdgeLine line = FitEdge(drawn);
@@ -232,13 +194,13 @@ TEST(TargetPng, TheEdgeHasItsStatedAngle) {
 
 TEST(TargetPng, HasPlainPlateausDarkOnTheLeftAndBrightOnTheRight) {
   const Drawn drawn = Draw(SmallRequest(), 300);
-  Rectangle left = drawn.page.patch;
+  model::SheetRectangle left = drawn.page.patch;
   left.x += 0.2;
   left.y += 0.2;
   left.height -= 0.4;
   left.width = drawn.page.EdgeX(left.y + left.height) - left.x - 0.2;
   EXPECT_EQ(cv::countNonZero(drawn.Part(left)), 0);
-  Rectangle right = left;
+  model::SheetRectangle right = left;
   right.x = drawn.page.EdgeX(left.y) + 0.2;
   right.width = drawn.page.patch.x + drawn.page.patch.width - right.x - 0.2;
   EXPECT_EQ(cv::countNonZero(drawn.Part(right) != 255), 0);
@@ -249,7 +211,7 @@ TEST(TargetPng, HasPlainPlateausDarkOnTheLeftAndBrightOnTheRight) {
 // Each line of the caption stands where the page says: ink above its baseline, none below the last.
 TEST(TargetPng, ShowsTheCaption) {
   const Drawn drawn = Draw(SmallRequest(), 300);
-  const TargetPage& page = drawn.page;
+  const model::TargetPage& page = drawn.page;
   double baseline_mm = page.first_baseline_y_mm;
   for (std::size_t i = 0; i < page.caption.size(); ++i) {
     const double reckoned_mm =
@@ -257,7 +219,7 @@ TEST(TargetPng, ShowsTheCaption) {
     const cv::Mat dark = drawn.Part({page.bar.x, baseline_mm - 0.7 * page.text_size_mm, reckoned_mm,
                                      0.7 * page.text_size_mm}) < 128;
     EXPECT_GT(cv::countNonZero(dark), 0.05 * static_cast<double>(dark.total()));
-    baseline_mm += kLineHeight * page.text_size_mm;
+    baseline_mm += model::kLineHeight * page.text_size_mm;
   }
   const cv::Mat below =
       drawn.Part({0, baseline_mm, page.width_mm, page.height_mm - baseline_mm - 1});
@@ -268,7 +230,7 @@ TEST(TargetPng, ShowsTheCaption) {
 }
 
 TEST(TargetPng, TwoTonesAreTwo) {
-  TargetRequest request = SmallRequest();
+  model::TargetRequest request = SmallRequest();
   request.two_tone = true;
   const Drawn drawn = Draw(request, 300);
   EXPECT_EQ(cv::countNonZero(drawn.picture == 0) + cv::countNonZero(drawn.picture == 255),
@@ -328,10 +290,10 @@ Peaks PeaksBeyond(const cv::Mat& correlation, int from_px, int reach_px) {
 }
 
 TEST(TargetPng, RepeatsNothing) {
-  TargetRequest request;
+  model::TargetRequest request;
   request.sheet = kSheet;
-  const Drawn drawn = Draw(request, 127);  // 5 px a mm
-  Rectangle above = drawn.page.pattern;    // of the patch
+  const Drawn drawn = Draw(request, 127);            // 5 px a mm
+  model::SheetRectangle above = drawn.page.pattern;  // of the patch
   above.height = drawn.page.patch.y - above.y - 1;
   const Peaks found = PeaksBeyond(Autocorrelation(drawn.Part(above)), 10, 5);
   EXPECT_LT(found.second_peak, 0.2) << found.highest;
@@ -345,8 +307,8 @@ TEST(TargetPng, RepeatsNothing) {
 }
 
 TEST(TargetSvg, HasTrueScaleAndTheCaption) {
-  const TargetPage page = LayOutTarget(SmallRequest());
-  const std::vector<Leaf> leaves = DeadLeaves(page);
+  const model::TargetPage page = model::LayOutTarget(SmallRequest());
+  const std::vector<model::TargetLeaf> leaves = model::DeadLeaves(page);
   const XmlDocument svg = ParseXml(TargetSvg(page, leaves));
   ASSERT_THAT(svg.error, IsEmpty());
   const XmlElement& root = svg.elements.front();
@@ -374,8 +336,8 @@ TEST(TargetSvg, HasTrueScaleAndTheCaption) {
 }
 
 TEST(TargetPdf, HasTrueScaleTheCaptionAndNoDate) {
-  const TargetPage page = LayOutTarget(SmallRequest());
-  const std::string pdf = TargetPdf(page, DeadLeaves(page));
+  const model::TargetPage page = model::LayOutTarget(SmallRequest());
+  const std::string pdf = TargetPdf(page, model::DeadLeaves(page));
   EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
   const std::size_t at = pdf.find("/MediaBox [");
   ASSERT_NE(at, std::string::npos);
@@ -390,7 +352,7 @@ TEST(TargetPdf, HasTrueScaleTheCaptionAndNoDate) {
   EXPECT_THAT(pdf, HasSubstr(page.caption[0]));
   EXPECT_THAT(pdf, HasSubstr("/ToUnicode"));  // there are letters, which can be searched
   EXPECT_THAT(pdf, ::testing::Not(HasSubstr("Date")));
-  EXPECT_EQ(TargetPdf(page, DeadLeaves(page)), pdf);
+  EXPECT_EQ(TargetPdf(page, model::DeadLeaves(page)), pdf);
 }
 
 // The program as a person meets it.

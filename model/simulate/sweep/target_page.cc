@@ -1,4 +1,4 @@
-#include "tools/report/target_page.h"
+#include "thicklens/model/target_page.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include "thicklens/base/error.h"
 #include "thicklens/model/thick_lens.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -56,14 +56,14 @@ double SheetScale(const SheetSize& sheet) {
 }
 
 // What margins and caption leave to the pattern.
-Rectangle FreeArea(const SheetSize& sheet) {
+SheetRectangle FreeArea(const SheetSize& sheet) {
   const double margin_mm = kMarginMm * SheetScale(sheet);
   const double caption_mm = kCaptionHeightMm * SheetScale(sheet);
   return {margin_mm, margin_mm, FloorToTenths(sheet.width_mm - 2 * margin_mm),
           FloorToTenths(sheet.height_mm - 2 * margin_mm - caption_mm)};
 }
 
-bool Holds(const Rectangle& free, double width_mm, double height_mm) {
+bool Holds(const SheetRectangle& free, double width_mm, double height_mm) {
   return width_mm <= free.width + kRoundingSlack && height_mm <= free.height + kRoundingSlack;
 }
 
@@ -79,7 +79,7 @@ SheetSize SheetFor(const SheetSize& sheet, const std::optional<CameraView>& view
   const double height_mm = CeilToTenths(kOverfill * view->height_mm);
   if (Holds(FreeArea(sheet), width_mm, height_mm)) return sheet;
   if (sheet.may_turn && Holds(FreeArea(Turned(sheet)), width_mm, height_mm)) return Turned(sheet);
-  const Rectangle free = FreeArea(sheet);
+  const SheetRectangle free = FreeArea(sheet);
   throw Error(fmt::format(
       "the camera sees {:.1f} x {:.1f} mm at {:g} mm; a pattern of {:.1f} x {:.1f} mm, which "
       "overfills this by 15 %, does not fit the sheet of {:g} x {:g} mm ({:.1f} x {:.1f} mm are "
@@ -88,8 +88,8 @@ SheetSize SheetFor(const SheetSize& sheet, const std::optional<CameraView>& view
       sheet.height_mm, free.width, free.height));
 }
 
-Rectangle PatternFor(const SheetSize& sheet, const std::optional<CameraView>& view) {
-  const Rectangle free = FreeArea(sheet);
+SheetRectangle PatternFor(const SheetSize& sheet, const std::optional<CameraView>& view) {
+  const SheetRectangle free = FreeArea(sheet);
   if (!view) return free;
   const double width_mm = CeilToTenths(kOverfill * view->width_mm);
   const double height_mm = CeilToTenths(kOverfill * view->height_mm);
@@ -97,10 +97,10 @@ Rectangle PatternFor(const SheetSize& sheet, const std::optional<CameraView>& vi
           height_mm};
 }
 
-Rectangle PatchOf(const Rectangle& pattern) {
+SheetRectangle PatchOf(const SheetRectangle& pattern) {
   const double width_mm = kPatchPart * pattern.width / kOverfill;
   const double height_mm = kPatchPart * pattern.height / kOverfill;
-  Rectangle patch;
+  SheetRectangle patch;
   patch.width = std::min(width_mm, kLongestPatch * height_mm);
   patch.height = std::min(height_mm, kLongestPatch * width_mm);
   patch.x = pattern.x + (pattern.width - patch.width) / 2;
@@ -156,7 +156,7 @@ Feature FeatureForCamera(const CameraView& view, double finest_mm) {
                   finest_mm, std::ceil(farther_mm)));
 }
 
-Feature ChooseFeature(const TargetRequest& request, const Rectangle& pattern) {
+Feature ChooseFeature(const TargetRequest& request, const SheetRectangle& pattern) {
   if (request.feature_mm) return GivenFeature(*request.feature_mm, request);
   if (request.view) return FeatureForCamera(*request.view, request.finest_mm);
   const double part_mm =
@@ -167,7 +167,7 @@ Feature ChooseFeature(const TargetRequest& request, const Rectangle& pattern) {
   return {request.finest_mm, "the finest that is printed, no camera being given"};
 }
 
-void RequirePossibleTexture(const Rectangle& pattern, double feature_mm) {
+void RequirePossibleTexture(const SheetRectangle& pattern, double feature_mm) {
   const double shorter_mm = std::min(pattern.width, pattern.height);
   if (!(shorter_mm >= kFewestFeaturesAcross * feature_mm)) {
     throw Error(
@@ -206,7 +206,7 @@ std::vector<std::string> CaptionOf(const TargetPage& page, const std::optional<C
 
 void AddCaption(const SheetSize& sheet, const std::optional<CameraView>& view, TargetPage* page) {
   const double scale = SheetScale(sheet);
-  const Rectangle free = FreeArea(sheet);
+  const SheetRectangle free = FreeArea(sheet);
   page->bar = {free.x, free.y + free.height + kBarGapMm * scale, LongestBarMm(free.width),
                kBarHeightMm * scale};
   page->caption = CaptionOf(*page, view);
@@ -219,10 +219,10 @@ void AddCaption(const SheetSize& sheet, const std::optional<CameraView>& view, T
 
 }  // namespace
 
-CameraView ViewOfTarget(const model::Camera& camera, double distance_mm) {
-  const double image_distance_mm = model::ImageDistanceMm(camera.lens, distance_mm);
+CameraView ViewOfTarget(const Camera& camera, double distance_mm) {
+  const double image_distance_mm = ImageDistanceMm(camera.lens, distance_mm);
   const double magnification =
-      std::abs(model::ChiefRayMagnification(camera.lens, image_distance_mm, distance_mm));
+      std::abs(ChiefRayMagnification(camera.lens, image_distance_mm, distance_mm));
   const double px_mm = camera.sensor.pixel_pitch_mm / magnification;
   return {distance_mm, px_mm, px_mm * camera.sensor.width_px, px_mm * camera.sensor.height_px,
           camera.lens.front_focal_length_mm};
@@ -257,4 +257,4 @@ TargetPage LayOutTarget(const TargetRequest& request) {
   return page;
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model

@@ -1,5 +1,5 @@
-#ifndef THICKLENS_TOOLS_REPORT_TARGET_PAGE_H_
-#define THICKLENS_TOOLS_REPORT_TARGET_PAGE_H_
+#ifndef THICKLENS_MODEL_TARGET_PAGE_H_
+#define THICKLENS_MODEL_TARGET_PAGE_H_
 
 #include <cstdint>
 #include <optional>
@@ -8,7 +8,7 @@
 
 #include "thicklens/model/camera.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 
 // Size of a sheet of paper.
 struct SheetSize {
@@ -27,7 +27,7 @@ struct CameraView {
 };
 // Returns the view of the camera focused on a target at `distance_mm` from its aperture. Throws
 // Error if it cannot be focused there.
-CameraView ViewOfTarget(const model::Camera& camera, double distance_mm);
+CameraView ViewOfTarget(const Camera& camera, double distance_mm);
 
 struct TargetRequest {
   SheetSize sheet;
@@ -40,7 +40,7 @@ struct TargetRequest {
 };
 
 // A rectangle on the sheet, mm from its top left corner, y down.
-struct Rectangle {
+struct SheetRectangle {
   double x = 0, y = 0, width = 0, height = 0;
 };
 
@@ -49,10 +49,10 @@ struct Rectangle {
 struct TargetPage {
   double width_mm = 0;
   double height_mm = 0;
-  Rectangle pattern;
-  Rectangle patch;  // black on the left of the edge, white on its right
+  SheetRectangle pattern;
+  SheetRectangle patch;  // black on the left of the edge, white on its right
   double edge_angle_deg = 0;
-  Rectangle bar;
+  SheetRectangle bar;
   std::vector<std::string> caption;
   double text_size_mm = 0;         // size of the letters' em square
   double first_baseline_y_mm = 0;  // lines are kLineHeight text sizes apart
@@ -70,6 +70,6 @@ constexpr double kLineHeight = 1.4;
 // method does not resolve the features, or the sheet has no room.
 TargetPage LayOutTarget(const TargetRequest& request);
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model
 
-#endif  // THICKLENS_TOOLS_REPORT_TARGET_PAGE_H_
+#endif  // THICKLENS_MODEL_TARGET_PAGE_H_

@@ -1,4 +1,4 @@
-#include "tools/report/effect_costs.h"
+#include "thicklens/model/effect_costs.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "thicklens/model/light_field.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 constexpr int kPatchWidthPx = 96, kPatchHeightPx = 64;
@@ -16,36 +16,35 @@ constexpr double kFarthestMm = 1e6;
 // Of the picture's time; what is less is lost in what one run differs from the next.
 constexpr double kMeasurable = 0.05;
 
-model::SceneLayer Leaves(double depth_mm) {
-  model::SceneLayer layer;
+SceneLayer Leaves(double depth_mm) {
+  SceneLayer layer;
   layer.plane.depth_mm = depth_mm;
-  layer.texture.kind = model::TextureKind::kDeadLeaves;
+  layer.texture.kind = TextureKind::kDeadLeaves;
   return layer;
 }
 
-model::SceneSimulationOptions PatchOf(const model::Camera& camera, const model::DepthRange& range,
-                                      const model::SceneSimulationOptions& sensor) {
-  model::SceneSimulationOptions patch = sensor;
-  const model::Sensor& whole = camera.sensor;
+SceneSimulationOptions PatchOf(const Camera& camera, const DepthRange& range,
+                               const SceneSimulationOptions& sensor) {
+  SceneSimulationOptions patch = sensor;
+  const Sensor& whole = camera.sensor;
   const int width_px = std::min(kPatchWidthPx, whole.width_px);
   const int height_px = std::min(kPatchHeightPx, whole.height_px);
-  patch.camera = model::CropCamera(
-      camera,
-      {(whole.width_px - width_px) / 2, (whole.height_px - height_px) / 2, width_px, height_px});
-  model::SceneLayer card = Leaves(range.near_mm);
-  card.outline.shape = model::OutlineOptions::Shape::kRectangle;
+  patch.camera = CropCamera(camera, {(whole.width_px - width_px) / 2,
+                                     (whole.height_px - height_px) / 2, width_px, height_px});
+  SceneLayer card = Leaves(range.near_mm);
+  card.outline.shape = OutlineOptions::Shape::kRectangle;
   card.outline.centre = {0, height_px / 2.0};
   card.outline.size = {static_cast<double>(width_px), 4.0 * height_px};
   patch.layers = {Leaves(std::min(range.far_mm, kFarthestMm)), card};
   patch.effects = {};
-  patch.effects.base = model::EffectChoice::Base::kGiven;
+  patch.effects.base = EffectChoice::Base::kGiven;
   return patch;
 }
 
 // Of the processor, which says more than the clock where others have it, too.
-double SecondsOf(const model::SceneSimulationOptions& patch) {
+double SecondsOf(const SceneSimulationOptions& patch) {
   const std::clock_t start = std::clock();
-  const model::SceneSimulator simulator(patch, {}, 1);
+  const SceneSimulator simulator(patch, {}, 1);
   simulator.Store(simulator.RenderNoiseless({1, {}}));
   return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
@@ -57,16 +56,15 @@ double Median(std::vector<double> values) {
 
 }  // namespace
 
-EffectCosts MeasureEffectCosts(const model::Camera& camera, const model::DepthRange& range,
-                               const model::SceneSimulationOptions& sensor,
-                               const model::EffectDecision& decision,
+EffectCosts MeasureEffectCosts(const Camera& camera, const DepthRange& range,
+                               const SceneSimulationOptions& sensor, const EffectDecision& decision,
                                const std::function<void(int done, int total)>& tell) {
-  model::SceneSimulationOptions patch = PatchOf(camera, range, sensor);
-  const model::EffectSet known = decision.on.Both(model::PictureEffects());
+  SceneSimulationOptions patch = PatchOf(camera, range, sensor);
+  const EffectSet known = decision.on.Both(PictureEffects());
   EffectCosts costs;
-  std::vector<model::Effect> effects;
-  for (const model::EffectFinding& finding : decision.findings) {
-    if (!model::PictureEffects().Has(finding.effect)) continue;
+  std::vector<Effect> effects;
+  for (const EffectFinding& finding : decision.findings) {
+    if (!PictureEffects().Has(finding.effect)) continue;
     if (finding.impact.amount == 0 && finding.impact.grey_levels == 0) {
       costs.of_effect.emplace_back(finding.effect, 0);
     } else {
@@ -85,7 +83,7 @@ EffectCosts MeasureEffectCosts(const model::Camera& camera, const model::DepthRa
       seconds[i].push_back(SecondsOf(patch));
     }
   }
-  const model::Sensor& part = patch.camera.sensor;
+  const Sensor& part = patch.camera.sensor;
   const double patches = static_cast<double>(camera.sensor.width_px) * camera.sensor.height_px /
                          (static_cast<double>(part.width_px) * part.height_px);
   const double as_is = Median(seconds[0]);
@@ -99,4 +97,4 @@ EffectCosts MeasureEffectCosts(const model::Camera& camera, const model::DepthRa
   return costs;
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model

@@ -1,4 +1,4 @@
-#include "tools/report/target_texture.h"
+#include "thicklens/model/target_texture.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include "thicklens/base/cancel.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 constexpr double kLargestLeaf = 0.1;  // radius, of the pattern's shorter side
@@ -33,7 +33,7 @@ class Draws {
 // backward.
 class Openings {
  public:
-  Openings(const Rectangle& pattern, double spacing_mm)
+  Openings(const SheetRectangle& pattern, double spacing_mm)
       : pattern_(pattern),
         spacing_mm_(spacing_mm),
         columns_(static_cast<int>(std::ceil(pattern.width / spacing_mm))),
@@ -44,13 +44,13 @@ class Openings {
   double OpenPart() const { return static_cast<double>(left_) / static_cast<double>(open_.size()); }
 
   // Each closes what it covers and tells whether any of it was open.
-  bool Close(const Rectangle& area) {
+  bool Close(const SheetRectangle& area) {
     bool was_open = false;
     for (int row = FirstRow(area.y); row <= LastRow(area.y + area.height); ++row)
       was_open |= CloseRow(row, area.x, area.x + area.width);
     return was_open;
   }
-  bool Close(const Leaf& leaf) {
+  bool Close(const TargetLeaf& leaf) {
     bool was_open = false;
     const int last = LastRow(leaf.y_mm + leaf.radius_mm);
     for (int row = FirstRow(leaf.y_mm - leaf.radius_mm); row <= last; ++row) {
@@ -88,7 +88,7 @@ class Openings {
     return was_open;
   }
 
-  Rectangle pattern_;
+  SheetRectangle pattern_;
   double spacing_mm_;
   int columns_, rows_;
   std::vector<std::uint8_t> open_;
@@ -103,8 +103,8 @@ int DrawGrey(bool two_tone, Draws* draws) {
 
 }  // namespace
 
-std::vector<Leaf> DeadLeaves(const TargetPage& page) {
-  const Rectangle& pattern = page.pattern;
+std::vector<TargetLeaf> DeadLeaves(const TargetPage& page) {
+  const SheetRectangle& pattern = page.pattern;
   const double smallest_mm = page.feature_mm / 2;
   const double largest_mm =
       std::max(kLargestLeaf * std::min(pattern.width, pattern.height), 2 * smallest_mm);
@@ -114,12 +114,12 @@ std::vector<Leaf> DeadLeaves(const TargetPage& page) {
   Openings openings(pattern, page.feature_mm / kSamplesPerFeature);
   openings.Close(page.patch);  // in front of every leaf
   Draws draws(page.seed);
-  std::vector<Leaf> leaves;
+  std::vector<TargetLeaf> leaves;
   for (int count = 0; openings.OpenPart() > kOpenAtEnd; ++count) {
     if (count % kTriesPerLook == 0) ThrowIfCancelled();
     // r = (rmin^-2 - q (rmin^-2 - rmax^-2))^(-1/2), q uniform: the inverse of the distribution
     // function of the density ~ r^-3 between rmin and rmax, derived here [D46].
-    Leaf leaf;
+    TargetLeaf leaf;
     leaf.radius_mm = 1 / std::sqrt(small_term - draws.Uniform() * (small_term - large_term));
     // Also from beyond the sides, so that the texture there is as in the middle.
     leaf.x_mm = pattern.x - largest_mm + draws.Uniform() * (pattern.width + 2 * largest_mm);
@@ -135,4 +135,4 @@ int GreyBehindLeaves(const TargetPage& page) {
   return page.two_tone ? 255 : (kDarkestGrey + kBrightestGrey) / 2;
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model

@@ -1,4 +1,4 @@
-#include "tools/report/target_page.h"
+#include "thicklens/model/target_page.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "support/test_cameras.h"
 #include "thicklens/base/error.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 using ::testing::AllOf;
@@ -161,9 +161,11 @@ TEST(LayOutTarget, FeaturesThatDoNotSuitTheCameraAreReported) {
 // In focus m = f1/(zf - f1), whatever f2 and the thickness; the distance that a refusal names is
 // one that is accepted.
 TEST(ViewOfTarget, IsWhatAThickLensSeesInFocus) {
-  model::Camera camera;
-  camera.lens = ThickMacroLens(10);
-  camera.sensor = TestSensor(640, 480, 0.004, {0, 0});
+  Camera camera;
+  camera.lens = {50, 52, 4, 10};
+  camera.sensor.width_px = 640;
+  camera.sensor.height_px = 480;
+  camera.sensor.pixel_pitch_mm = 0.004;
   const CameraView view = ViewOfTarget(camera, 800);
   EXPECT_NEAR(view.px_mm, 0.004 * (800 - 50) / 50, 1e-12);
   EXPECT_NEAR(view.width_mm, 38.4, 1e-9);
@@ -184,4 +186,4 @@ TEST(ViewOfTarget, IsWhatAThickLensSeesInFocus) {
 }
 
 }  // namespace
-}  // namespace thicklens::tools
+}  // namespace thicklens::model

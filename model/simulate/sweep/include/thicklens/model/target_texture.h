@@ -1,13 +1,13 @@
-#ifndef THICKLENS_TOOLS_REPORT_TARGET_TEXTURE_H_
-#define THICKLENS_TOOLS_REPORT_TARGET_TEXTURE_H_
+#ifndef THICKLENS_MODEL_TARGET_TEXTURE_H_
+#define THICKLENS_MODEL_TARGET_TEXTURE_H_
 
 #include <vector>
 
-#include "tools/report/target_page.h"
+#include "thicklens/model/target_page.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 
-struct Leaf {
+struct TargetLeaf {
   double x_mm = 0, y_mm = 0;  // on the sheet
   double radius_mm = 0;
   int grey = 0;  // 0 to 255, as stored
@@ -17,11 +17,11 @@ struct Leaf {
 // The radii are distributed as r^-3, so that every octave of sizes takes the same part of the area:
 // whatever the blur, some of the texture stays visible, and nothing repeats. Occluded leaves are
 // left out. The same page gives the same leaves on every machine.
-std::vector<Leaf> DeadLeaves(const TargetPage& page);
+std::vector<TargetLeaf> DeadLeaves(const TargetPage& page);
 
 // The grey value where no leaf lies, on less than a thousandth of the area.
 int GreyBehindLeaves(const TargetPage& page);
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model
 
-#endif  // THICKLENS_TOOLS_REPORT_TARGET_TEXTURE_H_
+#endif  // THICKLENS_MODEL_TARGET_TEXTURE_H_

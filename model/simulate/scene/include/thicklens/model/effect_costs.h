@@ -1,5 +1,5 @@
-#ifndef THICKLENS_TOOLS_REPORT_EFFECT_COSTS_H_
-#define THICKLENS_TOOLS_REPORT_EFFECT_COSTS_H_
+#ifndef THICKLENS_MODEL_EFFECT_COSTS_H_
+#define THICKLENS_MODEL_EFFECT_COSTS_H_
 
 #include <functional>
 #include <utility>
@@ -9,7 +9,7 @@
 #include "thicklens/model/explanation.h"
 #include "thicklens/model/scene_simulator.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 
 // Cost of effects in a simulated image of a camera, measured on this machine.
 struct EffectCosts {
@@ -17,7 +17,7 @@ struct EffectCosts {
   // For each effect that an image of a scene can have: the additional time of the image with the
   // effect, all others unchanged. 0: the effect does not occur, or its cost is too small to
   // measure.
-  std::vector<std::pair<model::Effect, double>> of_effect;
+  std::vector<std::pair<Effect, double>> of_effect;
 };
 
 // Simulates a patch of the middle of the sensor several times and takes medians. Its left half
@@ -25,11 +25,10 @@ struct EffectCosts {
 // of the image is that of the patch times the ratio of their pixels. From `sensor` only the noise
 // and the bits are used, not the camera, layers and effects. `tell` is called before each
 // simulation and may throw to stop. Throws Error for a camera or depths that cannot be simulated.
-EffectCosts MeasureEffectCosts(const model::Camera& camera, const model::DepthRange& range,
-                               const model::SceneSimulationOptions& sensor,
-                               const model::EffectDecision& decision,
+EffectCosts MeasureEffectCosts(const Camera& camera, const DepthRange& range,
+                               const SceneSimulationOptions& sensor, const EffectDecision& decision,
                                const std::function<void(int done, int total)>& tell);
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model
 
-#endif  // THICKLENS_TOOLS_REPORT_EFFECT_COSTS_H_
+#endif  // THICKLENS_MODEL_EFFECT_COSTS_H_
