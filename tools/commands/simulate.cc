@@ -24,6 +24,7 @@
 #include "tools/commands/simulate_scene.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
+#include "tools/report/ablation_run.h"
 #include "tools/report/attribution_page.h"
 #include "tools/system/progress_line.h"
 
@@ -107,8 +108,8 @@ CommandResult SimulateSweep(const SimulateOptions& options) {
   Attribution attribution;
   if (options.attribute) {
     ProgressLine progress("attributing", options.common.quiet);
-    attribution.sweep = AttributeSweepOf(options.config_path, simulation, options.unknown_offset,
-                                         AttributionRunWith(options.common, &progress));
+    attribution.sweep = AblateSweepOf(options.config_path, simulation, options.unknown_offset,
+                                      AblationRunWith(options.common, &progress));
     WriteAttribution(attribution, options.config_path, &folder);
   }
   ThrowIfCancelled();

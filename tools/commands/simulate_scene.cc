@@ -28,6 +28,7 @@
 #include "tools/options/effect_options.h"
 #include "tools/options/light_field_options.h"
 #include "tools/options/option_values.h"
+#include "tools/report/ablation_run.h"
 #include "tools/report/attribution_page.h"
 #include "tools/system/build_info.h"
 #include "tools/system/progress_line.h"
@@ -116,11 +117,11 @@ Attribution Attribute(const SceneOptions& options, const model::SceneSimulationO
   // The sweep is read first, because it may have no calibration to compare with.
   if (sweep) {
     ProgressLine progress("attributing the sweep", options.common.quiet);
-    attribution.sweep = AttributeSweepOf(options.sweep_path, *sweep, false,
-                                         AttributionRunWith(options.common, &progress));
+    attribution.sweep = AblateSweepOf(options.sweep_path, *sweep, false,
+                                      AblationRunWith(options.common, &progress));
   }
   ProgressLine progress("attributing", options.common.quiet);
-  attribution.scene = AttributeScene(scene, pixels, AttributionRunWith(options.common, &progress));
+  attribution.scene = AblateSceneOf(scene, pixels, AblationRunWith(options.common, &progress));
   return attribution;
 }
 

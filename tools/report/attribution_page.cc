@@ -6,8 +6,6 @@
 #include <cmath>
 #include <opencv2/core/mat.hpp>
 
-#include "thicklens/base/cancel.h"
-#include "thicklens/base/error.h"
 #include "thicklens/base/printable_text.h"
 #include "thicklens/base/utc_time.h"
 #include "thicklens/io/simulated_sweep.h"
@@ -37,8 +35,8 @@ double RangeOf(const std::vector<float>& values) {
   return std::max(kLeast, static_cast<double>(sizes[static_cast<std::size_t>(place)]));
 }
 
-std::string DifferenceCell(const AttributedEffect& effect) {
-  const DifferencePicture& shown = effect.difference;
+std::string DifferenceCell(const model::AblatedEffect& effect) {
+  const model::DifferencePicture& shown = effect.difference;
   if (effect.absent || shown.grey_levels.empty()) return "";
   const double range = RangeOf(shown.grey_levels);
   const std::string name = model::EffectName(effect.effect);
@@ -119,8 +117,8 @@ std::string Verdict(const Attribution& attribution) {
     html += fmt::format("<p>Nowhere more than half a grey level: {}.</p>\n", EscapeXml(unseen));
   }
   if (attribution.scene) {
-    const SceneEffect* worst = nullptr;
-    for (const SceneEffect& effect : attribution.scene->effects) {
+    const model::AblatedSceneEffect* worst = nullptr;
+    for (const model::AblatedSceneEffect& effect : attribution.scene->effects) {
       if (effect.ignored_db && (worst == nullptr || *effect.ignored_db < *worst->ignored_db)) {
         worst = &effect;
       }
@@ -133,15 +131,17 @@ std::string Verdict(const Attribution& attribution) {
                                     model::EffectName(worst->effect), *worst->ignored_db)));
   }
   if (attribution.sweep) {
-    const SweepAttribution& sweep = *attribution.sweep;
-    const auto moved_mm = [&](const SweepEffect& effect) {
+    const model::SweepAblation& sweep = *attribution.sweep;
+    const auto moved_mm = [&](const model::AblatedSweepEffect& effect) {
       return effect.calibration ? std::abs(effect.calibration->image_distance_mm -
                                            sweep.calibration.image_distance_mm)
                                 : -1;
     };
     const auto most = std::max_element(
         sweep.effects.begin(), sweep.effects.end(),
-        [&](const SweepEffect& a, const SweepEffect& b) { return moved_mm(a) < moved_mm(b); });
+        [&](const model::AblatedSweepEffect& a, const model::AblatedSweepEffect& b) {
+          return moved_mm(a) < moved_mm(b);
+        });
     if (most != sweep.effects.end() && moved_mm(*most) > 0) {
       html += fmt::format(
           "<p>The calibrated d1 is moved most by {}: {:.2g} µm, beside a standard error of {:.2g} "
@@ -185,26 +185,6 @@ std::string AttributionPage(const Attribution& attribution, const std::string& n
                     "What each effect changes in the frame where it changes most", caption));
   }
   return html + "</main>\n</body>\n</html>\n";
-}
-
-AttributionRun AttributionRunWith(const CommonOptions& common, ProgressLine* progress) {
-  return {common.threads, [progress](int done, int total) {
-            ThrowIfCancelled();
-            progress->Show(done, total);
-          }};
-}
-
-SweepAttribution AttributeSweepOf(const std::string& path,
-                                  const model::SweepSimulationOptions& sweep, bool unknown_offset,
-                                  const AttributionRun& run) {
-  const model::LinearPicture target_picture = io::ReadTargetPicture(sweep.target);
-  try {
-    return AttributeSweep(sweep, target_picture, unknown_offset, run);
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const Error& error) {
-    throw Error(PrintableUtf8(path) + ": " + error.what());
-  }
 }
 
 void WriteAttribution(const Attribution& attribution, const std::string& name,

@@ -4,23 +4,13 @@
 #include <string>
 
 #include "thicklens/base/output_file.h"
-#include "tools/options/command_frame.h"
 #include "tools/report/attribution_table.h"
-#include "tools/system/progress_line.h"
 
 namespace thicklens::tools {
 
 // Makes one self-contained HTML page: the table, and an image of what each effect changes.
 std::string AttributionPage(const Attribution& attribution, const std::string& name,
                             const std::string& version, const std::string& date);
-
-// Makes a run that shows its progress and ends when the user interrupts it.
-AttributionRun AttributionRunWith(const CommonOptions& common, ProgressLine* progress);
-
-// Runs AttributeSweep for a simulation that was read from the file `path`; messages name the file.
-SweepAttribution AttributeSweepOf(const std::string& path,
-                                  const model::SweepSimulationOptions& sweep, bool unknown_offset,
-                                  const AttributionRun& run);
 
 // Writes the page and the machine-readable table into a folder; `name` says what was simulated.
 inline constexpr char kAttributionPage[] = "attribution.html";

@@ -10,10 +10,10 @@ namespace {
 
 constexpr char kNone[] = "-";
 
-double ShiftUm(const SweepAttribution& sweep, const CalibratedValues& values) {
+double ShiftUm(const model::SweepAblation& sweep, const model::CalibratedValues& values) {
   return 1000 * (values.image_distance_mm - sweep.calibration.image_distance_mm);
 }
-double RatioPercent(const SweepAttribution& sweep, const CalibratedValues& values) {
+double RatioPercent(const model::SweepAblation& sweep, const model::CalibratedValues& values) {
   return 100 * (values.blur_ratio / sweep.calibration.blur_ratio - 1);
 }
 
@@ -45,21 +45,22 @@ const Effect* Find(const std::vector<Effect>& effects, model::Effect effect) {
 }
 
 std::vector<std::string> PictureCells(const AttributionRow& row) {
-  const AttributedEffect& effect = row.picture();
+  const model::AblatedEffect& effect = row.picture();
   if (effect.absent) return {kNone, "0", "0", "same", "0"};
-  const PictureChange& change = effect.picture;
+  const model::PictureChange& change = effect.picture;
   return {Amount(change.as_shift_px), Amount(change.rms_grey_levels),
           Amount(change.largest_grey_levels), Psnr(change.psnr_db),
           Amount(effect.bound_grey_levels)};
 }
 
-std::vector<std::string> LightFieldCells(const SceneEffect* row) {
+std::vector<std::string> LightFieldCells(const model::AblatedSceneEffect* row) {
   if (row == nullptr) return {kNone, kNone};
   if (row->absent) return {"0", kNone};
   return {Signed(row->light_field_db, 2), row->ignored_db ? Signed(*row->ignored_db, 2) : kNone};
 }
 
-std::vector<std::string> CalibrationCells(const SweepAttribution& sweep, const SweepEffect* row) {
+std::vector<std::string> CalibrationCells(const model::SweepAblation& sweep,
+                                          const model::AblatedSweepEffect* row) {
   if (row == nullptr) return {kNone, kNone};
   if (row->absent) return {"0", "0"};
   if (!row->calibration) return {"refused", "refused"};
@@ -83,7 +84,7 @@ AttributionTable::Line WithAll(const Attribution& attribution) {
     Append({fmt::format("{:.2f}", attribution.scene->light_field_psnr_db), kNone}, &line.cells);
   }
   if (attribution.sweep) {
-    const CalibratedValues& values = attribution.sweep->calibration;
+    const model::CalibratedValues& values = attribution.sweep->calibration;
     Append({fmt::format("+-{:.2g}", 1000 * values.image_distance_sigma_mm),
             fmt::format("+-{:.2g}", 100 * values.blur_ratio_sigma / values.blur_ratio)},
            &line.cells);
@@ -106,7 +107,7 @@ nlohmann::json Number(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
 }
 
-nlohmann::json PictureJson(const AttributedEffect& effect) {
+nlohmann::json PictureJson(const model::AblatedEffect& effect) {
   nlohmann::json json = {{"name", model::EffectName(effect.effect)},
                          {"absent", effect.absent},
                          {"kept_by_auto", effect.kept_by_auto},
@@ -120,9 +121,9 @@ nlohmann::json PictureJson(const AttributedEffect& effect) {
   return json;
 }
 
-nlohmann::json SceneJson(const SceneAttribution& scene) {
+nlohmann::json SceneJson(const model::SceneAblation& scene) {
   nlohmann::json effects = nlohmann::json::array();
-  for (const SceneEffect& effect : scene.effects) {
+  for (const model::AblatedSceneEffect& effect : scene.effects) {
     nlohmann::json json = PictureJson(effect);
     if (!effect.absent) {
       json["light_field_db"] = Number(effect.light_field_db);
@@ -139,9 +140,9 @@ nlohmann::json SceneJson(const SceneAttribution& scene) {
           {"effects", std::move(effects)}};
 }
 
-nlohmann::json SweepJson(const SweepAttribution& sweep) {
+nlohmann::json SweepJson(const model::SweepAblation& sweep) {
   nlohmann::json effects = nlohmann::json::array();
-  for (const SweepEffect& effect : sweep.effects) {
+  for (const model::AblatedSweepEffect& effect : sweep.effects) {
     nlohmann::json json = PictureJson(effect);
     if (!effect.absent) {
       json["calibration_seconds"] = effect.calibration_seconds;
@@ -153,7 +154,7 @@ nlohmann::json SweepJson(const SweepAttribution& sweep) {
     }
     effects.push_back(std::move(json));
   }
-  const CalibratedValues& values = sweep.calibration;
+  const model::CalibratedValues& values = sweep.calibration;
   return {{"frames", sweep.frames},
           {"image_distance_mm",
            {{"value", values.image_distance_mm},
@@ -240,10 +241,10 @@ AttributionTable TableOf(const Attribution& attribution) {
     if (attribution.scene) Append(LightFieldCells(row.scene), &line.cells);
     if (attribution.sweep) Append(CalibrationCells(*attribution.sweep, row.sweep), &line.cells);
     if (attribution.scene) {
-      Append(SecondsCells(row.scene, &SceneEffect::estimate_seconds), &line.cells);
+      Append(SecondsCells(row.scene, &model::AblatedSceneEffect::estimate_seconds), &line.cells);
     }
     if (attribution.sweep) {
-      Append(SecondsCells(row.sweep, &SweepEffect::calibration_seconds), &line.cells);
+      Append(SecondsCells(row.sweep, &model::AblatedSweepEffect::calibration_seconds), &line.cells);
     }
     line.cells.emplace_back(row.picture().kept_by_auto ? "on" : "off");
     table.lines.push_back(std::move(line));
@@ -261,7 +262,7 @@ std::vector<std::string> AttributionNotes(const Attribution& attribution) {
           "deviation).",
           attribution.scene ? "the picture" : "all frames together")};
   if (attribution.scene) {
-    const SceneAttribution& scene = *attribution.scene;
+    const model::SceneAblation& scene = *attribution.scene;
     notes.push_back(fmt::format(
         "Views: how much better the {}x{} views estimated from the picture are against the true "
         "ones where the effect is not in the world; ignored: where it is in the picture and the "
@@ -275,14 +276,14 @@ std::vector<std::string> AttributionNotes(const Attribution& attribution) {
     }
   }
   if (attribution.sweep) {
-    const SweepAttribution& sweep = *attribution.sweep;
+    const model::SweepAblation& sweep = *attribution.sweep;
     notes.push_back(fmt::format(
         "Calibration from {} frames: d1 = {:.6g} +- {:.2g} mm (truth {:.6g}), kappa = "
         "{:.5g} +- {:.2g} (truth {:.5g}); below, how far they move.",
         sweep.frames, sweep.calibration.image_distance_mm,
         sweep.calibration.image_distance_sigma_mm, sweep.true_image_distance_mm,
         sweep.calibration.blur_ratio, sweep.calibration.blur_ratio_sigma, sweep.true_blur_ratio));
-    for (const SweepEffect& effect : sweep.effects) {
+    for (const model::AblatedSweepEffect& effect : sweep.effects) {
       if (effect.absent || effect.calibration) continue;
       notes.push_back(fmt::format("Without {} there is no calibration: {}.",
                                   model::EffectName(effect.effect), effect.refusal));
@@ -310,7 +311,7 @@ std::string AttributionCsv(const Attribution& attribution) {
       "largest_grey_levels,psnr_db,light_field_db,ignored_db,image_distance_um,"
       "blur_ratio_percent,picture_seconds,estimate_seconds,sweep_seconds,calibration_seconds\n";
   for (const AttributionRow& row : RowsOf(attribution)) {
-    const AttributedEffect& effect = row.picture();
+    const model::AblatedEffect& effect = row.picture();
     text += fmt::format("{},{},{},{},{}", model::EffectName(row.effect),
                         row.scene != nullptr ? "scene" : "sweep", row.absent() ? 1 : 0,
                         effect.kept_by_auto ? 1 : 0, effect.bound_grey_levels);
@@ -319,8 +320,10 @@ std::string AttributionCsv(const Attribution& attribution) {
     };
     text += of_picture(effect.picture.as_shift_px) + of_picture(effect.picture.rms_grey_levels) +
             of_picture(effect.picture.largest_grey_levels) + of_picture(effect.picture.psnr_db);
-    const SceneEffect* scene = row.scene != nullptr && !row.scene->absent ? row.scene : nullptr;
-    const SweepEffect* sweep = row.sweep != nullptr && !row.sweep->absent ? row.sweep : nullptr;
+    const model::AblatedSceneEffect* scene =
+        row.scene != nullptr && !row.scene->absent ? row.scene : nullptr;
+    const model::AblatedSweepEffect* sweep =
+        row.sweep != nullptr && !row.sweep->absent ? row.sweep : nullptr;
     text += scene == nullptr ? ",," : Field(scene->light_field_db) + Field(scene->ignored_db);
     text += sweep == nullptr || !sweep->calibration
                 ? ",,"

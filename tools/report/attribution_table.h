@@ -6,25 +6,26 @@
 #include <string>
 #include <vector>
 
-#include "tools/report/attribution.h"
+#include "thicklens/model/scene_ablation.h"
+#include "thicklens/model/sweep_ablation.h"
 
 namespace thicklens::tools {
 
 // At least one of the two attributions.
 struct Attribution {
-  std::optional<SceneAttribution> scene;
-  std::optional<SweepAttribution> sweep;
+  std::optional<model::SceneAblation> scene;
+  std::optional<model::SweepAblation> sweep;
 };
 
 // One effect in all that was simulated, in the order of the enumeration. A null pointer means that
 // the effect was not part of that simulation.
 struct AttributionRow {
   model::Effect effect = model::Effect::kDefocus;
-  const SceneEffect* scene = nullptr;
-  const SweepEffect* sweep = nullptr;
+  const model::AblatedSceneEffect* scene = nullptr;
+  const model::AblatedSweepEffect* sweep = nullptr;
 
   // The attribution for the scene, or for the sweep's frames if there is no scene.
-  const AttributedEffect& picture() const {
+  const model::AblatedEffect& picture() const {
     if (scene != nullptr) return *scene;
     return *sweep;
   }

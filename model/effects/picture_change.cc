@@ -1,10 +1,10 @@
-#include "tools/report/picture_change.h"
+#include "thicklens/model/picture_change.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 // Rms of the slopes, of full scale per px, of what is the rounding of a flat picture.
@@ -12,8 +12,7 @@ constexpr double kFlat = 1e-4;
 
 }  // namespace
 
-double PictureChangeMeter::Add(const model::StoredValues& reference,
-                               const model::StoredValues& other) {
+double PictureChangeMeter::Add(const StoredValues& reference, const StoredValues& other) {
   double squares = 0;
   for (std::size_t i = 0; i < reference.values.size(); ++i) {
     const double difference = static_cast<double>(other.values[i]) - reference.values[i];
@@ -61,8 +60,7 @@ PictureChange PictureChangeMeter::Result() const {
   return change;
 }
 
-std::vector<float> GreyLevelDifference(const model::StoredValues& reference,
-                                       const model::StoredValues& other) {
+std::vector<float> GreyLevelDifference(const StoredValues& reference, const StoredValues& other) {
   const auto channels = static_cast<std::size_t>(reference.channels);
   std::vector<float> difference(reference.values.size() / channels);
   for (std::size_t i = 0; i < reference.values.size(); ++i) {
@@ -72,4 +70,4 @@ std::vector<float> GreyLevelDifference(const model::StoredValues& reference,
   return difference;
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model

@@ -1,12 +1,12 @@
-#ifndef THICKLENS_TOOLS_REPORT_PICTURE_CHANGE_H_
-#define THICKLENS_TOOLS_REPORT_PICTURE_CHANGE_H_
+#ifndef THICKLENS_MODEL_PICTURE_CHANGE_H_
+#define THICKLENS_MODEL_PICTURE_CHANGE_H_
 
 #include <cstddef>
 #include <vector>
 
 #include "thicklens/model/stored_values.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 
 // Difference between two images, or two sets of images, of stored values in 1/255 of full scale.
 struct PictureChange {
@@ -24,7 +24,7 @@ struct PictureChange {
 class PictureChangeMeter {
  public:
   // Both must have one size and number of channels. Returns the rms of this image, grey levels.
-  double Add(const model::StoredValues& reference, const model::StoredValues& other);
+  double Add(const StoredValues& reference, const StoredValues& other);
   // Adds the sums of another meter.
   void Add(const PictureChangeMeter& other);
   PictureChange Result() const;
@@ -35,9 +35,8 @@ class PictureChangeMeter {
 };
 
 // Returns `other` minus the reference, as the mean of the channels, in grey levels; pixel by pixel.
-std::vector<float> GreyLevelDifference(const model::StoredValues& reference,
-                                       const model::StoredValues& other);
+std::vector<float> GreyLevelDifference(const StoredValues& reference, const StoredValues& other);
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model
 
-#endif  // THICKLENS_TOOLS_REPORT_PICTURE_CHANGE_H_
+#endif  // THICKLENS_MODEL_PICTURE_CHANGE_H_

@@ -1,21 +1,19 @@
+#include "thicklens/model/sweep_ablation.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <functional>
-#include <opencv2/core/mat.hpp>
-#include <optional>
 #include <utility>
+#include <vector>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/parallel.h"
 #include "thicklens/base/stopwatch.h"
-#include "thicklens/calib/calibrate.h"
-#include "thicklens/io/simulated_sweep.h"
 #include "thicklens/model/stored_values.h"
-#include "tools/report/attribution.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 // Frames below that are held, larger sweeps are simulated again where they are looked at.
@@ -41,14 +39,11 @@ class Frames {
 // One simulation of the sweep.
 class SweepWorld {
  public:
-  SweepWorld(const model::SweepSimulationOptions& options,
-             const model::LinearPicture& target_picture, bool unknown_offset,
-             const AttributionRun& run, const std::function<void()>& tell)
+  SweepWorld(const SweepSimulationOptions& options, const LinearPicture& target_picture,
+             const AblationRun& run, const std::function<void()>& tell)
       : start_(Clock::now()),
         options_(options),
         simulator_(options, target_picture),
-        unknown_offset_(unknown_offset),
-        threads_(run.threads),
         tell_(tell),
         stored_(options.frame_count, Pixels() * 2, run.threads,
                 [this](int i) {
@@ -62,74 +57,43 @@ class SweepWorld {
   double Pixels() const {
     return static_cast<double>(options_.camera.sensor.width_px) * options_.camera.sensor.height_px;
   }
-  const model::SweepSimulator& simulator() const { return simulator_; }
+  const SweepSimulator& simulator() const { return simulator_; }
   double seconds() const { return seconds_; }
 
-  model::StoredValues Values(int frame, bool with_noise) const {
+  StoredValues Values(int frame, bool with_noise) const {
     tell_();
-    return with_noise ? model::StoredValuesOf(stored_.At(frame))
-                      : model::StoredValuesOf(simulator_.RenderNoiseless(frame),
-                                              simulator_.camera().sensor.transfer);
+    return with_noise ? StoredValuesOf(stored_.At(frame))
+                      : StoredValuesOf(simulator_.RenderNoiseless(frame),
+                                       simulator_.camera().sensor.transfer);
   }
 
-  calib::Calibration Calibrated() const {
-    model::Camera camera = simulator_.camera();
-    camera.calibration.reset();
-    calib::FocusSweep sweep =
-        calib::MakeFocusSweep(io::DescribeSweep(options_, simulator_, unknown_offset_), camera);
-    sweep.read_frame = [this](std::size_t i) {
-      return io::AsFile(stored_.At(static_cast<int>(i)));
-    };
-    calib::CalibrationOptions options;
-    options.map_field = false;
-    options.threads = threads_;
-    options.progress = [this](int, int) {
-      tell_();
-      return true;
-    };
-    return calib::Calibrate(sweep, options);
+  SweepCalibration Calibrated(const CalibrateSweep& calibrate) const {
+    return calibrate({options_, simulator_, [this](int i) { return stored_.At(i); }, tell_});
   }
 
  private:
   Clock::time_point start_;
-  model::SweepSimulationOptions options_;
-  model::SweepSimulator simulator_;
-  bool unknown_offset_;
-  int threads_;
+  SweepSimulationOptions options_;
+  SweepSimulator simulator_;
   std::function<void()> tell_;
-  Frames<model::StoredPicture> stored_;
+  Frames<StoredPicture> stored_;
   double seconds_;
 };
 
-std::optional<CalibratedValues> ValuesOf(const calib::Calibration& calibration,
-                                         std::string* refusal) {
-  if (calibration.image_distance_mm && calibration.blur_ratio) {
-    return CalibratedValues{calibration.image_distance_mm->value,
-                            calibration.image_distance_mm->sigma, calibration.blur_ratio->value,
-                            calibration.blur_ratio->sigma};
-  }
-  *refusal = calibration.reason;
-  return std::nullopt;
-}
-
-class SweepAttributor {
+class SweepAblator {
  public:
-  SweepAttributor(const model::SweepSimulationOptions& sweep,
-                  const model::LinearPicture& target_picture, bool unknown_offset,
-                  const AttributionRun& run)
-      : sweep_(sweep),
-        target_picture_(target_picture),
-        unknown_offset_(unknown_offset),
-        run_(run) {}
+  SweepAblator(const SweepSimulationOptions& sweep, const LinearPicture& target_picture,
+               const CalibrateSweep& calibrate, const AblationRun& run)
+      : sweep_(sweep), target_picture_(target_picture), calibrate_(calibrate), run_(run) {}
 
-  SweepAttribution Run() {
-    model::SweepSimulationOptions by_auto = sweep_;
-    by_auto.effects.base = model::EffectChoice::Base::kAuto;
-    const model::EffectSet kept = model::SweepSimulator(by_auto, target_picture_).effects().on;
+  SweepAblation Run() {
+    SweepSimulationOptions by_auto = sweep_;
+    by_auto.effects.base = EffectChoice::Base::kAuto;
+    const EffectSet kept = SweepSimulator(by_auto, target_picture_).effects().on;
 
     sweep_.effects = AllInsteadOfAuto(sweep_.effects);
-    const SweepWorld base(sweep_, target_picture_, unknown_offset_, run_, [this] { Tell(); });
-    const model::SweepSimulator& simulator = base.simulator();
+    const SweepWorld base(sweep_, target_picture_, run_, [this] { Tell(); });
+    const SweepSimulator& simulator = base.simulator();
     result_.on = simulator.effects().on;
     total_ = static_cast<int>(result_.on.Effects().size()) + 1;
     result_.frames = sweep_.frame_count;
@@ -137,13 +101,13 @@ class SweepAttributor {
     result_.true_blur_ratio = simulator.truth().blur_ratio;
     result_.picture_seconds = base.seconds();
     CalibrateBase(base);
-    const Frames<model::StoredValues> noiseless(sweep_.frame_count, base.Pixels() * 4, run_.threads,
-                                                [&](int i) { return base.Values(i, false); });
-    for (const model::EffectFinding& finding : simulator.effects().findings) {
+    const Frames<StoredValues> noiseless(sweep_.frame_count, base.Pixels() * 4, run_.threads,
+                                         [&](int i) { return base.Values(i, false); });
+    for (const EffectFinding& finding : simulator.effects().findings) {
       if (!result_.on.Has(finding.effect)) continue;
       ++done_;
       Tell();
-      SweepEffect row;
+      AblatedSweepEffect row;
       row.effect = finding.effect;
       row.bound_grey_levels = finding.impact.grey_levels;
       row.kept_by_auto = kept.Has(finding.effect);
@@ -160,21 +124,20 @@ class SweepAttributor {
 
   void CalibrateBase(const SweepWorld& base) {
     const auto start = Clock::now();
-    std::string refusal;
-    const auto values = ValuesOf(base.Calibrated(), &refusal);
-    if (!values) {
+    const SweepCalibration calibration = base.Calibrated(calibrate_);
+    if (!calibration.values) {
       throw Error("the sweep with all its effects gives no calibration to compare with: " +
-                  refusal);
+                  calibration.refusal);
     }
-    result_.calibration = *values;
+    result_.calibration = *calibration.values;
     result_.calibration_seconds = SecondsSince(start);
   }
 
-  void TakeAway(const SweepWorld& base, const Frames<model::StoredValues>& noiseless,
-                SweepEffect* row) const {
-    model::SweepSimulationOptions options = sweep_;
+  void TakeAway(const SweepWorld& base, const Frames<StoredValues>& noiseless,
+                AblatedSweepEffect* row) const {
+    SweepSimulationOptions options = sweep_;
     options.effects.without.Add(row->effect);
-    const SweepWorld world(options, target_picture_, unknown_offset_, run_, [this] { Tell(); });
+    const SweepWorld world(options, target_picture_, run_, [this] { Tell(); });
     row->picture_seconds = world.seconds();
     Compare(base, noiseless, world, row);
     row->absent = row->picture.nothing() && SameReadings(base, world);
@@ -183,7 +146,9 @@ class SweepAttributor {
       return;
     }
     const auto start = Clock::now();
-    row->calibration = ValuesOf(world.Calibrated(), &row->refusal);
+    SweepCalibration calibration = world.Calibrated(calibrate_);
+    row->calibration = calibration.values;
+    row->refusal = std::move(calibration.refusal);
     row->calibration_seconds = SecondsSince(start);
   }
 
@@ -195,8 +160,8 @@ class SweepAttributor {
         [](const auto& one, const auto& other) { return one.reading_mm == other.reading_mm; });
   }
 
-  void Compare(const SweepWorld& base, const Frames<model::StoredValues>& noiseless,
-               const SweepWorld& world, SweepEffect* row) const {
+  void Compare(const SweepWorld& base, const Frames<StoredValues>& noiseless,
+               const SweepWorld& world, AblatedSweepEffect* row) const {
     const bool with_noise = IsOfStorage(row->effect);
     const auto with = [&](int i) { return with_noise ? base.Values(i, true) : noiseless.At(i); };
     std::vector<PictureChangeMeter> meters(static_cast<std::size_t>(sweep_.frame_count));
@@ -211,7 +176,7 @@ class SweepAttributor {
     if (row->picture.nothing()) return;
     const auto most = std::max_element(rms.begin(), rms.end()) - rms.begin();
     const auto frame = static_cast<int>(most);
-    const model::StoredValues there = with(frame);
+    const StoredValues there = with(frame);
     row->difference = {
         there.width_px, there.height_px,
         GreyLevelDifference(there, world.Values(frame, with_noise)),
@@ -219,20 +184,19 @@ class SweepAttributor {
                     base.simulator().truth().frames[static_cast<std::size_t>(most)].depth_mm)};
   }
 
-  model::SweepSimulationOptions sweep_;
-  const model::LinearPicture& target_picture_;
-  const bool unknown_offset_;
-  const AttributionRun& run_;
+  SweepSimulationOptions sweep_;
+  const LinearPicture& target_picture_;
+  const CalibrateSweep& calibrate_;
+  const AblationRun& run_;
   int done_ = 0, total_ = 1;
-  SweepAttribution result_;
+  SweepAblation result_;
 };
 
 }  // namespace
 
-SweepAttribution AttributeSweep(const model::SweepSimulationOptions& sweep,
-                                const model::LinearPicture& target_picture, bool unknown_offset,
-                                const AttributionRun& run) {
-  return SweepAttributor(sweep, target_picture, unknown_offset, run).Run();
+SweepAblation AblateSweep(const SweepSimulationOptions& sweep, const LinearPicture& target_picture,
+                          const CalibrateSweep& calibrate, const AblationRun& run) {
+  return SweepAblator(sweep, target_picture, calibrate, run).Run();
 }
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::model

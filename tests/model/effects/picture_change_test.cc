@@ -1,5 +1,5 @@
 // How far pictures are apart, against closed forms.
-#include "tools/report/picture_change.h"
+#include "thicklens/model/picture_change.h"
 
 #include <gtest/gtest.h>
 
@@ -7,14 +7,14 @@
 
 #include "support/special_numbers.h"
 
-namespace thicklens::tools {
+namespace thicklens::model {
 namespace {
 
 using thicklens::testing::kPi;
 
 // A product of waves with a period of 16 px, moved to the right and down.
-model::StoredValues Waves(double right_px, double down_px) {
-  model::StoredValues picture{66, 50, 3, {}};  // whole periods inside the outermost pixels
+StoredValues Waves(double right_px, double down_px) {
+  StoredValues picture{66, 50, 3, {}};  // whole periods inside the outermost pixels
   for (int y = 0; y < picture.height_px; ++y) {
     for (int x = 0; x < picture.width_px; ++x) {
       const double light =
@@ -27,7 +27,7 @@ model::StoredValues Waves(double right_px, double down_px) {
   return picture;
 }
 
-PictureChange Change(const model::StoredValues& a, const model::StoredValues& b) {
+PictureChange Change(const StoredValues& a, const StoredValues& b) {
   PictureChangeMeter meter;
   meter.Add(a, b);
   return meter.Result();
@@ -44,9 +44,9 @@ TEST(PictureChangeTest, AShiftIsAShift) {
   }
 }
 
-TEST(PictureChangeTest, RmsLargestAndPsnrAreThoseOfTheDifference) {
-  model::StoredValues dark{4, 3, 1, std::vector<float>(12, 0.25F)};
-  model::StoredValues bright = dark;
+TEST(PictureChangeTest, TellsRmsLargestAndPsnr) {
+  StoredValues dark{4, 3, 1, std::vector<float>(12, 0.25F)};
+  StoredValues bright = dark;
   bright.values[5] += 0.1F;
   const PictureChange change = Change(dark, bright);
   EXPECT_NEAR(change.largest_grey_levels, 25.5, 1e-4);
@@ -70,8 +70,8 @@ TEST(PictureChangeTest, PartsAddUp) {
 }
 
 TEST(PictureChangeTest, DifferencesAreTheMeanOfTheChannels) {
-  const model::StoredValues before{2, 1, 3, {0, 0, 0, 0.5F, 0.5F, 0.5F}};
-  const model::StoredValues after{2, 1, 3, {0.1F, 0, 0.2F, 0.5F, 0.4F, 0.5F}};
+  const StoredValues before{2, 1, 3, {0, 0, 0, 0.5F, 0.5F, 0.5F}};
+  const StoredValues after{2, 1, 3, {0.1F, 0, 0.2F, 0.5F, 0.4F, 0.5F}};
   const std::vector<float> difference = GreyLevelDifference(before, after);
   ASSERT_EQ(difference.size(), 2U);
   EXPECT_NEAR(difference[0], 25.5, 1e-4);
@@ -79,4 +79,4 @@ TEST(PictureChangeTest, DifferencesAreTheMeanOfTheChannels) {
 }
 
 }  // namespace
-}  // namespace thicklens::tools
+}  // namespace thicklens::model

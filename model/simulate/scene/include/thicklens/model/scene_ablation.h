@@ -1,0 +1,61 @@
+#ifndef THICKLENS_MODEL_SCENE_ABLATION_H_
+#define THICKLENS_MODEL_SCENE_ABLATION_H_
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "thicklens/model/ablation.h"
+#include "thicklens/model/camera.h"
+#include "thicklens/model/light_field.h"
+#include "thicklens/model/scene.h"
+#include "thicklens/model/scene_simulator.h"
+
+namespace thicklens::model {
+
+// The ablation of an image of a scene and of the light field that is estimated from it.
+
+struct AblatedSceneEffect : AblatedEffect {
+  // Mean PSNR of the estimated views against the true ones, minus that with all effects, if the
+  // photograph and the scene lack the effect.
+  double light_field_db = 0;
+  // This difference if the photograph has the effect and the estimate ignores it. Absent for
+  // effects that an estimate does not model or cannot leave out. Without defocus the estimate is
+  // the photograph warped by its depth.
+  std::optional<double> ignored_db;
+  double estimate_seconds = 0;
+};
+
+struct SceneAblation {
+  EffectSet on;  // effects of the scene that is the reference
+  int u_count = 0, v_count = 0;
+  double light_field_psnr_db = 0;
+  double picture_seconds = 0, estimate_seconds = 0;
+  double sampling_error_grey_levels = 0;  // rms, where it is largest
+  std::vector<AblatedSceneEffect> effects;
+  StoredPicture picture;
+};
+
+// What an estimate starts from, and the true views at the places of its grid.
+struct SceneToEstimate {
+  const StoredPicture& photograph;
+  const Camera& camera;
+  const RawDepthMap& depth;
+  const LightField& truth;
+  EffectSet on;                // as the estimate models them
+  std::function<void()> tell;  // to be called often; may throw to stop
+};
+// Estimates the views and returns their mean PSNR against the true ones, dB. It is a function of
+// the caller, because the estimator is not part of this module.
+using EstimatedPsnrDb = std::function<double(const SceneToEstimate&)>;
+
+// `pixels` are as in SceneSimulator. The reference is the image with all effects that
+// `scene.effects` does not exclude: auto counts as all. Deterministic effects are judged before
+// noise and rounding. Throws Error as SceneSimulator and the estimate do.
+SceneAblation AblateScene(const SceneSimulationOptions& scene,
+                          const std::vector<LayerPixels>& pixels, const EstimatedPsnrDb& estimate,
+                          const AblationRun& run);
+
+}  // namespace thicklens::model
+
+#endif  // THICKLENS_MODEL_SCENE_ABLATION_H_
