@@ -229,7 +229,7 @@ std::vector<PriceRow> MeasureScene(const BenchAccuracyOptions& options, const Sc
   PriceRow row;
   row.scene = scene.name;
   row.views = views;
-  for (const EstimatePlan& plan : PlansOf(grid)) {
+  for (const estimator::EstimatePlan& plan : PlansOf(grid)) {
     row.plan = plan;
     rows.push_back(row);
   }
@@ -313,23 +313,24 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
                           options.profile_path.empty() ? "" : " where --profile names it"));
   nlohmann::json loads = nlohmann::json::array();
   for (std::size_t i = 0; i < measured.loads.size(); ++i) {
-    const PlanProfile& plan = measured.profile.plans[i];
+    const estimator::PlanProfile& plan = measured.profile.plans[i];
     for (const auto* of_plan : {&measured.loads[i], &measured.checks[i]}) {
-      for (const TimedLoad& timed : *of_plan) {
-        loads.push_back({{"plan", PlanName(plan.plan)},
-                         {"in_the_law", of_plan == &measured.loads[i]},
-                         {"megapixels", timed.load.megapixels},
-                         {"channels", timed.load.channels},
-                         {"views", timed.load.views},
-                         {"blur_sigma_px", timed.load.blur_sigma_px},
-                         {"file_seconds", timed.load.file_seconds},
-                         {"seconds", timed.seconds},
-                         {"parts",
-                          {{"read", timed.parts.read},
-                           {"setup", timed.parts.setup},
-                           {"solve", timed.parts.solve},
-                           {"files", timed.parts.files}}},
-                         {"expected_seconds", timed.parts.read + plan.law.Seconds(timed.load)}});
+      for (const estimator::TimedWorkload& timed : *of_plan) {
+        loads.push_back(
+            {{"plan", estimator::PlanName(plan.plan)},
+             {"in_the_law", of_plan == &measured.loads[i]},
+             {"megapixels", timed.load.megapixels},
+             {"channels", timed.load.channels},
+             {"views", timed.load.views},
+             {"blur_sigma_px", timed.load.blur_sigma_px},
+             {"file_seconds", timed.load.file_seconds},
+             {"seconds", timed.seconds},
+             {"parts",
+              {{"read", timed.parts.read},
+               {"setup", timed.parts.setup},
+               {"solve", timed.parts.solve},
+               {"files", timed.parts.files}}},
+             {"expected_seconds", timed.parts.read + plan.time_model.Seconds(timed.load)}});
       }
     }
   }

@@ -45,7 +45,7 @@ void CutParts(bool full, PartCount count, SampledPicture* picture) {
       static_cast<double>(width_px) * height_px / (static_cast<double>(count) * kPartPx * kPartPx);
 }
 
-PartsRun RunParts(const SampledPicture& picture, const EstimatePlan& plan, int threads,
+PartsRun RunParts(const SampledPicture& picture, const estimator::EstimatePlan& plan, int threads,
                   kernels::Backend* backend) {
   PartsRun run;
   for (const BenchScene& part : picture.parts) {
@@ -64,7 +64,8 @@ PartsRun RunParts(const SampledPicture& picture, const EstimatePlan& plan, int t
   return run;
 }
 
-void WarmUp(const SampledPicture& picture, const EstimatePlan& plan, kernels::Backend* backend) {
+void WarmUp(const SampledPicture& picture, const estimator::EstimatePlan& plan,
+            kernels::Backend* backend) {
   const BenchScene block = PartOf(picture.parts.front(), {0, 0, kSourceBlockPx, kSourceBlockPx});
   RunPlan(plan, block.input, 1, backend);
 }

@@ -49,10 +49,11 @@ struct PartsRun {
   std::optional<double> rcond;   // minimum over the parts
   std::string device;
 };
-PartsRun RunParts(const SampledPicture& picture, const EstimatePlan& plan, int threads,
+PartsRun RunParts(const SampledPicture& picture, const estimator::EstimatePlan& plan, int threads,
                   kernels::Backend* backend);
 // Solves one block, so that one-time work of a device is done before times are measured.
-void WarmUp(const SampledPicture& picture, const EstimatePlan& plan, kernels::Backend* backend);
+void WarmUp(const SampledPicture& picture, const estimator::EstimatePlan& plan,
+            kernels::Backend* backend);
 // Runs a solver of the whole image on one part, so that it is as warm as the solvers of blocks.
 using WholePictureRun = std::function<void(const estimator::EstimateInput&)>;
 void WarmUpWhole(const SampledPicture& picture, const WholePictureRun& run);

@@ -6,7 +6,8 @@
 namespace thicklens::tools {
 namespace {
 
-LightFieldSolver SolverOf(const EstimatePlan& plan, int threads, kernels::Backend* backend) {
+LightFieldSolver SolverOf(const estimator::EstimatePlan& plan, int threads,
+                          kernels::Backend* backend) {
   return {plan.solver, plan.block_solver, plan.solver == "scene" ? plan.prior : "ridge",
           [plan, threads, backend](const estimator::EstimateInput& input) {
             return RunPlan(plan, input, threads, backend).light_field;
@@ -15,24 +16,24 @@ LightFieldSolver SolverOf(const EstimatePlan& plan, int threads, kernels::Backen
 
 }  // namespace
 
-EstimatePlan SourcePlan(estimator::BlockSolver solver) {
-  EstimatePlan plan;
+estimator::EstimatePlan SourcePlan(estimator::BlockSolver solver) {
+  estimator::EstimatePlan plan;
   plan.solver = "blocks";
   plan.block_solver = estimator::BlockSolverName(solver);
   plan.block_px = kSourceBlockPx;
   return plan;
 }
 
-std::vector<EstimatePlan> WholePicturePlans() {
-  std::vector<EstimatePlan> plans;
+std::vector<estimator::EstimatePlan> WholePicturePlans() {
+  std::vector<estimator::EstimatePlan> plans;
   for (const auto prior : {estimator::Prior::kRidge, estimator::Prior::kGradient,
                            estimator::Prior::kTotalVariation, estimator::Prior::kPatches}) {
-    EstimatePlan plan;
+    estimator::EstimatePlan plan;
     plan.prior = estimator::PriorName(prior);
     plans.push_back(plan);
   }
   for (const char* solver : {"functional", "grid"}) {
-    EstimatePlan plan;
+    estimator::EstimatePlan plan;
     plan.solver = solver;
     plans.push_back(plan);
   }
@@ -46,7 +47,7 @@ LightFieldSolver SolverByBlocks(estimator::BlockSolver solver, int threads,
 
 std::vector<LightFieldSolver> WholePictureSolvers(int threads) {
   std::vector<LightFieldSolver> solvers;
-  for (const EstimatePlan& plan : WholePicturePlans()) {
+  for (const estimator::EstimatePlan& plan : WholePicturePlans()) {
     solvers.push_back(SolverOf(plan, threads, nullptr));
   }
   solvers.push_back({"dibr", "", "", [threads](const estimator::EstimateInput& input) {

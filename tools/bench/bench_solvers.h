@@ -13,9 +13,9 @@
 namespace thicklens::tools {
 
 // Returns the plan by blocks of the paper's size, with its gamma of 1.
-EstimatePlan SourcePlan(estimator::BlockSolver solver);
+estimator::EstimatePlan SourcePlan(estimator::BlockSolver solver);
 // Returns the plans for the whole image: scene with each prior, functional, grid.
-std::vector<EstimatePlan> WholePicturePlans();
+std::vector<estimator::EstimatePlan> WholePicturePlans();
 
 // One complete way from photograph and depth to the views. An interrupt stops it.
 struct LightFieldSolver {

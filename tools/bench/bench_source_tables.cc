@@ -48,7 +48,7 @@ SourceContender ByBlocks(SourceRow row, const SourcePicture& picture, BlockSolve
                          int threads, kernels::Backend* backend) {
   row.extrapolated = picture.sample;
   row.block_solver = estimator::BlockSolverName(solver);
-  const EstimatePlan plan = SourcePlan(solver);
+  const estimator::EstimatePlan plan = SourcePlan(solver);
   return {row, [&picture, solver, plan, threads, backend](SourceRow* out) {
             const bool is_first = out->seconds.empty();
             if (is_first) WarmUp(picture, plan, backend);
@@ -105,7 +105,7 @@ SourceContender OfLens(const std::string& lens, const SourcePicture& picture,
   row.extrapolated = parts->sample;
   row.block_solver = estimator::BlockSolverName(estimator::DefaultBlockSolver());
   return {row, [parts, &bench](SourceRow* out) {
-            const EstimatePlan plan = SourcePlan(estimator::DefaultBlockSolver());
+            const estimator::EstimatePlan plan = SourcePlan(estimator::DefaultBlockSolver());
             if (out->seconds.empty()) WarmUp(*parts, plan, bench.processor.get());
             const PartsRun run = RunParts(*parts, plan, bench.threads, bench.processor.get());
             if (!out->seconds.empty()) return run.seconds();

@@ -14,21 +14,21 @@ using estimator::BlockSolver;
 
 class PlanList {
  public:
-  void Add(const EstimatePlan& plan) {
-    const std::string name = PlanName(plan);
-    const bool is_there = std::any_of(plans_.begin(), plans_.end(), [&](const EstimatePlan& other) {
-      return PlanName(other) == name;
-    });
+  void Add(const estimator::EstimatePlan& plan) {
+    const std::string name = estimator::PlanName(plan);
+    const bool is_there = std::any_of(
+        plans_.begin(), plans_.end(),
+        [&](const estimator::EstimatePlan& other) { return estimator::PlanName(other) == name; });
     if (!is_there) plans_.push_back(plan);
   }
-  void AddWithTolerance(EstimatePlan plan, double tolerance) {
+  void AddWithTolerance(estimator::EstimatePlan plan, double tolerance) {
     plan.tolerance = tolerance;
     Add(plan);
   }
-  std::vector<EstimatePlan> Take() { return std::move(plans_); }
+  std::vector<estimator::EstimatePlan> Take() { return std::move(plans_); }
 
  private:
-  std::vector<EstimatePlan> plans_;
+  std::vector<estimator::EstimatePlan> plans_;
 };
 
 // From what can hardly be called solved to what no float can tell from the answer.
@@ -37,10 +37,10 @@ const std::vector<double>& Tolerances() {
   return tolerances;
 }
 
-bool IsScene(const EstimatePlan& plan) { return plan.solver == "scene"; }
+bool IsScene(const estimator::EstimatePlan& plan) { return plan.solver == "scene"; }
 
-std::vector<EstimatePlan> BlockPlans() {
-  std::vector<EstimatePlan> plans;
+std::vector<estimator::EstimatePlan> BlockPlans() {
+  std::vector<estimator::EstimatePlan> plans;
   for (const BlockSolver solver : estimator::BuiltInBlockSolvers()) {
     plans.push_back(SourcePlan(solver));
   }
@@ -49,27 +49,27 @@ std::vector<EstimatePlan> BlockPlans() {
 
 // One choice after the other, all else as it is by itself.
 void AddVariations(bool opencl, PlanList* list) {
-  for (EstimatePlan plan : WholePicturePlans()) {
+  for (estimator::EstimatePlan plan : WholePicturePlans()) {
     const bool is_usual = plan.prior == "tv" || plan.prior == "patches";
     if (IsScene(plan) && !is_usual) continue;
     for (const double tolerance : {0.1, 0.01, 1e-6}) list->AddWithTolerance(plan, tolerance);
-    EstimatePlan changed = plan;
+    estimator::EstimatePlan changed = plan;
     changed.double_precision = true;
     list->Add(changed);
     if (!IsScene(plan) || !opencl) continue;
     plan.on_opencl = true;
     list->Add(plan);
   }
-  for (const EstimatePlan& plan : BlockPlans()) list->Add(plan);
-  const EstimatePlan usual = SourcePlan(estimator::DefaultBlockSolver());
+  for (const estimator::EstimatePlan& plan : BlockPlans()) list->Add(plan);
+  const estimator::EstimatePlan usual = SourcePlan(estimator::DefaultBlockSolver());
   for (const int block_px : {kSourceBlockPx / 2, 2 * kSourceBlockPx}) {
-    EstimatePlan plan = usual;
+    estimator::EstimatePlan plan = usual;
     plan.block_px = block_px;
     list->Add(plan);
   }
   list->AddWithTolerance(SourcePlan(BlockSolver::kCg), 0.01);
   if (opencl) {
-    EstimatePlan plan = usual;
+    estimator::EstimatePlan plan = usual;
     plan.on_opencl = true;
     list->Add(plan);
   }
@@ -77,11 +77,11 @@ void AddVariations(bool opencl, PlanList* list) {
 
 // Each choice with each other.
 void AddProduct(bool opencl, PlanList* list) {
-  for (const EstimatePlan& base : WholePicturePlans()) {
+  for (const estimator::EstimatePlan& base : WholePicturePlans()) {
     for (const bool on_opencl : {false, true}) {
       if (on_opencl && (!IsScene(base) || !opencl)) continue;
       for (const bool double_precision : {false, true}) {
-        EstimatePlan plan = base;
+        estimator::EstimatePlan plan = base;
         plan.on_opencl = on_opencl;
         plan.double_precision = double_precision;
         list->Add(plan);
@@ -89,7 +89,7 @@ void AddProduct(bool opencl, PlanList* list) {
       }
     }
   }
-  for (EstimatePlan plan : BlockPlans()) {
+  for (estimator::EstimatePlan plan : BlockPlans()) {
     const bool is_iterative =
         estimator::IsIterative(estimator::BlockSolverFromName(plan.block_solver));
     for (const int block_px : {kSourceBlockPx / 2, kSourceBlockPx, 2 * kSourceBlockPx}) {
@@ -107,9 +107,9 @@ void AddProduct(bool opencl, PlanList* list) {
 
 }  // namespace
 
-std::vector<EstimatePlan> PlansOf(const PlanGrid& grid) {
+std::vector<estimator::EstimatePlan> PlansOf(const PlanGrid& grid) {
   PlanList list;
-  for (const EstimatePlan& plan : WholePicturePlans()) list.Add(plan);
+  for (const estimator::EstimatePlan& plan : WholePicturePlans()) list.Add(plan);
   if (grid.base_only) return list.Take();
   if (grid.full) {
     AddProduct(grid.opencl, &list);

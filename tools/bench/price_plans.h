@@ -14,7 +14,7 @@ struct PlanGrid {
   bool base_only = false;  // each solver and prior with its defaults only
 };
 // Returns the plans without duplicates.
-std::vector<EstimatePlan> PlansOf(const PlanGrid& grid);
+std::vector<estimator::EstimatePlan> PlansOf(const PlanGrid& grid);
 
 }  // namespace thicklens::tools
 

@@ -15,8 +15,8 @@ namespace thicklens::tools {
 // Cost and accuracy of one plan on one image with one number of views.
 struct PriceRow {
   std::string scene;
-  int views = 0;      // across and down
-  EstimatePlan plan;  // unless it is the baseline
+  int views = 0;                 // across and down
+  estimator::EstimatePlan plan;  // unless it is the baseline
   bool is_warping = false;
   std::string failure;                // why it could not be run; all later fields are then unknown
   std::optional<BlockSample> sample;  // absent: the whole image was run
@@ -33,7 +33,7 @@ struct PriceRow {
   bool on_front = false;
 
   WholeTime time() const { return {seconds, sample.has_value()}; }
-  std::string Name() const { return is_warping ? "warping (DIBR)" : PlanName(plan); }
+  std::string Name() const { return is_warping ? "warping (DIBR)" : estimator::PlanName(plan); }
 };
 
 // Sets on_front among rows of the same scene and views, from the seconds, including extrapolated

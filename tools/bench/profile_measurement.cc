@@ -30,7 +30,7 @@
 #include "tools/bench/bench_scene.h"
 #include "tools/bench/bench_solvers.h"
 #include "tools/options/estimate_input.h"
-#include "tools/options/picture_load.h"
+#include "tools/options/file_seconds.h"
 #include "tools/system/build_info.h"
 #include "tools/system/machine.h"
 #include "tools/system/program_run.h"
@@ -66,8 +66,8 @@ struct Prepared {
 // What was measured of a case.
 struct CaseRuns {
   Prepared prepared;
-  std::vector<std::vector<TimedLoad>> runs;  // of each plan
-  std::vector<double> file_seconds;          // of each round
+  std::vector<std::vector<estimator::TimedWorkload>> runs;  // of each plan
+  std::vector<double> file_seconds;                         // of each round
 };
 
 model::StoredPicture FirstChannel(const model::StoredPicture& picture) {
@@ -128,7 +128,7 @@ double PsnrDb(const Prepared& prepared, const model::LightField& estimate, int t
 
 // The summary of a run of its own process.
 nlohmann::json RunOnce(const std::string& program, const Prepared& prepared,
-                       const EstimatePlan& plan) {
+                       const estimator::EstimatePlan& plan) {
   const EstimateOptions& options = prepared.options;
   std::vector<std::string> words = {"estimate",
                                     kPicture,
@@ -164,10 +164,10 @@ nlohmann::json RunOnce(const std::string& program, const Prepared& prepared,
   return summary;
 }
 
-TimedLoad Timed(const PictureLoad& load, const nlohmann::json& seconds) {
+estimator::TimedWorkload Timed(const estimator::Workload& load, const nlohmann::json& seconds) {
   const auto of = [&](const char* part) { return seconds.at(part).get<double>(); };
   // Parts are measured one by one: rounding may put them above the whole.
-  PartSeconds parts;
+  estimator::PartSeconds parts;
   double left = of("total");
   const auto take = [&left](double part) {
     part = std::clamp(part, 0.0, left);
@@ -182,10 +182,12 @@ TimedLoad Timed(const PictureLoad& load, const nlohmann::json& seconds) {
 }
 
 // By the whole time, and of two the slower. One run, so that its parts are of that time.
-TimedLoad MiddleRun(std::vector<TimedLoad> runs) {
+estimator::TimedWorkload MiddleRun(std::vector<estimator::TimedWorkload> runs) {
   const auto middle = runs.begin() + static_cast<std::ptrdiff_t>(runs.size() / 2);
   std::nth_element(runs.begin(), middle, runs.end(),
-                   [](const TimedLoad& a, const TimedLoad& b) { return a.seconds < b.seconds; });
+                   [](const estimator::TimedWorkload& a, const estimator::TimedWorkload& b) {
+                     return a.seconds < b.seconds;
+                   });
   return *middle;
 }
 
@@ -197,23 +199,23 @@ std::pair<double, double> ErrorsOf(std::vector<double> ratios) {
 
 // Plans of one solver differ in what they solve alone.
 void FitLaws(MeasuredProfile* measured) {
-  std::vector<PlanProfile>& plans = measured->profile.plans;
+  std::vector<estimator::PlanProfile>& plans = measured->profile.plans;
   std::map<std::string, std::vector<std::size_t>> of_solver;
   for (std::size_t i = 0; i < plans.size(); ++i) of_solver[plans[i].plan.solver].push_back(i);
   for (const auto& [solver, members] : of_solver) {
-    TimesOfPlans times;
+    estimator::TimesOfPlans times;
     for (const std::size_t i : members) times.push_back(measured->loads[i]);
-    const std::vector<TimeLaw> laws = FitTimeLaws(times);
-    const std::vector<std::vector<double>> ratios = LeftOutRatios(times);
+    const std::vector<estimator::TimeModel> models = estimator::FitTimeModels(times);
+    const std::vector<std::vector<double>> ratios = estimator::LeftOutRatios(times);
     for (std::size_t k = 0; k < members.size(); ++k) {
-      PlanProfile& plan = plans[members[k]];
-      plan.law = laws[k];
+      estimator::PlanProfile& plan = plans[members[k]];
+      plan.time_model = models[k];
       std::tie(plan.median_error, plan.largest_error) = ErrorsOf(ratios[k]);
     }
   }
 }
 
-void TakeLarger(const PictureLoad& load, PictureLoad* largest) {
+void TakeLarger(const estimator::Workload& load, estimator::Workload* largest) {
   largest->megapixels = std::max(largest->megapixels, load.megapixels);
   largest->channels = std::max(largest->channels, load.channels);
   largest->views = std::max(largest->views, load.views);
@@ -240,9 +242,9 @@ const std::vector<ProfileCase>& UsualProfileCases() {
   return cases;
 }
 
-std::vector<EstimatePlan> PlansOfProfile() {
-  std::vector<EstimatePlan> plans;
-  for (EstimatePlan plan : WholePicturePlans()) {
+std::vector<estimator::EstimatePlan> PlansOfProfile() {
+  std::vector<estimator::EstimatePlan> plans;
+  for (estimator::EstimatePlan plan : WholePicturePlans()) {
     if (plan.solver == "grid") continue;
     plans.push_back(plan);
     if (plan.prior == "ridge" || plan.prior == "gradient") continue;
@@ -252,11 +254,12 @@ std::vector<EstimatePlan> PlansOfProfile() {
   return plans;
 }
 
-MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const ProfileRun& run) {
+MeasuredProfile MeasureProfile(const std::vector<estimator::EstimatePlan>& plans,
+                               const ProfileRun& run) {
   const OnlyErrors silence;
   const TemporaryFolder folder("profile");
   MeasuredProfile measured;
-  EstimateProfile& profile = measured.profile;
+  estimator::EstimateProfile& profile = measured.profile;
   profile.processor = ProcessorName();
   profile.date = NowIso8601();
   profile.build = BuildInfo();
@@ -266,7 +269,7 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
   profile.from = "this run";
   measured.loads.resize(plans.size());
   measured.checks.resize(plans.size());
-  for (const EstimatePlan& plan : plans) {
+  for (const estimator::EstimatePlan& plan : plans) {
     profile.plans.emplace_back();
     profile.plans.back().plan = plan;
   }
@@ -293,7 +296,7 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
   for (int round = 0; round < run.repeat; ++round) {
     for (CaseRuns& of_case : cases) {
       const Prepared& prepared = of_case.prepared;
-      const PictureLoad load = PictureLoadOf(PrepareEstimate(prepared.options).input);
+      const estimator::Workload load = MeasuredWorkload(PrepareEstimate(prepared.options).input);
       of_case.file_seconds.push_back(load.file_seconds);
       for (std::size_t i = 0; i < plans.size(); ++i) {
         if (run.progress) run.progress(done++, total);
@@ -311,36 +314,37 @@ MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const Pro
   for (std::size_t c = 0; c < cases.size(); ++c) {
     const bool is_check = run.cases[c].use == ProfileCase::Use::kCheck;
     for (std::size_t i = 0; i < plans.size(); ++i) {
-      TimedLoad middle = MiddleRun(std::move(cases[c].runs[i]));
+      estimator::TimedWorkload middle = MiddleRun(std::move(cases[c].runs[i]));
       middle.load.file_seconds = Median(cases[c].file_seconds);
       if (!is_check) TakeLarger(middle.load, &profile.largest);
       (is_check ? measured.checks : measured.loads)[i].push_back(middle);
     }
   }
   profile.warping_psnr_db /= judged;
-  for (PlanProfile& plan : profile.plans) plan.psnr_db /= judged;
+  for (estimator::PlanProfile& plan : profile.plans) plan.psnr_db /= judged;
   FitLaws(&measured);
   return measured;
 }
 
 std::string ProfileTable(const MeasuredProfile& measured) {
-  const EstimateProfile& profile = measured.profile;
+  const estimator::EstimateProfile& profile = measured.profile;
   // For people to compare: a picture of a common size, that takes to encode what these do.
-  const auto millions = [](const PictureLoad& load) {
+  const auto millions = [](const estimator::Workload& load) {
     return load.megapixels * load.channels * load.views;
   };
-  PictureLoad usual{0.64 * 0.48, 3, 49, 2, 0};
+  estimator::Workload usual{0.64 * 0.48, 3, 49, 2, 0};
   std::vector<double> encode_seconds;
-  for (const TimedLoad& timed : measured.loads.front()) {
+  for (const estimator::TimedWorkload& timed : measured.loads.front()) {
     encode_seconds.push_back(timed.load.file_seconds / millions(timed.load));
   }
   usual.file_seconds = Median(encode_seconds) * millions(usual);
   std::string text = fmt::format("{:<32}{:>10}{:>10}{:>14}{:>18}{:>16}\n", "", "PSNR dB", "loss dB",
                                  "seconds at K", "law's error: mid", "largest");
-  for (const PlanProfile& plan : profile.plans) {
+  for (const estimator::PlanProfile& plan : profile.plans) {
     text += fmt::format("{:<32}{:>10.2f}{:>10.2f}{:>14.3g}{:>16.0f} %{:>14.0f} %\n",
-                        PlanName(plan.plan), plan.psnr_db, profile.LossDb(plan),
-                        plan.law.Seconds(usual), 100 * plan.median_error, 100 * plan.largest_error);
+                        estimator::PlanName(plan.plan), plan.psnr_db, profile.LossDb(plan),
+                        plan.time_model.Seconds(usual), 100 * plan.median_error,
+                        100 * plan.largest_error);
   }
   text += fmt::format(
       "{:<32}{:>10.2f}{:>10.2f}\n\n"
@@ -353,12 +357,12 @@ std::string ProfileTable(const MeasuredProfile& measured) {
   text += "Larger pictures than any of these, as the law foresaw them:\n";
   std::vector<double> ratios;
   for (std::size_t i = 0; i < profile.plans.size(); ++i) {
-    for (const TimedLoad& check : measured.checks[i]) {
-      const double expected = check.parts.read + profile.plans[i].law.Seconds(check.load);
+    for (const estimator::TimedWorkload& check : measured.checks[i]) {
+      const double expected = check.parts.read + profile.plans[i].time_model.Seconds(check.load);
       text += fmt::format(
           "{:<32}{:.2f} megapixels, {} channel(s), {} views: {:.2f} s expected, {:.2f} s taken "
           "({:+.0f} %)\n",
-          PlanName(profile.plans[i].plan), check.load.megapixels, check.load.channels,
+          estimator::PlanName(profile.plans[i].plan), check.load.megapixels, check.load.channels,
           check.load.views, expected, check.seconds, 100 * (check.seconds / expected - 1));
       ratios.push_back(check.seconds / expected);
     }

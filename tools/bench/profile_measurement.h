@@ -10,13 +10,13 @@
 
 namespace thicklens::tools {
 
-// A simulated image that separates the terms of the law.
+// A simulated image that separates the terms of the time model.
 struct ProfileCase {
   enum class Use {
-    kTime,  // a point of the law
+    kTime,  // a point of the time model
     // also judged: simulating the true views of large images takes longer than everything else
     kTimeAndViews,
-    kCheck,  // larger than the images of the other uses, to check the law
+    kCheck,  // larger than the images of the other uses, to check the time model
   };
   int size_px = 0;
   int views = 0;  // across and down
@@ -38,10 +38,10 @@ struct ProfileRun {
 
 // A profile, and the measurements that it was made from.
 struct MeasuredProfile {
-  EstimateProfile profile;
-  std::vector<std::vector<TimedLoad>> loads;  // one list for each plan
-  // Images that are larger than all in `loads`, to check the law.
-  std::vector<std::vector<TimedLoad>> checks;
+  estimator::EstimateProfile profile;
+  std::vector<std::vector<estimator::TimedWorkload>> loads;  // one list for each plan
+  // Images that are larger than all in `loads`, to check the time model.
+  std::vector<std::vector<estimator::TimedWorkload>> checks;
   int judged = 0;  // number of judged loads
 };
 
@@ -50,11 +50,12 @@ struct MeasuredProfile {
 // known: slanted planes, and cards in front of a wall. Each run is a process of its own, as for a
 // user: a process that has run before already holds memory, and getting it takes a good part of the
 // time of a small image. Throws Error.
-MeasuredProfile MeasureProfile(const std::vector<EstimatePlan>& plans, const ProfileRun& run);
+MeasuredProfile MeasureProfile(const std::vector<estimator::EstimatePlan>& plans,
+                               const ProfileRun& run);
 
 // Returns the plans that are worth a choice: by the list of `bench accuracy`, grid and blocks cost
 // many times as much and give less.
-std::vector<EstimatePlan> PlansOfProfile();
+std::vector<estimator::EstimatePlan> PlansOfProfile();
 
 std::string ProfileTable(const MeasuredProfile& measured);
 

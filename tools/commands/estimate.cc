@@ -35,8 +35,9 @@
 #include "tools/options/estimate_options.h"
 #include "tools/options/estimate_plan.h"
 #include "tools/options/estimate_profile.h"
-#include "tools/options/picture_load.h"
+#include "tools/options/file_seconds.h"
 #include "tools/options/plan_choice.h"
+#include "tools/options/quality_target_options.h"
 #include "tools/report/estimate_records.h"
 #include "tools/report/estimate_summary.h"
 #include "tools/report/light_field_page.h"
@@ -193,18 +194,21 @@ void SolveFunctional(const EstimateOptions& options, const estimator::EstimateIn
 
 // Chooses by the profile, scaled by the present speed of this machine if the profile was made on
 // another one or for other threads. The time since `start` is spent already.
-PlanChoice ChoosePlanHere(const EstimateOptions& options, const estimator::EstimateInput& input,
-                          Clock::time_point start) {
-  const EstimateProfile profile = ProfileFor(options.profile_path);
+estimator::PlanChoice ChoosePlanHere(const EstimateOptions& options,
+                                     const estimator::EstimateInput& input,
+                                     Clock::time_point start) {
+  const estimator::EstimateProfile profile = ProfileFor(options.profile_path);
   const int threads = ResolveThreads(options.common.threads);
   const double speed_ratio =
-      profile.IsFromHere(threads) ? 1 : ProbeSeconds(threads) / profile.probe_seconds;
-  PictureLoad load = PictureLoadOf(input);
+      IsFromHere(profile, threads) ? 1 : ProbeSeconds(threads) / profile.probe_seconds;
+  estimator::Workload load = MeasuredWorkload(input);
   spdlog::debug("plan: blur of {:.3g} px (sigma, rms), {:.3g} s for the files on one thread",
                 load.blur_sigma_px, load.file_seconds);
   // The model of the time knows how the profile's threads share the files.
   load.file_seconds *= static_cast<double>(profile.threads) / threads;
-  PlanChoice choice = ChoosePlan(profile, options.wish, load, speed_ratio, SecondsSince(start));
+  estimator::PlanChoice choice = estimator::ChoosePlan(profile, options.quality_target,
+                                                       QualityTargetText(options.quality_target),
+                                                       load, speed_ratio, SecondsSince(start));
   // Options whose time the model does not include.
   std::vector<std::string> besides;
   if (!options.report_folder.empty()) besides.emplace_back("--report");
@@ -342,8 +346,8 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   };
   PreparedEstimate prepared = PrepareEstimate(options);
   ThrowIfCancelled();
-  std::optional<PlanChoice> choice;
-  if (options.wish.IsMade()) {
+  std::optional<estimator::PlanChoice> choice;
+  if (options.quality_target.has_value()) {
     choice = ChoosePlanHere(options, prepared.input, start);
     spdlog::info("{}", PrintableUtf8(choice->message));
     ApplyPlan(choice->plan, &options);
@@ -382,7 +386,7 @@ CommandResult RunEstimate(const EstimateOptions& given) {
   std::string text = EstimateText(prepared, outcome, result.summary);
   result.summary["plan"] = nullptr;
   if (choice) {
-    result.summary["plan"] = ChoiceJson(*choice, options.wish, outcome.seconds.total);
+    result.summary["plan"] = ChoiceJson(*choice, options.quality_target, outcome.seconds.total);
     text += ChoiceText(*choice, outcome.seconds.total);
   }
   const std::vector<std::string> warnings = EstimateWarnings(options, prepared, outcome);

@@ -12,6 +12,7 @@
 #include "thicklens/base/error.h"
 #include "tools/options/light_field_effects.h"
 #include "tools/options/option_values.h"
+#include "tools/options/quality_target_options.h"
 
 namespace thicklens::tools {
 namespace {
@@ -307,7 +308,7 @@ void AddEstimateOptions(CLI::App* command, EstimateOptions* options) {
   AddIterationOptions(command, options);
   AddFunctionalOptions(command, options);
   AddBlockOptions(command, options);
-  AddPlanWishOptions(command, &options->wish);
+  AddQualityTargetOptions(command, &options->quality_target);
   command
       ->add_option("--profile", options->profile_path,
                    "Profile for --quality, --within and --psnr-loss, as bench accuracy "
@@ -363,7 +364,7 @@ void CheckEstimateUsage(const EstimateOptions& options) {
         "--aperture-shape and --aperture-of state the shape of the aperture; without the effect "
         "aperture-shape it is Gaussian");
   CheckSolverUsage(options);
-  needs(!options.profile_path.empty(), options.wish.IsMade(),
+  needs(!options.profile_path.empty(), options.quality_target.has_value(),
         "--profile is only used by --quality, --within or --psnr-loss, and none of them is given");
   RequireBesideLightField("--report", options.report_folder, options);
   RequireBesideLightField("--checkpoint", options.checkpoint_path, options);

@@ -10,11 +10,11 @@
 #include "thicklens/estimator/block_solver.h"
 #include "thicklens/estimator/blur_check.h"
 #include "thicklens/estimator/functional_solver.h"
+#include "thicklens/estimator/plan_choice.h"
 #include "thicklens/estimator/scene_solver.h"
 #include "tools/options/command_frame.h"
 #include "tools/options/effect_options.h"
 #include "tools/options/light_field_options.h"
-#include "tools/options/plan_wish.h"
 
 namespace thicklens::tools {
 
@@ -50,9 +50,9 @@ struct EstimateOptions {
   std::optional<double> gamma, ridge;
   std::optional<int> block_px;
   std::string checkpoint_path;
-  // A wish that replaces the options above; a profile chooses them (empty path: the user's own
+  // A target that replaces the options above; a profile chooses them (empty path: the user's own
   // profile, or the default profile of the program).
-  PlanWish wish;
+  estimator::QualityTarget quality_target;
   std::string profile_path;
 
   bool by_blocks() const { return solver == "blocks"; }

@@ -54,18 +54,7 @@ std::optional<Value> OptionalFieldOf(const json& fields, const char* name,
 
 }  // namespace
 
-std::string PlanName(const EstimatePlan& plan) {
-  std::string name = plan.solver;
-  if (!plan.prior.empty()) name += " " + plan.prior;
-  if (!plan.block_solver.empty()) name += " " + plan.block_solver;
-  if (plan.block_px) name += fmt::format(" {} px", *plan.block_px);
-  if (plan.tolerance) name += fmt::format(", tolerance {:g}", *plan.tolerance);
-  if (plan.double_precision) name += ", double";
-  if (plan.on_opencl) name += ", opencl";
-  return name;
-}
-
-std::vector<std::string> PlanWords(const EstimatePlan& plan) {
+std::vector<std::string> PlanWords(const estimator::EstimatePlan& plan) {
   std::vector<std::string> words = {"--solver", plan.solver};
   const auto add = [&words](const char* option, const std::string& value) {
     words.insert(words.end(), {option, value});
@@ -83,11 +72,11 @@ std::vector<std::string> PlanWords(const EstimatePlan& plan) {
   return words;
 }
 
-std::string PlanArguments(const EstimatePlan& plan) {
+std::string PlanArguments(const estimator::EstimatePlan& plan) {
   return fmt::format("{}", fmt::join(PlanWords(plan), " "));
 }
 
-json PlanJson(const EstimatePlan& plan) {
+json PlanJson(const estimator::EstimatePlan& plan) {
   const auto or_null = [](const auto& value) { return value ? json(*value) : json(); };
   const auto name_or_null = [](const std::string& name) {
     return name.empty() ? json() : json(name);
@@ -101,11 +90,11 @@ json PlanJson(const EstimatePlan& plan) {
           {"device", plan.on_opencl ? "opencl" : "cpu"}};
 }
 
-EstimatePlan PlanFromJson(const json& fields, const std::string& where) {
+estimator::EstimatePlan PlanFromJson(const json& fields, const std::string& where) {
   if (!fields.is_object()) {
     throw Error(fmt::format("{}: a plan's fields are expected, found {}", where, fields.dump()));
   }
-  EstimatePlan plan;
+  estimator::EstimatePlan plan;
   plan.solver = FieldOf<std::string>(fields, "solver", where);
   plan.prior = OptionalFieldOf<std::string>(fields, "prior", where).value_or("");
   plan.block_solver = OptionalFieldOf<std::string>(fields, "block_solver", where).value_or("");
@@ -140,7 +129,7 @@ EstimatePlan PlanFromJson(const json& fields, const std::string& where) {
   return plan;
 }
 
-void ApplyPlan(const EstimatePlan& plan, EstimateOptions* options) {
+void ApplyPlan(const estimator::EstimatePlan& plan, EstimateOptions* options) {
   const auto given = [](const std::string& name) {
     return name.empty() ? std::nullopt : std::optional<std::string>(name);
   };
@@ -155,8 +144,8 @@ void ApplyPlan(const EstimatePlan& plan, EstimateOptions* options) {
   options->device = plan.on_opencl ? "opencl" : processor;
 }
 
-PlanRun RunPlan(const EstimatePlan& plan, const estimator::EstimateInput& input, int threads,
-                kernels::Backend* backend) {
+PlanRun RunPlan(const estimator::EstimatePlan& plan, const estimator::EstimateInput& input,
+                int threads, kernels::Backend* backend) {
   EstimateOptions options;
   ApplyPlan(plan, &options);
   options.common.threads = threads;

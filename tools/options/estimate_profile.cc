@@ -9,10 +9,13 @@
 #include <limits>
 #include <memory>
 #include <system_error>
+#include <vector>
 
 #include "thicklens/base/error.h"
 #include "thicklens/base/input_file.h"
 #include "thicklens/base/stopwatch.h"
+#include "thicklens/estimator/estimate_input.h"
+#include "tools/options/estimate_plan.h"
 #include "tools/system/build_info.h"
 #include "tools/system/machine.h"
 
@@ -60,22 +63,22 @@ std::string TextOf(const json& fields, const char* name, const std::string& wher
   return found.get<std::string>();
 }
 
-TimeLaw LawOf(const json& fields, const std::string& where) {
+estimator::TimeModel TimeModelOf(const json& fields, const std::string& where) {
   const json& found = Field(fields, "seconds", where);
-  TimeLaw::Terms terms;
+  estimator::TimeModel::Terms terms;
   const auto is_term = [](const json& term) { return term.is_number() && term.get<double>() >= 0; };
-  if (!found.is_array() || found.size() != TimeLaw::kTerms ||
+  if (!found.is_array() || found.size() != estimator::TimeModel::kTerms ||
       !std::all_of(found.begin(), found.end(), is_term)) {
     throw Error(fmt::format("{}: seconds: {} numbers of at least 0 are expected, found {}", where,
-                            TimeLaw::kTerms, found.dump()));
+                            estimator::TimeModel::kTerms, found.dump()));
   }
-  for (int i = 0; i < TimeLaw::kTerms; ++i) {
+  for (int i = 0; i < estimator::TimeModel::kTerms; ++i) {
     terms[i] = found[static_cast<std::size_t>(i)].get<double>();
   }
-  return TimeLaw(terms);
+  return estimator::TimeModel(terms);
 }
 
-EstimateProfile Parse(const std::string& text, const std::string& where) {
+estimator::EstimateProfile Parse(const std::string& text, const std::string& where) {
   const json fields = json::parse(text, nullptr, false);
   if (!fields.is_object()) {
     throw Error(
@@ -87,7 +90,7 @@ EstimateProfile Parse(const std::string& text, const std::string& where) {
     throw Error(fmt::format("{}: schema: '{}' is expected, found {}", where, kSchema,
                             fields["schema"].dump()));
   }
-  EstimateProfile profile;
+  estimator::EstimateProfile profile;
   profile.from = where;
   profile.processor = TextOf(fields, "processor", where);
   profile.date = TextOf(fields, "date", where);
@@ -110,9 +113,9 @@ EstimateProfile Parse(const std::string& text, const std::string& where) {
   }
   for (std::size_t i = 0; i < plans.size(); ++i) {
     const std::string of_plan = fmt::format("{}: plans[{}]", where, i);
-    PlanProfile plan;
+    estimator::PlanProfile plan;
     plan.plan = PlanFromJson(Field(plans[i], "plan", of_plan), of_plan);
-    plan.law = LawOf(plans[i], of_plan);
+    plan.time_model = TimeModelOf(plans[i], of_plan);
     plan.median_error = NumberOf(plans[i], "median_error", 0, of_plan);
     plan.largest_error = NumberOf(plans[i], "largest_error", 0, of_plan);
     plan.psnr_db = NumberOf(plans[i], "psnr_db", 0, of_plan);
@@ -123,22 +126,16 @@ EstimateProfile Parse(const std::string& text, const std::string& where) {
 
 }  // namespace
 
-double EstimateProfile::best_psnr_db() const {
-  return std::max_element(
-             plans.begin(), plans.end(),
-             [](const PlanProfile& a, const PlanProfile& b) { return a.psnr_db < b.psnr_db; })
-      ->psnr_db;
+bool IsFromHere(const estimator::EstimateProfile& profile, int threads_here) {
+  const std::string processor_here = ProcessorName();
+  return processor_here != kUnknownProcessor &&
+         profile.WasMeasuredBy(BuildInfo(), processor_here, threads_here);
 }
 
-bool EstimateProfile::IsFromHere(int threads_here) const {
-  return is_own && processor != kUnknownProcessor && processor == ProcessorName() &&
-         build == BuildInfo() && threads == threads_here;
-}
-
-json ProfileJson(const EstimateProfile& profile) {
+json ProfileJson(const estimator::EstimateProfile& profile) {
   json plans = json::array();
-  for (const PlanProfile& plan : profile.plans) {
-    const TimeLaw::Terms& terms = plan.law.coefficients();
+  for (const estimator::PlanProfile& plan : profile.plans) {
+    const estimator::TimeModel::Terms& terms = plan.time_model.coefficients();
     plans.push_back({{"plan", PlanJson(plan.plan)},
                      {"seconds", std::vector<double>(terms.data(), terms.data() + terms.size())},
                      {"median_error", plan.median_error},
@@ -161,13 +158,15 @@ json ProfileJson(const EstimateProfile& profile) {
           {"plans", plans}};
 }
 
-EstimateProfile ReadProfile(const std::string& path) {
-  EstimateProfile profile = Parse(ReadTextFile(path), path);
+estimator::EstimateProfile ReadProfile(const std::string& path) {
+  estimator::EstimateProfile profile = Parse(ReadTextFile(path), path);
   profile.is_own = true;
   return profile;
 }
 
-EstimateProfile DefaultProfile() { return Parse(DefaultProfileText(), "the profile that ships"); }
+estimator::EstimateProfile DefaultProfile() {
+  return Parse(DefaultProfileText(), "the profile that ships");
+}
 
 std::string UserProfilePath() {
   const auto folder = [](const char* variable) -> std::filesystem::path {
@@ -181,7 +180,7 @@ std::string UserProfilePath() {
   return config.empty() ? "" : (config / "thicklens" / "profile.json").string();
 }
 
-EstimateProfile ProfileFor(const std::string& path) {
+estimator::EstimateProfile ProfileFor(const std::string& path) {
   if (!path.empty()) return ReadProfile(path);
   const std::string own = UserProfilePath();
   std::error_code unreachable;

@@ -2,140 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <iterator>
-#include <vector>
-
-#include "thicklens/base/error.h"
+#include "tools/options/estimate_plan.h"
+#include "tools/options/quality_target_options.h"
 
 namespace thicklens::tools {
-namespace {
 
-// The shares of the best plan's gain over warping.
-constexpr double kDraftShare = 0.5, kStandardShare = 0.9;
-
-struct Offer {
-  const PlanProfile* plan = nullptr;
-  double seconds = 0, loss_db = 0;
-};
-
-bool IsFaster(const Offer& a, const Offer& b) { return a.seconds < b.seconds; }
-bool IsBetter(const Offer& a, const Offer& b) {
-  return a.loss_db < b.loss_db || (a.loss_db == b.loss_db && a.seconds < b.seconds);
+nlohmann::json ChoiceJson(const estimator::PlanChoice& choice,
+                          const estimator::QualityTarget& target, double seconds) {
+  return {{"asked", QualityTargetText(target)},      {"plan", PlanJson(choice.plan)},
+          {"arguments", PlanArguments(choice.plan)}, {"expected_seconds", choice.expected_seconds},
+          {"expected_error", choice.median_error},   {"seconds", seconds},
+          {"expected_loss_db", choice.loss_db},      {"speed_ratio", choice.speed_ratio}};
 }
 
-std::string OfferText(const Offer& offer) {
-  return fmt::format("{} ({:.2g} s, {:.2f} dB below the best)", PlanName(offer.plan->plan),
-                     offer.seconds, offer.loss_db);
-}
-
-[[noreturn]] void Refuse(const PlanWish& wish, const EstimateProfile& profile,
-                         const std::string& nearest) {
-  throw Error(
-      fmt::format("{} cannot be met by any plan of {}: {}", wish.Text(), profile.from, nearest));
-}
-
-Offer Choose(const EstimateProfile& profile, const PlanWish& wish,
-             const std::vector<Offer>& offers) {
-  const auto fastest_with_loss = [&](double loss_db) {
-    std::vector<Offer> good;
-    std::copy_if(offers.begin(), offers.end(), std::back_inserter(good),
-                 [&](const Offer& offer) { return offer.loss_db <= loss_db; });
-    return *std::min_element(good.begin(), good.end(), IsFaster);  // the best loses nothing
-  };
-  const double gain_db = std::max(0.0, profile.best_psnr_db() - profile.warping_psnr_db);
-  if (wish.quality == "draft") return fastest_with_loss((1 - kDraftShare) * gain_db);
-  if (wish.quality == "standard") return fastest_with_loss((1 - kStandardShare) * gain_db);
-  if (wish.quality == "best") return *std::min_element(offers.begin(), offers.end(), IsBetter);
-
-  if (wish.psnr_loss_db) {
-    const Offer fastest = fastest_with_loss(*wish.psnr_loss_db);
-    if (!wish.within_s || fastest.seconds <= *wish.within_s) return fastest;
-  }
-  std::vector<Offer> soon;
-  std::copy_if(offers.begin(), offers.end(), std::back_inserter(soon),
-               [&](const Offer& offer) { return offer.seconds <= *wish.within_s; });
-  if (soon.empty()) {
-    const Offer fastest = *std::min_element(offers.begin(), offers.end(), IsFaster);
-    Refuse(wish, profile,
-           fmt::format(
-               "the fastest plan is {}; fewer --views or a smaller picture (--crop) take less time",
-               OfferText(fastest)));
-  }
-  const Offer best = *std::min_element(soon.begin(), soon.end(), IsBetter);
-  if (!wish.psnr_loss_db) return best;
-  Refuse(wish, profile,
-         fmt::format("in that time the best plan is {}; the fastest plan of that quality is {}",
-                     OfferText(best), OfferText(fastest_with_loss(*wish.psnr_loss_db))));
-}
-
-// Lists in which respects the prediction extrapolates far beyond the measurements.
-std::vector<std::string> BeyondProfile(const EstimateProfile& profile, const PictureLoad& load) {
-  constexpr double kFar = 2;
-  std::vector<std::string> beyond;
-  const auto look = [&](double value, double most, const std::string& what) {
-    if (value > kFar * most) {
-      beyond.push_back(
-          fmt::format("far beyond its {1} of {2:.2g} with {0:.2g}", value, what, most));
-    }
-  };
-  look(load.megapixels, profile.largest.megapixels, "megapixels");
-  look(load.views, profile.largest.views, "views");
-  look(load.blur_sigma_px, profile.largest.blur_sigma_px, "blur sigma in px");
-  return beyond;
-}
-
-}  // namespace
-
-PlanChoice ChoosePlan(const EstimateProfile& profile, const PlanWish& wish, const PictureLoad& load,
-                      double speed_ratio, double spent_seconds) {
-  std::vector<Offer> offers;
-  // The time for the files was measured on this machine.
-  PictureLoad there = load;
-  there.file_seconds /= speed_ratio;
-  for (const PlanProfile& plan : profile.plans) {
-    offers.push_back(
-        {&plan, spent_seconds + speed_ratio * plan.law.Seconds(there), profile.LossDb(plan)});
-  }
-  const Offer chosen = Choose(profile, wish, offers);
-  const Offer best = *std::min_element(offers.begin(), offers.end(), IsBetter);
-  PlanChoice choice;
-  choice.plan = chosen.plan->plan;
-  choice.expected_seconds = chosen.seconds;
-  choice.loss_db = chosen.loss_db;
-  choice.median_error = chosen.plan->median_error;
-  choice.speed_ratio = speed_ratio;
-  choice.message = fmt::format("{}: {}, about {:.2g} s (+- {:.0f} %)", wish.Text(),
-                               PlanName(choice.plan), chosen.seconds, 100 * choice.median_error);
-  if (chosen.plan == best.plan) {
-    choice.message += "; the best of its plans";
-  } else if (chosen.loss_db < 0.005) {
-    choice.message +=
-        fmt::format("; as good as {} ({:.2g} s)", PlanName(best.plan->plan), best.seconds);
-  } else {
-    choice.message += fmt::format("; {:.2f} dB below {} ({:.2g} s)", chosen.loss_db,
-                                  PlanName(best.plan->plan), best.seconds);
-  }
-  choice.message += "; from " + profile.from;
-  if (speed_ratio != 1) {
-    choice.message += fmt::format(", scaled by {:.2g} after a speed test (rough)", speed_ratio);
-  }
-  for (const std::string& beyond : BeyondProfile(profile, load)) choice.message += ", " + beyond;
-  return choice;
-}
-
-nlohmann::json ChoiceJson(const PlanChoice& choice, const PlanWish& wish, double seconds) {
-  return {{"asked", wish.Text()},
-          {"plan", PlanJson(choice.plan)},
-          {"arguments", PlanArguments(choice.plan)},
-          {"expected_seconds", choice.expected_seconds},
-          {"expected_error", choice.median_error},
-          {"seconds", seconds},
-          {"expected_loss_db", choice.loss_db},
-          {"speed_ratio", choice.speed_ratio}};
-}
-
-std::string ChoiceText(const PlanChoice& choice, double seconds) {
+std::string ChoiceText(const estimator::PlanChoice& choice, double seconds) {
   return fmt::format("plan         {}: {:.2g} s expected, {:.2g} s taken ({:+.0f} %)\n",
                      PlanArguments(choice.plan), choice.expected_seconds, seconds,
                      100 * (seconds / choice.expected_seconds - 1));

@@ -256,8 +256,8 @@ Requirement ViewsAreAll(const HardPicture& shape, double radiance, double limit)
 }
 
 std::vector<Way> EveryWay(const HardMachine& machine) {
-  std::vector<EstimatePlan> plans;
-  for (const EstimatePlan& plan : WholePicturePlans()) {
+  std::vector<estimator::EstimatePlan> plans;
+  for (const estimator::EstimatePlan& plan : WholePicturePlans()) {
     for (const bool on_opencl : {false, true}) {
       const bool is_usual = plan.prior == "tv" || plan.prior == "patches";
       if (on_opencl && (plan.solver != "scene" || !is_usual || !machine.opencl)) continue;
@@ -280,7 +280,7 @@ std::vector<Way> EveryWay(const HardMachine& machine) {
     if (!machine.every_way && !is_default && solver != estimator::BlockSolver::kCg) continue;
     for (const bool on_opencl : {false, true}) {
       if (on_opencl && (!is_default || !machine.opencl)) continue;
-      EstimatePlan plan;
+      estimator::EstimatePlan plan;
       plan.solver = "blocks";
       plan.block_solver = estimator::BlockSolverName(solver);
       plan.on_opencl = on_opencl;
@@ -288,7 +288,7 @@ std::vector<Way> EveryWay(const HardMachine& machine) {
     }
   }
   std::vector<Way> ways;
-  for (const EstimatePlan& plan : plans) {
+  for (const estimator::EstimatePlan& plan : plans) {
     Way way;
     way.arguments = Words(PlanArguments(plan));
     way.solver = plan.solver;

@@ -153,7 +153,8 @@ TEST(PlansOf, NamesNoPlanTwiceAndFullHasThemAll) {
   full.full = true;
   const auto names = [](const PlanGrid& grid) {
     std::vector<std::string> found;
-    for (const EstimatePlan& plan : PlansOf(grid)) found.push_back(PlanName(plan));
+    for (const estimator::EstimatePlan& plan : PlansOf(grid))
+      found.push_back(estimator::PlanName(plan));
     std::sort(found.begin(), found.end());
     EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
     return found;

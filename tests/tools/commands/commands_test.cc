@@ -22,6 +22,7 @@ int EndOfACommand(bool is_written) {
   CommonOptions options;
   options.json_path = folder / "summary.json";
   CatchSignals();
+  const CancelScope scope(ProgramToken());
   try {
     RunCommand(options, [is_written] {
       std::raise(SIGINT);

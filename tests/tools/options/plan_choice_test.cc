@@ -1,4 +1,4 @@
-// What estimate chooses for a wish, and the profile that it chooses by.
+// The profile that estimate chooses a plan by, and the words about its choice.
 #include "tools/options/plan_choice.h"
 
 #include <gmock/gmock.h>
@@ -12,12 +12,15 @@
 #include <string>
 #include <vector>
 
+#include "support/sample_profile.h"
 #include "support/temporary_folder.h"
 #include "thicklens/base/error.h"
 #include "thicklens/base/output_file.h"
 #include "tools/bench/bench_machine.h"
 #include "tools/bench/profile_measurement.h"
+#include "tools/options/estimate_plan.h"
 #include "tools/options/estimate_profile.h"
+#include "tools/options/quality_target_options.h"
 #include "tools/support/child_process.h"
 #include "tools/system/build_info.h"
 #include "tools/system/machine.h"
@@ -30,107 +33,19 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
+using thicklens::testing::kSampleWorkload;
+using thicklens::testing::SamplePlan;
+using thicklens::testing::SampleProfile;
 using thicklens::testing::TemporaryFolder;
 
-constexpr PictureLoad kLoad{1, 1, 25, 1, 0};
-
-PlanProfile ProfileOf(const std::string& prior, double seconds, double psnr_db) {
-  PlanProfile plan;
-  plan.plan.prior = prior;
-  TimeLaw::Terms terms = TimeLaw::Terms::Zero();
-  terms[TimeLaw::kPixels] = seconds;
-  plan.law = TimeLaw(terms);
-  plan.psnr_db = psnr_db;
-  plan.median_error = 0.1;
-  return plan;
+TEST(QualityTargetText, IsAsTyped) {
+  EXPECT_EQ(QualityTargetText({"best", {}, {}}), "--quality best");
+  EXPECT_EQ(QualityTargetText({"", 3.0, 1.0}), "--within 3s --psnr-loss 1dB");
 }
 
-// Warping 30 dB, the best 40 dB.
-EstimateProfile SomeProfile() {
-  EstimateProfile profile;
-  profile.from = "a test's profile";
-  profile.processor = "a machine";
-  profile.date = "2026-01-01T00:00:00Z";
-  profile.build = "a build";
-  profile.threads = 4;
-  profile.runs = 3;
-  profile.probe_seconds = 0.1;
-  profile.warping_psnr_db = 30;
-  profile.largest = {1, 3, 81, 3, 0};
-  profile.plans = {ProfileOf("ridge", 1, 34.9), ProfileOf("gradient", 2, 35.5),
-                   ProfileOf("tv", 4, 39.2), ProfileOf("patches", 8, 40)};
-  return profile;
-}
-
-std::string ChosenFor(const PlanWish& wish, double speed_ratio = 1) {
-  return ChoosePlan(SomeProfile(), wish, kLoad, speed_ratio).plan.prior;
-}
-PlanWish Quality(const std::string& name) { return {name, {}, {}}; }
-PlanWish Within(double seconds) { return {"", seconds, {}}; }
-PlanWish Loss(double db) { return {"", {}, db}; }
-
-TEST(ChoosePlan, TakesTheFastestThatGainsEnough) {
-  EXPECT_EQ(ChosenFor(Quality("draft")), "gradient");  // ridge gains 4.9 dB of 10
-  EXPECT_EQ(ChosenFor(Quality("standard")), "tv");
-  EXPECT_EQ(ChosenFor(Quality("best")), "patches");
-}
-
-TEST(ChoosePlan, TakesTheBestThatIsDoneByThen) {
-  EXPECT_EQ(ChosenFor(Within(1)), "ridge");
-  EXPECT_EQ(ChosenFor(Within(7.9)), "tv");
-  EXPECT_EQ(ChosenFor(Within(100)), "patches");
-  EXPECT_EQ(ChosenFor(Within(100), 20), "tv");  // on a machine that takes twenty times as long
-}
-
-TEST(ChoosePlan, TakesTheFastestThatLosesNoMore) {
-  EXPECT_EQ(ChosenFor(Loss(0)), "patches");
-  EXPECT_EQ(ChosenFor(Loss(0.8)), "tv");
-  EXPECT_EQ(ChosenFor(Loss(50)), "ridge");
-  EXPECT_EQ(ChosenFor({"", 4.0, 1.0}), "tv");
-}
-
-// What reading and the probe took is over by then.
-TEST(ChoosePlan, CountsWhatIsSpent) {
-  EXPECT_EQ(ChoosePlan(SomeProfile(), Within(4.2), kLoad, 1, 0.1).plan.prior, "tv");
-  EXPECT_EQ(ChoosePlan(SomeProfile(), Within(4.2), kLoad, 1, 0.3).plan.prior, "gradient");
-  EXPECT_NEAR(ChoosePlan(SomeProfile(), Loss(0), kLoad, 2, 0.3).expected_seconds, 16.3, 1e-9);
-}
-
-TEST(ChoosePlan, RefusesWithTheNearest) {
-  const auto refusal = [](const PlanWish& wish) {
-    try {
-      ChosenFor(wish);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string("no refusal");
-  };
-  EXPECT_THAT(refusal(Within(0.5)),
-              AllOf(StartsWith("--within 0.5s cannot be met"), HasSubstr("scene ridge (1 s")));
-  EXPECT_THAT(refusal({"", 3.0, 1.0}),
-              AllOf(HasSubstr("--within 3s --psnr-loss 1dB"),
-                    HasSubstr("scene gradient (2 s, 4.50"), HasSubstr("scene tv (4 s, 0.80")));
-}
-
-TEST(ChoosePlan, SaysInOneLineWhatItCostsAndGivesUp) {
-  const PlanChoice choice = ChoosePlan(SomeProfile(), Quality("standard"), kLoad, 2);
-  EXPECT_DOUBLE_EQ(choice.expected_seconds, 8);
-  EXPECT_NEAR(choice.loss_db, 0.8, 1e-9);
-  EXPECT_EQ(choice.message,
-            "--quality standard: scene tv, about 8 s (+- 10 %); 0.80 dB below scene patches "
-            "(16 s); from a test's profile, scaled by 2 after a speed test (rough)");
-  const PlanChoice best = ChoosePlan(SomeProfile(), Quality("best"), kLoad, 1);
-  EXPECT_EQ(
-      best.message,
-      "--quality best: scene patches, about 8 s (+- 10 %); the best of its plans; from a test's "
-      "profile");
-  PictureLoad large = kLoad;
-  large.megapixels = 12;
-  large.blur_sigma_px = 7;
-  EXPECT_THAT(
-      ChoosePlan(SomeProfile(), Quality("best"), large, 1).message,
-      AllOf(HasSubstr("far beyond its megapixels of 1 with 12"),
-            HasSubstr("far beyond its blur sigma in px of 3 with 7"), Not(HasSubstr("views"))));
+TEST(ChoiceText, HoldsTheTimeAgainstWhatWasExpected) {
+  const estimator::PlanChoice choice =
+      estimator::ChoosePlan(SampleProfile(), {"standard", {}, {}}, "", kSampleWorkload, 2);
   EXPECT_THAT(ChoiceText(choice, 10), HasSubstr("8 s expected, 10 s taken (+25 %)"));
 }
 
@@ -171,7 +86,7 @@ TEST(Profile, IsLookedForWhereAPersonsSettingsAre) {
     EXPECT_EQ(UserProfilePath(), folder / "config/thicklens/profile.json");
     EXPECT_FALSE(ProfileFor("").is_own);  // there is none
     std::filesystem::create_directories(folder / "config/thicklens");
-    std::ofstream(UserProfilePath()) << ProfileJson(SomeProfile()).dump();
+    std::ofstream(UserProfilePath()) << ProfileJson(SampleProfile()).dump();
     EXPECT_EQ(ProfileFor("").from, UserProfilePath());
     EXPECT_THROW(ProfileFor(folder / "none.json"), Error);
     std::ofstream(UserProfilePath()) << "nonsense";
@@ -190,31 +105,17 @@ TEST(Profile, IsLookedForWhereAPersonsSettingsAre) {
   EXPECT_FALSE(ProfileFor("").is_own);
 }
 
-// Files are timed here, all else there.
-TEST(ChoosePlan, TakesTheTimeOfFilesAsItIsHere) {
-  EstimateProfile profile = SomeProfile();
-  for (PlanProfile& plan : profile.plans) {
-    TimeLaw::Terms terms = plan.law.coefficients();
-    terms[TimeLaw::kFileSeconds] = 0.5;
-    plan.law = TimeLaw(terms);
-  }
-  PictureLoad load = kLoad;
-  load.file_seconds = 6;
-  EXPECT_DOUBLE_EQ(ChoosePlan(profile, Quality("best"), load, 1).expected_seconds, 8 + 3);
-  EXPECT_DOUBLE_EQ(ChoosePlan(profile, Quality("best"), load, 4).expected_seconds, 32 + 3);
-}
-
 TEST(Profile, IsOfThisMachineIfAllOfItIs) {
-  EstimateProfile profile = SomeProfile();
+  estimator::EstimateProfile profile = SampleProfile();
   profile.processor = ProcessorName();
   profile.build = BuildInfo();
   profile.threads = 2;
   profile.is_own = true;
-  EXPECT_EQ(profile.IsFromHere(2), ProcessorName() != kUnknownProcessor);
-  EXPECT_FALSE(profile.IsFromHere(1));
+  EXPECT_EQ(IsFromHere(profile, 2), ProcessorName() != kUnknownProcessor);
+  EXPECT_FALSE(IsFromHere(profile, 1));
   profile.build += " and more";
-  EXPECT_FALSE(profile.IsFromHere(2));
-  EXPECT_FALSE(DefaultProfile().IsFromHere(DefaultProfile().threads));
+  EXPECT_FALSE(IsFromHere(profile, 2));
+  EXPECT_FALSE(IsFromHere(DefaultProfile(), DefaultProfile().threads));
 }
 
 // From files to files, on pictures so small that all takes seconds.
@@ -233,14 +134,14 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
     EXPECT_LT(done, total);
     ++told;
   };
-  EstimatePlan ridge, tv;
+  estimator::EstimatePlan ridge, tv;
   ridge.prior = "ridge";
   tv.prior = "tv";
   const MeasuredProfile measured = MeasureProfile({ridge, tv}, run);
   EXPECT_EQ(told, 4 + 16);
   EXPECT_EQ(measured.judged, 2);
   EXPECT_EQ(measured.profile.runs, 2);
-  for (const TimedLoad& timed : measured.loads[0]) {
+  for (const estimator::TimedWorkload& timed : measured.loads[0]) {
     EXPECT_GT(timed.parts.read, 0);
     EXPECT_GT(timed.parts.setup, 0);
     EXPECT_GT(timed.parts.solve, 0);
@@ -252,13 +153,14 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
   ASSERT_EQ(measured.loads.size(), 2U);
   EXPECT_EQ(measured.loads[0].size(), 3U);
   EXPECT_EQ(measured.checks[1].size(), 1U);
-  const EstimateProfile& profile = measured.profile;
+  const estimator::EstimateProfile& profile = measured.profile;
   EXPECT_NEAR(profile.largest.megapixels, 0.009216, 1e-9);  // the check is not in it
   EXPECT_EQ(profile.largest.views, 9);
   EXPECT_GT(profile.best_psnr_db(), profile.warping_psnr_db);
   const TemporaryFolder folder;
-  const EstimateProfile read = ReadProfile(Written(folder, ProfileJson(profile)));
-  EXPECT_NEAR(read.plans[1].law.Seconds(kLoad), profile.plans[1].law.Seconds(kLoad), 1e-9);
+  const estimator::EstimateProfile read = ReadProfile(Written(folder, ProfileJson(profile)));
+  EXPECT_NEAR(read.plans[1].time_model.Seconds(kSampleWorkload),
+              profile.plans[1].time_model.Seconds(kSampleWorkload), 1e-9);
   EXPECT_THAT(ProfileTable(measured), AllOf(HasSubstr("scene ridge"), HasSubstr("0.01 megapixels, "
                                                                                 "1 channel(s)")));
   run.progress = [](int, int) { throw Error("stop"); };
@@ -277,7 +179,7 @@ TEST(MeasureProfile, GivesWhatEstimateCanChooseBy) {
 TEST(MeasureProfile, AMissingTemporaryFolderIsReported) {
   const Environment nowhere("TMPDIR", "/no/such/folder");
   try {
-    MeasureProfile({EstimatePlan()}, ProfileRun());
+    MeasureProfile({estimator::EstimatePlan()}, ProfileRun());
     ADD_FAILURE() << "no refusal";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("TMPDIR: no folder for temporary files can be created in "
@@ -287,21 +189,22 @@ TEST(MeasureProfile, AMissingTemporaryFolderIsReported) {
 
 TEST(Profile, IsReadAsItWasWritten) {
   const TemporaryFolder folder;
-  const EstimateProfile profile = SomeProfile();
-  const EstimateProfile read = ReadProfile(Written(folder, ProfileJson(profile)));
+  const estimator::EstimateProfile profile = SampleProfile();
+  const estimator::EstimateProfile read = ReadProfile(Written(folder, ProfileJson(profile)));
   EXPECT_EQ(ProfileJson(read), ProfileJson(profile));
   EXPECT_EQ(read.from, folder / "profile.json");
 }
 
 TEST(Profile, OneShipsAndHasSomethingForEverybody) {
-  const EstimateProfile profile = DefaultProfile();
+  const estimator::EstimateProfile profile = DefaultProfile();
   EXPECT_GE(profile.plans.size(), 4U);
   EXPECT_GT(profile.best_psnr_db(), profile.warping_psnr_db + 1);
-  for (const PlanProfile& plan : profile.plans) {
-    EXPECT_GT(plan.law.Seconds(kLoad), 0) << PlanName(plan.plan);
+  for (const estimator::PlanProfile& plan : profile.plans) {
+    EXPECT_GT(plan.time_model.Seconds(kSampleWorkload), 0) << estimator::PlanName(plan.plan);
   }
   const auto seconds_of = [&](const std::string& quality) {
-    return ChoosePlan(profile, Quality(quality), kLoad, 1).expected_seconds;
+    return estimator::ChoosePlan(profile, {quality, {}, {}}, quality, kSampleWorkload, 1)
+        .expected_seconds;
   };
   EXPECT_LE(seconds_of("draft"), seconds_of("standard"));
   EXPECT_LE(seconds_of("standard"), seconds_of("best"));
@@ -317,7 +220,7 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
     }
     return std::string("no refusal");
   };
-  const json good = ProfileJson(SomeProfile());
+  const json good = ProfileJson(SampleProfile());
   EXPECT_EQ(refusal(good), "no refusal");
   const auto with = [&](const std::string& pointer, const json& value) {
     json changed = good;
@@ -345,10 +248,10 @@ TEST(Profile, IsRefusedByNameOfFileAndField) {
 }
 
 // The program: a picture of the demo's size.
-class EstimateWish : public ::testing::Test {
+class EstimateTarget : public ::testing::Test {
  protected:
   // A person's own profile is none of the test's.
-  EstimateWish() : config_("XDG_CONFIG_HOME", (folder_ / "config").c_str()) {
+  EstimateTarget() : config_("XDG_CONFIG_HOME", (folder_ / "config").c_str()) {
     ChildProgram simulate({"simulate", "picture", THICKLENS_SOURCE_DIR "/configs/scenes/demo.yaml",
                            "-o", folder_ / "scene", "--quiet"},
                           folder_.path(), 0);
@@ -382,8 +285,8 @@ class EstimateWish : public ::testing::Test {
   Environment config_;
 };
 
-TEST_F(EstimateWish, IsTakenFromTheProfileAndHeldAgainstWhatItTook) {
-  const std::string profile = Written(folder_, ProfileJson(SomeProfile()));
+TEST_F(EstimateTarget, IsTakenFromTheProfileAndHeldAgainstWhatItTook) {
+  const std::string profile = Written(folder_, ProfileJson(SampleProfile()));
   const ProgramResult result = Estimate({"--quality", "draft", "--profile", profile});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("--quality draft: scene gradient, about"));
@@ -396,9 +299,9 @@ TEST_F(EstimateWish, IsTakenFromTheProfileAndHeldAgainstWhatItTook) {
 }
 
 // The law of this profile says that nothing but reading takes any time.
-TEST_F(EstimateWish, CountsReading) {
-  EstimateProfile profile = SomeProfile();
-  profile.plans = {ProfileOf("ridge", 1e-12, 40)};
+TEST_F(EstimateTarget, CountsReading) {
+  estimator::EstimateProfile profile = SampleProfile();
+  profile.plans = {SamplePlan("ridge", 1e-12, 40)};
   // Of this machine, so that no probe is needed.
   profile.processor = ProcessorName();
   profile.build = BuildInfo();
@@ -411,7 +314,7 @@ TEST_F(EstimateWish, CountsReading) {
   EXPECT_GE(Summary()["plan"]["expected_seconds"].get<double>(), 0.5 * read);
 }
 
-TEST_F(EstimateWish, ThatCannotBeMetLeavesNothingBehind) {
+TEST_F(EstimateTarget, ThatCannotBeMetLeavesNothingBehind) {
   const ProgramResult result = Estimate({"--within", "1e-6s"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("--within 1e-06s cannot be met"));
@@ -419,7 +322,7 @@ TEST_F(EstimateWish, ThatCannotBeMetLeavesNothingBehind) {
   EXPECT_EQ(Summary()["status"], "refused");
 }
 
-TEST_F(EstimateWish, ExcludesWhatItChooses) {
+TEST_F(EstimateTarget, ExcludesWhatItChooses) {
   const std::vector<std::vector<std::string>> wrong = {
       {"--quality", "draft", "--solver", "grid"},
       {"--within", "2s", "--prior", "tv"},
@@ -438,7 +341,7 @@ TEST_F(EstimateWish, ExcludesWhatItChooses) {
   }
 }
 
-TEST_F(EstimateWish, WithoutOneIsNoPlan) {
+TEST_F(EstimateTarget, WithoutOneIsNoPlan) {
   ASSERT_EQ(Estimate({}).exit_code, 0);
   EXPECT_TRUE(Summary()["plan"].is_null());
 }

@@ -1,13 +1,15 @@
-#ifndef THICKLENS_TOOLS_OPTIONS_TIME_LAW_H_
-#define THICKLENS_TOOLS_OPTIONS_TIME_LAW_H_
+#ifndef THICKLENS_ESTIMATOR_TIME_MODEL_H_
+#define THICKLENS_ESTIMATOR_TIME_MODEL_H_
 
 #include <Eigen/Core>
 #include <vector>
 
-namespace thicklens::tools {
+#include "thicklens/estimator/estimate_input.h"
+
+namespace thicklens::estimator {
 
 // Quantities known before an estimate that determine its time.
-struct PictureLoad {
+struct Workload {
   double megapixels = 0;
   int channels = 1;
   int views = 0;             // U V
@@ -18,22 +20,26 @@ struct PictureLoad {
 
 // Parts of the seconds of a run. The rest of the whole is making the views, and the end.
 struct PartSeconds {
-  // of the files, until the plan is chosen; it has passed by then and is in no law
+  // of the files, until the plan is chosen; it has passed by then and is in no model
   double read = 0;
   double setup = 0;  // geometry
   double solve = 0;  // depends on the plan alone; all other parts are equal for plans of one kind
   double files = 0;  // writing the views
 };
 
-struct TimedLoad {
-  PictureLoad load;
+// Returns the properties of a photograph, its depth and its views that determine how long an
+// estimate takes. `file_seconds` is measured by the caller.
+Workload WorkloadOf(const EstimateInput& input, double file_seconds);
+
+struct TimedWorkload {
+  Workload load;
   double seconds = 0;  // of the whole run, > 0
   PartSeconds parts;   // none below 0; their sum is at most the whole
 };
 
 // Seconds of a run from the start of reading its files [D120], as a sum of terms, none of them
 // negative. Pixels are in millions.
-class TimeLaw {
+class TimeModel {
  public:
   // The terms are in the order of the profile's file, whose schema changes with it. s is the blur's
   // sigma in px.
@@ -55,10 +61,10 @@ class TimeLaw {
   static constexpr int kTerms = kPixelsViewsBlurArea + 1;
   using Terms = Eigen::Matrix<double, kTerms, 1>;
 
-  TimeLaw() : coefficients_(Terms::Zero()) {}
-  explicit TimeLaw(const Terms& coefficients) : coefficients_(coefficients) {}
+  TimeModel() : coefficients_(Terms::Zero()) {}
+  explicit TimeModel(const Terms& coefficients) : coefficients_(coefficients) {}
 
-  double Seconds(const PictureLoad& load) const;
+  double Seconds(const Workload& load) const;
   const Terms& coefficients() const { return coefficients_; }
 
  private:
@@ -66,20 +72,20 @@ class TimeLaw {
 };
 
 // Times of plans on the same images in the same order. The plans differ only in what they solve.
-using TimesOfPlans = std::vector<std::vector<TimedLoad>>;
+using TimesOfPlans = std::vector<std::vector<TimedWorkload>>;
 
-// Fits a law for each plan. It is the sum of a law for each part of a run, with only the terms that
-// such work has, because a few images cannot separate all terms. The common parts of the plans are
-// fitted to the mean of all plans, so that noise does not separate plans where the images do not.
-// Each law has the least sum of squared errors, relative to the whole time, with no coefficient
-// below 0. Throws Error for fewer than two images, times that are not above 0, parts that do not
-// fit their times, or plans with different images.
-std::vector<TimeLaw> FitTimeLaws(const TimesOfPlans& plans);
+// Fits a model for each plan. It is the sum of a model for each part of a run, with only the terms
+// that such work has, because a few images cannot separate all terms. The common parts of the plans
+// are fitted to the mean of all plans, so that noise does not separate plans where the images do
+// not. Each model has the least sum of squared errors, relative to the whole time, with no
+// coefficient below 0. Throws Error for fewer than two images, times that are not above 0, parts
+// that do not fit their times, or plans with different images.
+std::vector<TimeModel> FitTimeModels(const TimesOfPlans& plans);
 
 // Returns for each plan and image the ratio of predicted to measured time. The prediction is made
-// when the image has been read, by the law from the images of all other sizes.
+// when the image has been read, by the model from the images of all other sizes.
 std::vector<std::vector<double>> LeftOutRatios(const TimesOfPlans& plans);
 
-}  // namespace thicklens::tools
+}  // namespace thicklens::estimator
 
-#endif  // THICKLENS_TOOLS_OPTIONS_TIME_LAW_H_
+#endif  // THICKLENS_ESTIMATOR_TIME_MODEL_H_

@@ -1,9 +1,10 @@
-#include "tools/options/plan_wish.h"
+#include "tools/options/quality_target_options.h"
 
 #include <fmt/format.h>
 
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <system_error>
 
 namespace thicklens::tools {
@@ -38,19 +39,19 @@ CLI::Option* AddNumberWithUnit(CLI::App* command, const std::string& name, const
 
 }  // namespace
 
-std::string PlanWish::Text() const {
+std::string QualityTargetText(const estimator::QualityTarget& target) {
   std::string text;
   const auto add = [&](const std::string& option) { text += (text.empty() ? "" : " ") + option; };
-  if (!quality.empty()) add("--quality " + quality);
-  if (within_s) add(fmt::format("--within {:g}s", *within_s));
-  if (psnr_loss_db) add(fmt::format("--psnr-loss {:g}dB", *psnr_loss_db));
+  if (!target.quality.empty()) add("--quality " + target.quality);
+  if (target.within_s) add(fmt::format("--within {:g}s", *target.within_s));
+  if (target.psnr_loss_db) add(fmt::format("--psnr-loss {:g}dB", *target.psnr_loss_db));
   return text;
 }
 
-void AddPlanWishOptions(CLI::App* command, PlanWish* wish) {
+void AddQualityTargetOptions(CLI::App* command, estimator::QualityTarget* target) {
   CLI::Option* quality =
       command
-          ->add_option("--quality", wish->quality,
+          ->add_option("--quality", target->quality,
                        "Choose the solver by quality. draft: the fastest plan with half of the "
                        "gain of the best plan over warping; standard: nine tenths; best")
           ->check(CLI::IsMember({"draft", "standard", "best"}))
@@ -58,12 +59,12 @@ void AddPlanWishOptions(CLI::App* command, PlanWish* wish) {
   CLI::Option* within = AddNumberWithUnit(command, "--within", "s", "2s",
                                           "Choose the most accurate solver that is expected to "
                                           "finish in that time, including reading and writing",
-                                          &wish->within_s);
+                                          &target->within_s);
   CLI::Option* loss =
       AddNumberWithUnit(command, "--psnr-loss", "dB", "0.1dB",
                         "Choose the fastest solver that is expected to lose no more PSNR than this "
                         "against the best one; can be combined with --within",
-                        &wish->psnr_loss_db);
+                        &target->psnr_loss_db);
   quality->excludes(within)->excludes(loss);
   for (const char* chosen : {"--solver", "--prior", "--strength", "--check-blur", "--tolerance",
                              "--max-iterations", "--double", "--gamma", "--ridge", "--block-solver",

@@ -1,0 +1,27 @@
+#ifndef THICKLENS_ESTIMATOR_ESTIMATE_PLAN_H_
+#define THICKLENS_ESTIMATOR_ESTIMATE_PLAN_H_
+
+#include <optional>
+#include <string>
+
+namespace thicklens::estimator {
+
+// One way to a light field: what determines how it is computed, but not what is
+// computed.
+struct EstimatePlan {
+  std::string solver = "scene";
+  std::string prior;                // solver scene only; otherwise empty
+  std::string block_solver;         // solver blocks only; otherwise empty
+  std::optional<double> tolerance;  // absent: the solver's default
+  bool double_precision = false;
+  std::optional<int> block_px;
+  bool on_opencl = false;
+};
+
+// Returns a unique name, as a user would type it: "scene tv", "scene tv, tolerance 0.01", "blocks
+// umfpack 16 px".
+std::string PlanName(const EstimatePlan& plan);
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_ESTIMATE_PLAN_H_

@@ -1,0 +1,46 @@
+#ifndef THICKLENS_ESTIMATOR_ESTIMATE_PROFILE_H_
+#define THICKLENS_ESTIMATOR_ESTIMATE_PROFILE_H_
+
+#include <string>
+#include <vector>
+
+#include "thicklens/estimator/estimate_plan.h"
+#include "thicklens/estimator/time_model.h"
+
+namespace thicklens::estimator {
+
+// Measurements of one plan.
+struct PlanProfile {
+  EstimatePlan plan;
+  TimeModel time_model;
+  // Relative errors of the times that the model predicts, including the reading time, for images of
+  // sizes that the model was not made from: the median and the maximum.
+  double median_error = 0, largest_error = 0;
+  double psnr_db = 0;  // of the true views, mean over scenes and views
+};
+
+// The plans to choose from and their costs, measured once on one machine. File format:
+// docs/file-formats.md.
+struct EstimateProfile {
+  std::string processor, build, date;  // build: version and compiler of the program
+  int threads = 1;
+  int runs = 1;              // runs of each plan and image; the models use the median
+  double probe_seconds = 0;  // of a small estimate on that machine
+  double warping_psnr_db = 0;
+  // Maximum of each quantity over the measured images.
+  Workload largest;
+  std::vector<PlanProfile> plans;
+  std::string from;     // the file it was read from, or "the profile that ships"
+  bool is_own = false;  // measured by the user, not the default profile
+
+  double best_psnr_db() const;
+  // Returns whether the user measured it with that build, on such a processor and with as many
+  // threads.
+  bool WasMeasuredBy(const std::string& build_here, const std::string& processor_here,
+                     int threads_here) const;
+  double LossDb(const PlanProfile& plan) const { return best_psnr_db() - plan.psnr_db; }
+};
+
+}  // namespace thicklens::estimator
+
+#endif  // THICKLENS_ESTIMATOR_ESTIMATE_PROFILE_H_
