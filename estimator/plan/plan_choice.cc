@@ -33,7 +33,7 @@ std::string OfferText(const Offer& offer) {
 [[noreturn]] void Refuse(const std::string& target_text, const EstimateProfile& profile,
                          const std::string& nearest) {
   throw Error(
-      fmt::format("{} cannot be met by what {} knows: {}", target_text, profile.from, nearest));
+      fmt::format("{} cannot be met by any plan of {}: {}", target_text, profile.from, nearest));
 }
 
 Offer Choose(const EstimateProfile& profile, const QualityTarget& target,
@@ -59,13 +59,14 @@ Offer Choose(const EstimateProfile& profile, const QualityTarget& target,
   if (soon.empty()) {
     const Offer fastest = *std::min_element(offers.begin(), offers.end(), IsFaster);
     Refuse(target_text, profile,
-           fmt::format("the fastest is {}; fewer --views or a smaller picture (--crop) take less",
-                       OfferText(fastest)));
+           fmt::format(
+               "the fastest plan is {}; fewer --views or a smaller picture (--crop) take less time",
+               OfferText(fastest)));
   }
   const Offer best = *std::min_element(soon.begin(), soon.end(), IsBetter);
   if (!target.psnr_loss_db) return best;
   Refuse(target_text, profile,
-         fmt::format("in that time the best is {}; the fastest that is as good is {}",
+         fmt::format("in that time the best plan is {}; the fastest plan of that quality is {}",
                      OfferText(best), OfferText(fastest_with_loss(*target.psnr_loss_db))));
 }
 
@@ -109,17 +110,17 @@ PlanChoice ChoosePlan(const EstimateProfile& profile, const QualityTarget& targe
   choice.message = fmt::format("{}: {}, about {:.2g} s (+- {:.0f} %)", target_text,
                                PlanName(choice.plan), chosen.seconds, 100 * choice.median_error);
   if (chosen.plan == best.plan) {
-    choice.message += "; the best it knows";
+    choice.message += "; the best of its plans";
   } else if (chosen.loss_db < 0.005) {
     choice.message +=
         fmt::format("; as good as {} ({:.2g} s)", PlanName(best.plan->plan), best.seconds);
   } else {
-    choice.message += fmt::format("; gives up {:.2f} dB of {} ({:.2g} s)", chosen.loss_db,
+    choice.message += fmt::format("; {:.2f} dB below {} ({:.2g} s)", chosen.loss_db,
                                   PlanName(best.plan->plan), best.seconds);
   }
-  choice.message += "; by " + profile.from;
+  choice.message += "; from " + profile.from;
   if (speed_ratio != 1) {
-    choice.message += fmt::format(", times {:.2g} by a probe: roughly", speed_ratio);
+    choice.message += fmt::format(", scaled by {:.2g} after a speed test (rough)", speed_ratio);
   }
   for (const std::string& beyond : BeyondProfile(profile, load)) choice.message += ", " + beyond;
   return choice;

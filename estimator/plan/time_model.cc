@@ -116,19 +116,20 @@ double RestSeconds(const TimedWorkload& load) {
 void CheckTimes(const TimesOfPlans& plans) {
   for (const std::vector<TimedWorkload>& plan : plans) {
     if (plan.size() < 2 || plan.size() != plans.front().size()) {
-      throw Error(fmt::format(
-          "laws of the time need the same pictures for each plan, two at least; there are {} and "
-          "{}",
-          plans.front().size(), plan.size()));
+      throw Error(
+          fmt::format("models of the run time need the same pictures for each plan, at least two; "
+                      "there are {} and "
+                      "{}",
+                      plans.front().size(), plan.size()));
     }
     for (const TimedWorkload& load : plan) {
       const auto [read, setup, solve, files] = load.parts;
       if (!(load.seconds > 0) || !(read >= 0) || !(setup >= 0) || !(solve >= 0) || !(files >= 0) ||
           !(RestSeconds(load) >= 0)) {
-        throw Error(
-            fmt::format("a law of the time needs times above 0, and parts of them, found {} s "
-                        "(read), {} s (setup), {} s (solve) and {} s (files) of {} s",
-                        read, setup, solve, files, load.seconds));
+        throw Error(fmt::format(
+            "a model of the run time needs times above 0, and parts of them, found {} s "
+            "(read), {} s (setup), {} s (solve) and {} s (files) of {} s",
+            read, setup, solve, files, load.seconds));
       }
     }
   }

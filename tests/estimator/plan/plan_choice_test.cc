@@ -80,12 +80,12 @@ TEST(ChoosePlan, SaysInOneLineWhatItCostsAndGivesUp) {
   EXPECT_DOUBLE_EQ(choice.expected_seconds, 8);
   EXPECT_NEAR(choice.loss_db, 0.8, 1e-9);
   EXPECT_EQ(choice.message,
-            "the target: scene tv, about 8 s (+- 10 %); gives up 0.80 dB of scene patches "
-            "(16 s); by a test's profile, times 2 by a probe: roughly");
+            "the target: scene tv, about 8 s (+- 10 %); 0.80 dB below scene patches "
+            "(16 s); from a test's profile, scaled by 2 after a speed test (rough)");
   const PlanChoice best =
       ChoosePlan(SampleProfile(), Quality("best"), "the target", kSampleWorkload, 1);
   EXPECT_EQ(best.message,
-            "the target: scene patches, about 8 s (+- 10 %); the best it knows; by a test's "
+            "the target: scene patches, about 8 s (+- 10 %); the best of its plans; from a test's "
             "profile");
   Workload large = kSampleWorkload;
   large.megapixels = 12;
