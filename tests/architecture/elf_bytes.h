@@ -13,7 +13,7 @@
 
 namespace thicklens::architecture {
 
-// A structure of an ELF file; nothing where the file ends before it does.
+// Returns the structure of an ELF file at the offset, or nothing if the file ends before it does.
 template <typename T>
 std::optional<T> At(const std::string& bytes, std::size_t offset) {
   T value;
@@ -22,13 +22,13 @@ std::optional<T> At(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-// A text that ends with a 0.
+// Returns the text at the offset, without the 0 that ends it.
 inline std::string TextAt(const std::string& bytes, std::size_t offset) {
   if (offset >= bytes.size()) return "";
   return {bytes.c_str() + offset, ::strnlen(bytes.c_str() + offset, bytes.size() - offset)};
 }
 
-// The header of an ELF file of this machine's kind; nothing: it is none.
+// Returns the header of an ELF file of this machine's kind, or nothing for any other file.
 inline std::optional<Elf64_Ehdr> HeaderOf(const std::string& bytes) {
   const auto header = At<Elf64_Ehdr>(bytes, 0);
   if (!header || std::memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 ||
@@ -38,7 +38,7 @@ inline std::optional<Elf64_Ehdr> HeaderOf(const std::string& bytes) {
   return header;
 }
 
-// The whole of an ELF file; empty of any other.
+// Returns the content of an ELF file, or an empty string for any other file.
 inline std::string BytesOf(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   char magic[SELFMAG] = {};

@@ -1,5 +1,5 @@
-// Where programs and libraries look for libraries: in absolute folders or beside themselves, never
-// in the current folder, which an empty entry means. In the build tree, or in the folder that
+// Programs and libraries look for libraries in absolute folders or beside themselves, never in the
+// current folder, which an empty entry means. The test checks the build tree, or the folder that
 // THICKLENS_INSTALLED names (install_test.cmake).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -23,11 +23,12 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 struct SearchPaths {
-  std::vector<std::string> lists;   // of DT_RPATH and DT_RUNPATH
-  std::vector<std::string> needed;  // DT_NEEDED
+  std::vector<std::string> lists;   // values of DT_RPATH and DT_RUNPATH
+  std::vector<std::string> needed;  // values of DT_NEEDED
 };
 
-// The search paths of a program or a shared library of this machine's kind; none: it is neither.
+// Returns the search paths of a program or a shared library of this machine's kind, or nothing for
+// any other file.
 std::optional<SearchPaths> ReadSearchPaths(const std::string& bytes) {
   const auto header = HeaderOf(bytes);
   if (!header || (header->e_type != ET_EXEC && header->e_type != ET_DYN)) {
@@ -66,7 +67,7 @@ std::optional<SearchPaths> ReadSearchPaths(const std::string& bytes) {
   return paths;
 }
 
-// Entries and names that could be found in the current folder.
+// Returns the entries and names that could be found in the current folder.
 std::vector<std::string> Dubious(const SearchPaths& paths) {
   std::vector<std::string> dubious;
   for (const std::string& list : paths.lists) {

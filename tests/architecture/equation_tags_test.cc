@@ -1,4 +1,4 @@
-// The tags of docs/equations.md and those that comments cite are the same, and the files, functions
+// The tags of docs/equations.md are the same as those that comments cite, and the files, functions
 // and tests that the page names exist.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// Their sources cite formulas.
+// The sources in these folders cite formulas.
 constexpr const char* kFolders[] = {"model", "kernels", "calib", "estimator", "tools", "tests"};
 
 std::string ContentOf(const fs::path& path) {
@@ -29,7 +29,7 @@ std::string ContentOf(const fs::path& path) {
   return content.str();
 }
 
-// The matches of the first group.
+// Returns what the first group of the expression matched, for every match.
 std::vector<std::string> AllMatches(const std::string& text, const std::string& pattern) {
   std::vector<std::string> found;
   const std::regex expression(pattern);
@@ -57,7 +57,8 @@ std::vector<Row> RowsOf(const std::string& page) {
   return rows;
 }
 
-// What a cell names that is not there: "`path`: `Name`, `Name`; `path`: `Name`".
+// Returns the names in a cell that do not exist. The form of a cell is "`path`: `Name`, `Name`;
+// `path`: `Name`".
 std::vector<std::string> MissingIn(const std::string& cell, const fs::path& root, bool is_tests) {
   std::vector<std::string> missing;
   std::string path, content;
@@ -71,7 +72,7 @@ std::vector<std::string> MissingIn(const std::string& cell, const fs::path& root
     std::string wanted = name;
     const std::size_t dot = name.find('.');
     if (is_tests && dot != std::string::npos) {
-      // Parametrised suites have a prefix: "Prefix/Suite.Name/0".
+      // The names of parametrised suites have a prefix: "Prefix/Suite.Name/0".
       std::string suite = name.substr(0, dot), test = name.substr(dot + 1);
       suite = suite.substr(suite.rfind('/') == std::string::npos ? 0 : suite.rfind('/') + 1);
       test = test.substr(0, test.find('/'));
@@ -88,7 +89,7 @@ std::vector<std::string> MissingIn(const std::string& cell, const fs::path& root
 const fs::path kRoot = THICKLENS_SOURCE_DIR;
 
 std::map<std::string, std::string> CitedTags() {
-  std::map<std::string, std::string> cited;  // with a file that cites it
+  std::map<std::string, std::string> cited;  // each tag with a file that cites it
   for (const char* folder : kFolders) {
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
       const std::string ending = entry.path().extension().string();

@@ -1,5 +1,6 @@
-// Inputs are read and outputs are written in one place (input_file.h, output_file.h of model),
-// which looks at what is there: a source that opens files in another way must be known here.
+// Inputs are read and outputs are written in one place (input_file.h and output_file.h of
+// model/base), which checks what exists under the name. A source that opens files in another way
+// must be listed here.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,7 +26,7 @@ const std::regex& WaysToOpenAFile() {
   return ways;
 }
 
-// Sources that open files, and why.
+// Sources that may open files, each with the reason.
 const std::set<std::string>& Known() {
   static const std::set<std::string> known = {
       "model/base/input_file.cc",              // the reader
@@ -33,9 +34,9 @@ const std::set<std::string>& Known() {
       "model/base/output_folder.cc",           //
       "model/base/output_part.cc",             //
       "model/base/output_target.cc",           //
-      "tools/io/journal_file.cc",              // grows while a run is on its way
-      "tools/io/float_tiff.cc",                // a file in an output folder
-      "tools/io/picture_kind.cc",              // libtiff, from memory
+      "tools/io/journal_file.cc",              // grows during a run
+      "tools/io/float_tiff.cc",                // writes a file in an output folder
+      "tools/io/picture_kind.cc",              // libtiff reads from memory
       "tools/system/standard_descriptors.cc",  // the null device
       "kernels/opencl/guarded_child.cc",       // the null device
       "model/base/run_cost.cc",                // files of /proc
@@ -46,7 +47,7 @@ const std::set<std::string>& Known() {
   return known;
 }
 
-// Regular expressions take long, and most lines hold no word of these.
+// Regular expressions are slow, and most lines contain none of these words.
 bool MayOpenAFile(const std::string& line) {
   for (const char* word : {"fstream", "fopen", "::open", "creat", "imread", "imwrite", "TIFF",
                            "ImageFactory", "_surface_create"}) {
@@ -55,7 +56,7 @@ bool MayOpenAFile(const std::string& line) {
   return false;
 }
 
-// The call by which a source file opens files; empty: there is none.
+// Returns the call by which a source opens files, or an empty string if there is none.
 std::string WayToOpenAFile(std::istream* source) {
   for (std::string line; std::getline(*source, line);) {
     line.resize(std::min(line.size(), line.find("//")));

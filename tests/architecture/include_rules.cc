@@ -10,7 +10,7 @@
 namespace thicklens::architecture {
 namespace {
 
-// C++17, the C headers it takes over, and POSIX.
+// Headers of C++17, the C headers that it includes, and those of POSIX.
 bool IsSystemHeader(const std::string& header) {
   static const std::set<std::string> headers = {
       "algorithm", "any", "array", "atomic", "bitset", "charconv", "chrono", "codecvt", "complex",
@@ -57,15 +57,15 @@ std::string FileName(const std::string& path) { return path.substr(path.rfind('/
 constexpr char kInclude[] = "/include/";
 bool IsPublic(const std::string& path) { return path.find(kInclude) != std::string::npos; }
 
-// As a public header is included: what follows the first include/.
+// Returns the name by which a public header is included: the part after the first include/.
 std::string PublicName(const std::string& path) {
   return path.substr(path.find(kInclude) + std::string(kInclude).size());
 }
 
-// Judges the includes of one file.
+// Checks the includes of one file.
 class Judge {
  public:
-  // `public_headers`: as they are included -> path.
+  // `public_headers` maps the name by which a header is included to its path.
   Judge(const SourceTree& tree, const std::map<std::string, std::string>& public_headers,
         const RoomsTable& table, std::string path, std::string room)
       : tree_(tree),
@@ -74,7 +74,7 @@ class Judge {
         path_(std::move(path)),
         room_(std::move(room)) {}
 
-  // What is wrong with the include, or nothing.
+  // Returns what is wrong with the include, or nothing if it is allowed.
   std::string Complaint(const std::string& header, bool quoted) const {
     if (StartsWith(header, "thicklens/")) return OfPublic(header);
     Names foreign = table_.Shows(room_);
@@ -98,14 +98,14 @@ class Judge {
                                           : OfArrow(found->second);
   }
 
-  // Nothing: it is none of ours, as far as its name says.
+  // Returns nothing if the name of the header does not lead into a module of this repository.
   std::optional<std::string> OfPrivate(const std::string& header) const {
     const std::string module = RoomsTable::ModuleOf(path_);
     if (tree_.count(header) > 0) {
       if (IsPublic(header)) return "it is included as " + PublicName(header);
       return OfPrivateFile(header);
     }
-    // In a module without rooms by the name below src/.
+    // In a module without rooms, a private header is included by its name below src/.
     if (!table_.IsModuleWithRooms(module) && header.find("..") == std::string::npos) {
       const std::string beside = path_.substr(0, path_.rfind('/') + 1) + header;
       for (const std::string& file : {beside, module + "/src/" + header}) {

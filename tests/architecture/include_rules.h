@@ -9,14 +9,15 @@
 
 namespace thicklens::architecture {
 
-// Path relative to the repository's top, with forward slashes -> text.
+// Maps each path, relative to the top of the repository and with forward slashes, to the text of
+// the file.
 using SourceTree = std::map<std::string, std::string>;
 
-// True for a file whose includes are judged: C, C++ and OpenCL sources and headers.
+// True for a file whose includes are checked: C, C++ and OpenCL sources and headers.
 bool IsSource(const std::string& path);
 
-// Every include that the table does not allow, every source of a module in no room, and every
-// public header in a wrong place, each as "file:line: what is wrong; what is allowed".
+// Returns every include that the table does not allow, every source of a module that is in no room,
+// and every public header in a wrong place, each as "file:line: what is wrong; what is allowed".
 std::vector<std::string> Violations(const SourceTree& tree, const RoomsTable& table);
 
 }  // namespace thicklens::architecture

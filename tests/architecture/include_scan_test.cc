@@ -1,4 +1,4 @@
-// The table of docs/rooms.txt, held against every include of the repository.
+// Every include of the repository is compared with the table of docs/rooms.txt.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ std::string Lines(const std::vector<std::string>& lines) {
 TEST(IncludeScan, EveryIncludeOfTheRepositoryIsAllowed) {
   const RoomsTable table = RepositoryTable();
   const SourceTree tree = ReadRepository(table.Modules());
-  // An empty scan would pass, too.
+  // An empty scan would pass as well.
   ASSERT_GT(tree.size(), 500U);
   EXPECT_THAT(Lines(Violations(tree, table)), IsEmpty());
 }
@@ -51,7 +51,7 @@ TEST(IncludeScan, NoOtherTopLevelFolder) {
   for (const std::string& module : RepositoryTable().Modules()) folders.insert(module);
   for (const auto& entry : fs::directory_iterator(THICKLENS_SOURCE_DIR)) {
     const std::string name = entry.path().filename().string();
-    // Dotted folders, and what .gitignore names: build*, out, fresh-out.
+    // Dotted folders are ignored, and so is what .gitignore names: build*, out, fresh-out.
     const bool ignored =
         name[0] == '.' || name.rfind("build", 0) == 0 || name == "out" || name == "fresh-out";
     if (!entry.is_directory() || ignored) continue;
@@ -59,7 +59,7 @@ TEST(IncludeScan, NoOtherTopLevelFolder) {
   }
 }
 
-// The scanner itself, on planted trees.
+// Tests of the scanner itself, on planted trees.
 
 const char kTable[] =
     "glass shows: Eigen/\n"
@@ -102,10 +102,10 @@ struct Planted {
   const char* name;
   const char* path;
   const char* include;
-  const char* allowed;  // part of the message
+  const char* allowed;  // a part of the message
 };
 
-// Printed in the place of the structure's bytes where a test fails.
+// GoogleTest prints this instead of the structure's bytes when a test fails.
 void PrintTo(const Planted& planted, std::ostream* os) { *os << planted.name; }
 
 class IncludeScannerRefuses : public ::testing::TestWithParam<Planted> {};

@@ -9,13 +9,13 @@
 
 namespace thicklens::architecture {
 
-// The content of a file; fails the test where it cannot be read.
+// Returns the content of a file. The test fails if the file cannot be read.
 std::string ContentOf(const std::string& path);
 
-// docs/rooms.txt.
+// Reads docs/rooms.txt.
 RoomsTable RepositoryTable();
 
-// All sources of these modules.
+// Reads all sources of these modules.
 SourceTree ReadRepository(const std::vector<std::string>& modules);
 
 }  // namespace thicklens::architecture

@@ -28,7 +28,8 @@ TEST(RoomsTable, SaysWhatARoomMayInclude) {
   EXPECT_TRUE(table.MayInclude("glass/optics", "glass/optics"));
   EXPECT_FALSE(table.MayInclude("glass/base", "glass/optics"));
   EXPECT_TRUE(table.MayInclude("fits", "glass/base"));
-  // What it includes includes more, which it does not.
+  // A permission is not transitive: tools may not include what the rooms that it includes may
+  // include.
   EXPECT_FALSE(table.MayInclude("tools", "glass/base"));
   EXPECT_EQ(table.WhatMayInclude("tools"), "glass/optics, fits");
   EXPECT_EQ(table.WhatMayInclude("glass/base"), "nothing");
@@ -62,7 +63,7 @@ TEST(RoomsTable, FindsACircle) {
   EXPECT_THAT(RoomsTable::Parse("a: b\nb: a\n").Circle(), ElementsAre("a", "b"));
   EXPECT_THAT(RoomsTable::Parse("z: a\na: b\nb: c\nc: a\n").Circle(),
               UnorderedElementsAre("a", "b", "c"));
-  // By the name of a module.
+  // The line refers to rooms by the name of their module.
   EXPECT_THAT(RoomsTable::Parse("glass/base: fits\nglass/optics:\nfits: glass\n").Circle(),
               UnorderedElementsAre("glass/base", "fits"));
 }

@@ -25,7 +25,7 @@ std::optional<ObjectSymbols> ReadObject(const std::string& bytes) {
   const auto header = HeaderOf(bytes);
   if (!header || header->e_type != ET_REL) return std::nullopt;
   ObjectSymbols symbols;
-  // Of very many sections their number stands in the first one.
+  // If a file has very many sections, their number is stored in the first one.
   std::size_t sections = header->e_shnum;
   if (sections == 0) {
     const auto first = At<Elf64_Shdr>(bytes, header->e_shoff);

@@ -10,23 +10,24 @@
 
 namespace thicklens::architecture {
 
-// What one source asks of others, as the linker sees it: names as the compiler writes them.
+// The symbols that one source defines and those that it uses from others, as the linker sees them
+// (mangled names).
 struct ObjectSymbols {
-  std::string source;  // path relative to the repository's top
+  std::string source;  // relative to the top of the repository
   std::set<std::string> defined, used;
 };
 
-// The symbols of an object file; nothing: it is none of this machine's kind.
+// Returns the symbols of an object file, or nothing if the file is not of this machine's kind.
 std::optional<ObjectSymbols> ReadObject(const std::string& bytes);
 
-// "model/base/CMakeFiles/thicklens_base.dir/parallel.cc.o" -> "model/base/parallel.cc"; empty of
-// any other path.
+// Maps "model/base/CMakeFiles/thicklens_base.dir/parallel.cc.o" to "model/base/parallel.cc".
+// Returns an empty string for any other path.
 std::string SourceOfObject(const std::string& object);
 
-// Every use of a symbol that one source of another room defines (a function of a template that
-// several define is none) and that the table does not allow, as "source: uses NAME of OTHER; the
-// arrow ROOM -> ROOM is wrong; what is allowed". An include may hide such an arrow: a header of one
-// room whose functions are defined in another.
+// Returns every use of a symbol that one source of another room defines and that the table does not
+// allow, as "source: uses NAME of OTHER; the arrow ROOM -> ROOM is wrong; what is allowed".
+// Functions of templates, which several sources define, are not counted. An include may hide such
+// an arrow if a header of one room declares functions that are defined in another.
 std::vector<std::string> WrongArrows(const std::vector<ObjectSymbols>& objects,
                                      const RoomsTable& table);
 

@@ -30,14 +30,14 @@ bool LensIsRight() {
          Fail("focus depth " + std::to_string(focus_depth_mm) + " mm, not 100");
 }
 
-// From calib, so that everything it uses inside has to be found by the linker.
+// This function is from calib, so the linker has to find everything that calib uses internally.
 bool OptionsAreValid() {
   const thicklens::calib::CalibrationOptions options;
   std::string why;
   return options.IsValid(&why) || Fail("default options: " + why);
 }
 
-// One blue pixel of a bitmap, which the library beside the installed program decodes.
+// Reads a bitmap of one blue pixel, which is decoded by the library beside the installed program.
 bool BitmapIsRead() {
   const std::string bitmap(
       "BM\x3A\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0"
@@ -48,7 +48,7 @@ bool BitmapIsRead() {
   return (pixel[0] == 0 && pixel[2] == 255) || Fail("the pixel is not blue");
 }
 
-// The photograph, warped by its depth, as a light field in a folder that is read again.
+// Warps the photograph by its depth, writes the light field to a folder and reads it again.
 bool LightFieldIsWritten() {
   thicklens::estimator::EstimateInput input;
   input.picture = {8, 8, 1, std::vector<float>(64, 0.5F)};
