@@ -1,5 +1,6 @@
-// How accurate a calibration is, and whether its error bars are: seeded simulated sweeps of the
-// cases in configs/sweeps, each of several targets, calibrated and compared with the truth.
+// Measures the accuracy of calibrations and of their error bars: it simulates seeded sweeps of the
+// cases in configs/sweeps, each of several targets, calibrates them and compares the results with
+// the truth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -48,7 +49,7 @@ std::vector<std::string> TargetNames() {
   return names;
 }
 
-// As a screen would show it; sRGB light becomes linear.
+// Reads a picture as a screen would show it: sRGB light is made linear.
 model::LinearPicture ReadPicture(const std::string& path) {
   const cv::Mat stored = cv::imread(path, cv::IMREAD_GRAYSCALE);
   if (stored.empty())
@@ -184,7 +185,7 @@ int main(int argc, char** argv) {
   CLI::App app("Accuracy of the calibration on simulated sweeps");
   thicklens::accuracy::AddOptions(&app, &arguments);
   CLI11_PARSE(app, argc, argv);
-  cv::setNumThreads(1);  // the sweeps run side by side
+  cv::setNumThreads(1);  // the sweeps run in parallel
   try {
     thicklens::accuracy::RunStudy(arguments);
   } catch (const std::exception& e) {

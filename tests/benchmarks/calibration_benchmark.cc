@@ -1,4 +1,4 @@
-// Where a calibration's time goes: one frame of 512 x 512 px through each of its steps.
+// Measures the time of each step of a calibration for one frame of 512 x 512 px.
 #include <benchmark/benchmark.h>
 
 #include <opencv2/core.hpp>
@@ -12,7 +12,7 @@
 namespace thicklens {
 namespace {
 
-// A macro sweep of dead leaves: frame 0 defocused by 8 px, frame 15 in focus.
+// A macro sweep of dead leaves, in which frame 0 is defocused by 8 px and frame 15 is in focus.
 const model::SweepSimulator& Bench() {
   static const model::SweepSimulator simulator = [] {
     model::SweepSimulationOptions options = model::ReadSweepSimulation(

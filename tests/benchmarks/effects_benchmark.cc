@@ -1,8 +1,8 @@
-// What each effect of image formation costs: pictures of five typical scenes, 320 x 240 px, made
-// without any effect, with one alone, with those that matter, and with all. The time is that of the
-// whole picture, its textures, survey and noise, too; `to_none` compares the processor's time with
-// that of the same picture without effects, `rays` is the mean of a pixel.
-//   ./dev bench --benchmark_filter=Effects/
+// Measures the cost of each effect of image formation. Pictures of five typical scenes, 320 x 240
+// px, are made without any effect, with one effect alone, with those that matter, and with all. The
+// time is that of the whole picture, including its textures, survey and noise. `to_none` is the
+// processor time relative to that of the same picture without effects, and `rays` is the mean
+// number of rays per pixel. Run it with ./dev bench --benchmark_filter=Effects/
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -20,7 +20,8 @@ namespace {
 constexpr int kWidth = 320, kHeight = 240;
 constexpr int kThreads = 2;
 
-// A thin lens; `floor_px` 0: not measured, so that diffraction counts.
+// A thin lens. `floor_px` 0 means that the floor was not measured, so that diffraction is
+// simulated.
 Camera MakeCamera(double focal_mm, double f_number, double pitch_mm, double focus_mm, Psf psf,
                   double floor_px) {
   Camera camera;
@@ -97,14 +98,14 @@ std::vector<std::pair<std::string, SceneSimulationOptions>> Scenes() {
 
 double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-// Makes the picture; returns the mean of its rays per pixel.
+// Makes the picture and returns the mean number of rays per pixel.
 double MakePicture(const SceneSimulationOptions& options) {
   const SceneSimulator simulator(options, {}, kThreads);
   benchmark::DoNotOptimize(simulator.Store(simulator.RenderNoiseless({kThreads, {}})));
   return simulator.mean_rays_per_pixel();
 }
 
-// Processor's seconds of the scene's picture without effects; the least of three.
+// Processor time, in s, of the scene's picture without effects: the minimum of three runs.
 double SecondsOfNone(const std::string& scene, SceneSimulationOptions options) {
   static std::map<std::string, double> known;
   const auto found = known.find(scene);
@@ -132,7 +133,7 @@ void CostOf(benchmark::State& state, const std::string& scene, SceneSimulationOp
   state.counters["to_none"] = seconds / of_none;
 }
 
-// Before main().
+// The benchmarks are registered before main().
 const bool kRegistered = [] {
   for (const auto& [scene, options] : Scenes()) {
     std::vector<std::string> rows = {"none"};

@@ -1,10 +1,11 @@
-// H of the solver `scene`, whose time is that of memory: a slanted plane of 2048 x 1536 px, 7 x 7
-// views of one weight, one channel. `bytes_per_second` counts what H must move at least (its
-// tables, the picture that it reads and the one that it writes, once each) and compares with the
-// triad's, which is what this machine's memory gives two threads. Steps and H on an OpenCL device
-// compare by time; where the device is the processor, so does column CPU, of the process's threads.
-// And H of a whole light field (FormNative, as `thicklens bench source --table 2` times it): the
-// least it must move are the light field, which it reads, and the picture, which it writes.
+// Measures H of the solver `scene`, which is limited by memory bandwidth, on a slanted plane of
+// 2048 x 1536 px, 7 x 7 views of one weight, one channel. `bytes_per_second` counts the minimum
+// traffic of H (its tables, the picture that it reads and the one that it writes, once each).
+// Compare it with that of the triad, which is the bandwidth of this machine for two threads. Steps
+// and H on an OpenCL device are compared by time. If the device is the processor, column CPU (all
+// threads of the process) can be compared as well. FormNative measures H of a whole light field, as
+// `thicklens bench source --table 2` does; its minimum traffic is the light field, which it reads,
+// and the picture, which it writes.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Core>
@@ -33,7 +34,7 @@ namespace {
 constexpr int kThreads = 2;
 constexpr int kWidth = 2048, kHeight = 1536, kViews = 7;
 constexpr double kMostDisparityPx = 1;
-constexpr double kMu = 1e-2;  // of the ridge
+constexpr double kMu = 1e-2;  // weight of the ridge
 
 void Report(benchmark::State* state, double bytes) {
   state->SetBytesProcessed(
@@ -44,7 +45,7 @@ void TriadOf(const float* b, const float* c, float scale, std::size_t count, flo
   for (std::size_t i = 0; i < count; ++i) a[i] = b[i] + scale * c[i];
 }
 
-// As the STREAM benchmark does and counts it: two arrays read, one written.
+// Counts bytes as the STREAM benchmark does: two arrays are read and one is written.
 void Triad(benchmark::State& state) {
   constexpr std::size_t kCount = std::size_t{1} << 27U;
   constexpr int kParts = 64;
@@ -115,8 +116,8 @@ void ForwardNative(benchmark::State& state) {
   Report(&state, problem.LeastBytes());
 }
 
-// 640 x 480 px, rays that land 0 or .37 px further from view to view: of a view one sample goes
-// into a pixel, or four do.
+// An image of 640 x 480 px whose rays land 0 or 0.37 px farther from view to view, so that each
+// pixel gets one sample or four of each view.
 void FormNative(benchmark::State& state) {
   model::LightField field = model::MakeLightField(640, 480, kViews, kViews, 1);
   std::fill(field.values.begin(), field.values.end(), 0.5F);
@@ -128,7 +129,7 @@ void FormNative(benchmark::State& state) {
   Report(&state, sizeof(float) * static_cast<double>(field.values.size() + field.view_size()));
 }
 
-// With the pictures on the device.
+// The pictures are on the device.
 void ForwardOpenCl(benchmark::State& state) {
   const Problem& problem = TheProblem();
   const kernels::DeviceRequest place = kernels::ParseDeviceRequest(
@@ -144,7 +145,7 @@ void ForwardOpenCl(benchmark::State& state) {
   const kernels::DeviceMemory last(&queue, "last", sizeof(double));
   double unused = 0;
   projection.Apply(x, 1, nullptr, &y);
-  last.Read(&unused);  // when all calls before are done
+  last.Read(&unused);  // waits until all earlier calls are done
   for (auto _ : state) {
     projection.Apply(x, 1, nullptr, &y);
     last.Read(&unused);
@@ -152,7 +153,7 @@ void ForwardOpenCl(benchmark::State& state) {
   Report(&state, problem.LeastBytes());
 }
 
-// Steepest descent, which does in a step what conjugate gradients do.
+// Runs steepest descent, of which a step costs as much as one of conjugate gradients.
 void RunSteps(benchmark::State* state, kernels::RadianceSteps<float>* steps) {
   const Problem& problem = TheProblem();
   const auto run_one = [&] {
@@ -163,7 +164,8 @@ void RunSteps(benchmark::State* state, kernels::RadianceSteps<float>* steps) {
   steps->SetPrior(RidgePrior(problem.data.weight, kMu));
   steps->Start(problem.data.photograph);
   run_one();
-  steps->UpdateResidual();  // when a device has done all calls before, which compile
+  // Until the device has done all earlier calls, which include compilation
+  steps->UpdateResidual();
   for (auto _ : *state) run_one();
 }
 void StepNative(benchmark::State& state) {

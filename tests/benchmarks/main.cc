@@ -1,4 +1,4 @@
-// Benchmarks run in memory like the program's: in huge pages, and kept when it is freed.
+// Benchmarks use memory as the program does: in huge pages, which are kept when they are freed.
 #include <benchmark/benchmark.h>
 
 #include "tools/system/program_memory.h"

@@ -1,5 +1,6 @@
-// How good estimated light fields are on simulated scenes, when the depth is noisy: PSNR of all
-// views against the truth, beside the photograph warped by the same depth (DIBR).
+// Measures the quality of light fields estimated from simulated scenes with noisy depth: the PSNR
+// of all views against the truth, compared with that of the photograph warped by the same depth
+// (DIBR).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -45,7 +46,7 @@ struct Row {
   int views_above_dibr = 0, views = 0;
 };
 
-// px of disparity per view step, normal and independent from pixel to pixel.
+// Adds noise to the disparity, in px per view step, normal and independent from pixel to pixel.
 void AddNoise(double sigma_px, std::uint64_t seed, estimator::DisparityMap* map) {
   const double step = map->step.cwiseAbs().maxCoeff();
   std::mt19937_64 engine(seed);
@@ -55,7 +56,7 @@ void AddNoise(double sigma_px, std::uint64_t seed, estimator::DisparityMap* map)
   }
 }
 
-// One photograph, through hundreds of rays a pixel, and its true views.
+// One photograph, simulated with hundreds of rays per pixel, and its true views.
 struct Simulated {
   estimator::EstimateInput input;
   model::LightField truth;

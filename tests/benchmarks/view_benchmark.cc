@@ -1,8 +1,8 @@
-// Views of a picture with a step in its depth, in 1 and in 3 channels, to memory that is there, as
-// a light field's are made, two at a time on two threads: by C++, and by an OpenCL device; 640 x
-// 480 px, and 160 x 120 px, of which a device's calls are the larger part. `views_per_second`
-// compares them; where the device is the processor, so does column CPU, the time of the process's
-// threads, which other programs on the machine disturb less.
+// Measures views of a picture with a step in its depth, in 1 and in 3 channels. They are written to
+// memory that exists, as the views of a light field are, two at a time on two threads, by C++ and
+// by an OpenCL device. The sizes are 640 x 480 px and 160 x 120 px, for which the overhead of a
+// device's calls dominates. Compare `views_per_second`. If the device is the processor, compare
+// column CPU, the time of the process's threads, which other programs on the machine disturb less.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -77,7 +77,7 @@ void ViewOpenCl(benchmark::State& state) {
     warp->Warp({&view.disparity, view.shift.x(), view.shift.y(), &view.hidden, &view.mixed},
                &values[static_cast<std::size_t>(i)]);
   };
-  for (int i = 0; i < kViews; ++i) make(i);  // a first call compiles
+  for (int i = 0; i < kViews; ++i) make(i);  // the first call compiles
   for (auto _ : state) {
     ParallelFor(kViews, 2, make);
     benchmark::ClobberMemory();

@@ -16,9 +16,9 @@ using testing::SimulatedSweep;
 
 struct Damage {
   std::string name;
-  std::function<void(model::SweepSimulationOptions*)> before;  // of the simulation
+  std::function<void(model::SweepSimulationOptions*)> before;  // changes the simulation
   std::function<void(SimulatedSweep*)> after;
-  int fewest_frames = 0;  // that there must be for it
+  int fewest_frames = 0;  // number of frames that the case needs for it
 };
 
 std::vector<Damage> Damages() {
@@ -43,16 +43,17 @@ std::vector<Damage> Damages() {
   };
 }
 
-// What the damaged sweep gave.
+// Result of calibrating the damaged sweep.
 struct Row {
   std::string outcome, first_warning;
   bool done = false;
   int rejected = 0;
   double focus_error_mm = 0, focus_sigma_mm = 0, focus_beyond_mm = 0;
-  double ratio_error = 0, ratio_sigma = 0, ratio_beyond = 0;  // relative
+  double ratio_error = 0, ratio_sigma = 0, ratio_beyond = 0;  // relative to kappa
 };
 
-// How far the truth lies beyond the interval that is stated: 2 sigma around the systematic one.
+// Returns how far the truth lies outside the stated interval: the systematic one, widened by 2
+// sigma.
 double Beyond(const calib::Result& result, double truth) {
   const Eigen::Vector2d interval =
       result.systematic.value_or(Eigen::Vector2d(result.value, result.value));

@@ -9,9 +9,9 @@
 
 namespace thicklens::accuracy {
 
-// Dead leaves with one kind of damage to the whole sweep at a time, and the floor known: how far
-// zf and kappa go, and how far beyond what the calibration states (2 sigma and the systematic
-// interval). Prints a table per case.
+// Calibrates dead leaves with one kind of damage to the whole sweep at a time and a known floor.
+// Reports how far zf and kappa move, and by how much they leave the stated interval (2 sigma and
+// the systematic interval). Prints one table per case.
 nlohmann::ordered_json RunFaultStudy(const std::vector<std::string>& cases,
                                      const TrialSettings& settings, int threads);
 

@@ -6,15 +6,15 @@
 namespace thicklens::accuracy {
 namespace {
 
-// Central differences: a relative step, and the smallest standard deviation of a variance, px^2,
-// in frames where the readings have no effect on it.
+// Central differences use a relative step. The second number is the smallest standard deviation of
+// a variance, px^2, for frames in which the readings have no effect on the variance.
 constexpr double kRelativeStep = 1e-5;
 constexpr double kLeastErrorPx2 = 1e-6;
 
-// What a texture of unknown sharpness shows of a frame at depth z: its blur variance on the target
-// in px^2 of the plane of reference, plus a constant c of the texture's own,
-// V = S z^2/zref^2 + c, S = S0 + (kappa r K/p)^2 (1/z - 1/zf)^2, K = f1 zf/(zf - f1). Derived here:
-// 1 px at depth z covers p z/(K zref) times as much as at zref.
+// Blur variance that a texture of unknown sharpness shows in a frame at depth z: the variance on
+// the target in px^2 of the plane of reference, plus a constant c of the texture, V = S z^2/zref^2
+// + c, S = S0 + (kappa r K/p)^2 (1/z - 1/zf)^2, K = f1 zf/(zf - f1). Derived here: 1 px at depth z
+// covers p z/(K zref) times as much as at zref.
 struct Law {
   model::ThickLens lens;
   double pixel_pitch_mm = 0;
@@ -76,19 +76,20 @@ FisherBounds BoundsOf(const model::SweepSimulationOptions& options, double floor
   }
 
   FisherBounds bounds;
-  // A floor that is off moves the other parameters to where the law is the same.
+  // An error of the floor moves the other parameters to where the law is the same.
   const Eigen::Vector3d moved = jacobian.colPivHouseholderQr().solve(by_floor) * floor_sigma_px2;
   bounds.floor = MakeBound(camera.lens, zf, std::abs(moved(0)), std::abs(moved(1)));
 
-  // (J^T Q^-1 J)^-1, Q the variance that the readings' errors make of V.
+  // The matrix is (J^T Q^-1 J)^-1, where Q is the variance of V that results from the errors of the
+  // readings.
   const Eigen::MatrixXd weighted = error_px2.cwiseInverse().asDiagonal() * jacobian;
   const Eigen::Matrix3d covariance = (weighted.transpose() * weighted).inverse();
   bounds.readings =
       MakeBound(camera.lens, zf, std::sqrt(covariance(0, 0)), std::sqrt(covariance(1, 1)));
 
-  // With the scales all depths are known but for one factor 1 + e, and the readings say
-  // z_i (1 + e) with their errors: var e = s^2/sum z_i^2. zf goes as 1 + e; V stays the same where
-  // kappa K does, so that kappa goes as 1 + e zf/(zf - f1).
+  // If the scales are known, all depths are known up to one factor 1 + e, and the readings measure
+  // z_i (1 + e) with their errors: var e = s^2/sum z_i^2. zf is proportional to 1 + e. V stays the
+  // same if kappa K does, so kappa is proportional to 1 + e zf/(zf - f1).
   const double factor_sigma = options.reading_sigma_mm / std::sqrt(sum_depths2);
   bounds.scaled = MakeBound(camera.lens, zf, zf * factor_sigma,
                             factor_sigma * zf / (zf - camera.lens.front_focal_length_mm));

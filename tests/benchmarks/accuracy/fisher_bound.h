@@ -9,16 +9,16 @@ namespace thicklens::accuracy {
 struct Bound {
   double focus_depth_mm = 0;
   double image_distance_mm = 0;
-  double relative_blur_ratio = 0;  // of kappa over kappa
+  double relative_blur_ratio = 0;  // sigma of kappa, divided by kappa
 };
 
-// What no unbiased calibration of a sweep of an unknown texture can do better than, each cause
-// alone, all else known exactly.
+// Lower bounds on the errors of every unbiased calibration of a sweep of an unknown texture. Each
+// bound has one cause of error alone; everything else is known exactly.
 struct FisherBounds {
-  Bound floor;     // the floor's variance is known to a standard deviation
-  Bound readings;  // readings err by their sigma; the blur of every frame is known exactly
-  Bound scaled;    // the same, and the image scale of every frame is known exactly too
-  Bound together;  // floor and `scaled`
+  Bound floor;     // the variance of the floor is known with a standard deviation
+  Bound readings;  // the readings have their sigma; the blur of every frame is known exactly
+  Bound scaled;    // as for `readings`, and the image scale of every frame is known exactly, too
+  Bound together;  // the errors of `floor` and `scaled` together
 };
 FisherBounds BoundsOf(const model::SweepSimulationOptions& options, double floor_sigma_px2);
 

@@ -20,7 +20,7 @@ constexpr double kRejectionP = 0.01;
 constexpr model::TargetKind kTextures[] = {
     model::TargetKind::kDeadLeaves, model::TargetKind::kWhiteNoise, model::TargetKind::kPinkNoise};
 
-// One cell of the table: how one result's intervals hold the truth.
+// One cell of the table: how often the intervals of one result contain the truth.
 struct Cell {
   int done = 0, covered = 0;
   double error = 0, half_width = 0;  // sums
@@ -35,7 +35,7 @@ struct Cell {
   }
 };
 
-// The probability of as few successes or fewer.
+// The probability of at most this many successes.
 double AtMostP(int successes, int trials, double probability) {
   double sum = 0;
   for (int k = 0; k <= successes; ++k) {

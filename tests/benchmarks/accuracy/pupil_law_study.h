@@ -9,10 +9,10 @@
 
 namespace thicklens::accuracy {
 
-// Whether the intervals hold the truth whatever law the pupil follows: for each law, each case and
-// both a given and an unknown bench zero, `sweeps` sweeps of three aperiodic textures, floors drawn
-// about the truth. A result is covered if the truth lies within its systematic interval widened by
-// 2 sigma. Prints the table and returns it.
+// Measures whether the intervals contain the truth whatever law the pupil follows. For each law,
+// each case and both a given and an unknown bench zero, it calibrates `sweeps` sweeps of three
+// aperiodic textures with floors drawn about the truth. A result is covered if the truth lies
+// within its systematic interval widened by 2 sigma. Prints the table and returns it.
 nlohmann::ordered_json RunPupilLawStudy(const std::vector<std::string>& cases,
                                         const TrialSettings& settings, int sweeps, int threads);
 

@@ -14,7 +14,7 @@ using testing::RobustSigmaAboutZero;
 using testing::RootMeanSquare;
 
 constexpr double kLevel = 0.95;
-constexpr double kInterval = 1.96;  // sigmas that hold kLevel of a Gaussian
+constexpr double kInterval = 1.96;  // this many sigmas contain kLevel of a Gaussian
 
 Coverage Cover(const std::vector<Measured>& results) {
   Coverage coverage;

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kFloorSigmaPx2 = 0.01;
 constexpr int kManyFrames = 30;
 constexpr double kRejectionP = 0.001;
-// Of the magnitude of a Gaussian error, in standard deviations.
+// Quantiles of the magnitude of a Gaussian error, in standard deviations.
 constexpr double kGaussianMedian = 0.6745;
 constexpr double kGaussian90 = 1.645;
 
@@ -31,7 +31,7 @@ Summary Of(const Run& run, const std::function<bool(const Trial&)>& belongs) {
   return Summarise(trials);
 }
 
-// NaN has no JSON.
+// JSON has no NaN.
 Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json CoverageJson(const Coverage& c) {
@@ -115,13 +115,13 @@ Json PrintErrors(const Run& run) {
   return rows;
 }
 
-// One goal of one case. `bound`: what cannot be done better, where that is known.
+// One goal of one case. `bound` is the smallest error that is possible, if it is known.
 struct Goal {
   std::string what;
   double measured = 0;
   double limit = 0;
   std::optional<double> bound;
-  bool at_least = false;  // the limit is the least, not the most
+  bool at_least = false;  // true: the limit is a minimum
 
   std::string Verdict() const {
     if (at_least ? measured >= limit : measured <= limit) return "met";

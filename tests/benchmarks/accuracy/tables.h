@@ -9,21 +9,21 @@
 
 namespace thicklens::accuracy {
 
-// What was run, in the order in which it is to be printed.
+// The trials that were run, in the order in which they are printed.
 struct Run {
   TrialSettings settings;
   std::vector<std::string> cases;
   std::vector<model::TargetKind> targets;
-  std::vector<Floor> floors;  // of the textures
+  std::vector<Floor> floors;  // floors of the textures
   std::vector<Trial> trials;
 };
 
-// The texture has no period, so that its frames can be told apart wherever they lie. A star is left
-// out as well: it looks the same at each image scale.
+// True if the texture has no period, so that the registration of its frames is unambiguous at any
+// distance. A star is excluded as well, because it looks the same at each image scale.
 bool IsAperiodic(model::TargetKind target);
 
-// Prints the tables on the standard output and gives back the same as JSON, units in the keys:
-// errors and failures per case and target, goals, coverage, and what cannot be done better.
+// Prints the tables on the standard output and returns the same as JSON, with units in the keys:
+// errors and failures per case and target, goals, coverage, and the smallest possible errors.
 nlohmann::ordered_json PrintTables(const Run& run);
 
 }  // namespace thicklens::accuracy

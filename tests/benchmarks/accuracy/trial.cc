@@ -13,20 +13,21 @@ namespace {
 
 using thicklens::testing::SimulatedSweep;
 
-// Reasons with different numbers are one reason.
+// Reasons that differ in their numbers only count as one reason.
 std::string Countable(const std::string& reason) {
   static const std::regex number(R"([-+]?\d+(\.\d+)?(e[-+]?\d+)?)");
   const std::string text = std::regex_replace(reason, number, "#");
   return text.size() <= 160 ? text : text.substr(0, 157) + "...";
 }
 
-// Seeds of different cells of the table lie apart, so that no texture is used twice.
+// The seeds of the cells of the table are far apart, so that no texture is used twice.
 std::uint64_t Seed(const TrialKey& key, const TrialSettings& settings) {
   return settings.first_seed + 1000000U * static_cast<std::uint64_t>(key.case_number) +
          20000U * static_cast<std::uint64_t>(key.target) + static_cast<std::uint64_t>(key.index);
 }
 
-// CPU time of this thread: other sweeps, and other programs, take their share of the machine.
+// CPU time of this thread. Elapsed time would include other sweeps and other programs on the
+// machine.
 double ThreadSeconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
