@@ -53,7 +53,7 @@ sensor: {width_px: 512, height_px: 512, pixel_pitch_mm: 0.0045, principal_point_
 psf: gaussian
 )";
 
-// The file, and the same bytes as the content of records whose hashes are right.
+// Reads the file, and the same bytes as the content of records whose hashes are right.
 void ReadCheckpoint(const std::string& bytes, const TemporaryFolder& folder) {
   const std::string records = folder / "records.blocks";
   fs::remove(records);
@@ -66,7 +66,7 @@ void ReadCheckpoint(const std::string& bytes, const TemporaryFolder& folder) {
   for (const std::string& path : {records, folder.Put("estimate.blocks", bytes)}) {
     io::BlockCheckpoint checkpoint(path, "a version");
     checkpoint.device();
-    // What is left out of a file is no error to the reader; here it is.
+    // The reader accepts a file from which something is missing; this function refuses it.
     const bool is_whole = checkpoint.block_px() && checkpoint.Find(0) && checkpoint.Find(1);
     if (path != records && !is_whole) throw Error(path + ": a block is missing");
   }

@@ -10,24 +10,24 @@
 
 namespace thicklens::testing {
 
-// One of the program's readers, fed with the bytes of one file.
+// One of the program's readers, which gets the bytes of one file.
 struct FuzzedReader {
-  std::string name;  // of the folder of its corpus, too
-  // Reads the bytes, which it puts into the folder, where what belongs beside them is. Throws Error
-  // for what is not right, and nothing else whatever the bytes are.
+  std::string name;  // also the name of the folder of its corpus
+  // Writes the bytes to the folder, which contains the files that they refer to, and reads them.
+  // Throws Error for invalid bytes, and must throw nothing else for any bytes.
   std::function<void(const std::string& bytes, const TemporaryFolder& folder)> read;
 };
 
-// For GoogleTest.
+// GoogleTest prints this.
 inline void PrintTo(const FuzzedReader& reader, std::ostream* out) { *out << reader.name; }
 
 const std::vector<FuzzedReader>& FuzzedReaders();
 
-// Puts what the readers need beside the file there.
+// Writes the files that the readers need beside the one that is read.
 void PrepareFuzzFolder(const TemporaryFolder& folder);
 
-// What the reader refused the bytes with; empty: it read them. Anything but an Error passes
-// through, and so does an Error without a message.
+// Returns the message with which the reader refused the bytes, or an empty string if it read them.
+// Exceptions other than Error pass through, and so does an Error without a message.
 std::string Refusal(const FuzzedReader& reader, const std::string& bytes,
                     const TemporaryFolder& folder);
 
