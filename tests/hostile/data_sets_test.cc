@@ -1,5 +1,5 @@
-// Folders that come from strangers: light fields and sweeps with traps in them, and a current
-// folder that holds what programs look for by name.
+// Data sets from untrusted sources: light fields and sweeps that contain traps, and a current
+// folder with files whose names programs look for.
 #include <unistd.h>
 
 #include <filesystem>
@@ -16,7 +16,7 @@ using ::testing::Not;
 
 class HostileDataSets : public HostileTest {
  protected:
-  // The description of lf with another line.
+  // Replaces one line of the description of lf.
   void ChangeDescription(const std::string& key, const std::string& value) {
     std::string text = testing::ContentOf(Work("lf/lightfield.yaml"));
     const std::size_t begin = text.find("\n" + key + ":");
@@ -111,14 +111,14 @@ THICKLENS_SITUATION(HostileDataSets, LibrariesInTheCurrentFolder,
                     "They are not loaded") {
   const Outcome needed = Shell("LD_TRACE_LOADED_OBJECTS=1 \"$T\"; readelf -d \"$T\" 2>/dev/null");
   ASSERT_THAT(needed.out, HasSubstr("libcsv.so"));
-  // A file that is no library stops a program that tries to load it.
+  // A file that is not a library stops any program that tries to load it.
   ExpectDone(Shell("LD_TRACE_LOADED_OBJECTS=1 \"$T\" | while read name arrow rest; do case $name "
                    "in *.so*) echo trap > \"${name##*/}\";; esac; done; rm -f ld-linux*; ls | "
                    "grep -c '\\.so' > count; mkdir traps; mv *.so* traps; test $(cat count) -gt "
                    "20"),
              {"new count", "new traps"});
   ExpectDone(Shell("cd traps; \"$T\" explain ../camera.yaml --depth-range 290:310 --quiet"), {});
-  // Loaded when a picture asks for it.
+  // This library is loaded as soon as a picture needs it.
   ExpectDone(Shell("cd traps; echo trap > thicklens_opencv_codecs.so; printf 'P5\\n2 "
                    "2\\n255\\nabcd' > ../a.pgm; \"$T\" compare ../a.pgm ../a.pgm --quiet"),
              {"new a.pgm", "new traps/thicklens_opencv_codecs.so"});
@@ -139,7 +139,7 @@ THICKLENS_SITUATION(
   }
   for (const char* variable : {"XDG_CACHE_HOME=.", "POCL_CACHE_DIR=cache"}) {
     SCOPED_TRACE(variable);
-    // Where there is no device, it is refused.
+    // If there is no device, the option is refused.
     const Outcome outcome =
         Shell(std::string("env ") + variable + " " + Estimate("new --device opencl"));
     EXPECT_LE(outcome.exit_code, 1) << outcome.err;

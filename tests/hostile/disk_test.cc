@@ -16,7 +16,7 @@ using ::testing::IsEmpty;
 
 class HostileDisk : public HostileTest {
  protected:
-  // The commands, each of which writes disk/new; some of them replace an older one.
+  // The commands, each of which writes disk/new. Some of them replace an older output.
   static std::vector<std::string> Writers() {
     return {Explain("disk/new"),
             Render("disk/new"),
@@ -27,8 +27,8 @@ class HostileDisk : public HostileTest {
             "\"$T\" simulate picture scene.yaml --quiet -o disk/new"};
   }
 
-  // In a file system that is mounted with these options at disk: runs the command, and prints
-  // which entries came and whether they are whole: the same names as `whole` has.
+  // Mounts a file system with these options at disk, runs the command there, and prints which
+  // entries were written and whether they are complete, that is, have the same names as `whole`.
   static std::string InDisk(const std::string& options, const std::string& script) {
     return "unshare -m sh -c " +
            Quoted("mount -t tmpfs -o " + options + " none disk || exit 98; " + script +
@@ -42,8 +42,8 @@ class HostileDisk : public HostileTest {
     return false;
   }
 
-  // From too small a disk to one that is large enough: refused until it is done, and nothing is
-  // there until all is.
+  // Increases the disk from too small a size to one that is large enough. The command is refused
+  // until the disk is large enough, and until then it leaves nothing there.
   void GrowDisk(const std::string& option, int first, int last) {
     fs::create_directory(Work("disk"));
     int refused = 0;
@@ -66,7 +66,7 @@ class HostileDisk : public HostileTest {
         }
         ++refused;
         EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
-        // What could be written before is whole; else there is nothing.
+        // Either the earlier outputs are complete, or there is nothing.
         EXPECT_THAT(outcome.out, ::testing::AnyOf(IsEmpty(), json, all_but_json)) << outcome.err;
         const std::vector<std::string> errors = ErrorsIn(outcome.err);
         ASSERT_EQ(errors.size(), 1U) << outcome.err;
@@ -103,7 +103,7 @@ THICKLENS_SITUATION(HostileDisk, ALimitOnTheSizeOfFiles,
     for (const char* blocks : {"0", "1", "2", "8"}) {
       for (const std::string& script : {Explain("new"), Estimate("new"), Render("new")}) {
         SCOPED_TRACE(std::string(trap) + blocks + " " + script);
-        // The limit holds for all files: what is printed goes into a pipe.
+        // The limit holds for all files, so the standard output goes into a pipe.
         const Outcome outcome =
             Shell("{ (" + std::string(trap) + "ulimit -f " + blocks + "; exec " + script +
                   ") 2>&1; echo $? >code; } | cat >&2; read code "
@@ -124,8 +124,8 @@ THICKLENS_SITUATION(HostileDisk, ALimitOnTheSizeOfFiles,
 
 class HostileWrites : public HostileTest {
  protected:
-  // Lets the first call that writes fail, then the second and so on, until all succeed. What was
-  // there before stays until all is there.
+  // Lets the first call that writes fail, then the second and so on, until the command succeeds.
+  // The previous output stays until the new one is complete.
   void FailEachCall(const std::string& script, int error, const std::string& reason) {
     SCOPED_TRACE(script + ", " + reason);
     ASSERT_EQ(Shell(script).exit_code, 0);
@@ -146,7 +146,8 @@ class HostileWrites : public HostileTest {
       }
       fs::remove(Work("failed"));
       ++failed;
-      // fsync may fail after all, as of a folder or where it cannot be done: then all is there.
+      // fsync may fail at the end, for example on a folder or where it is not supported. The output
+      // is complete then.
       if (outcome.exit_code != 0) {
         EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
         EXPECT_THAT(ErrorsIn(outcome.err), ::testing::ElementsAre(::testing::AllOf(

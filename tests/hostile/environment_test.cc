@@ -1,4 +1,4 @@
-// Variables of the environment that are missing, wrong or absurd.
+// Environment variables that are missing, wrong or absurd.
 #include <unistd.h>
 
 #include <filesystem>
@@ -15,12 +15,12 @@ using ::testing::Not;
 
 class HostileEnvironment : public HostileTest {
  protected:
-  // What estimate and calibrate give, without what differs from run to run.
+  // Returns the results of estimate and calibrate, without what differs from run to run.
   std::string Results(const std::string& name) {
     return testing::ContentOf(Work(name + "/views/view_00_00.png")) +
            testing::ContentOf(Work(name + "/views/view_01_01.png"));
   }
-  // With each setting the outputs of a usual run come.
+  // Each setting gives the outputs of a usual run.
   void ExpectNoDifference(const std::vector<std::string>& settings) {
     ExpectDone(Shell(Estimate("usual")), {"new usual"});
     ExpectDone(Shell(Explain("usual.json")), {"new usual.json"});

@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Larger files are sparse ones, which nobody wants to read.
+// Larger files are sparse, and reading them would take too long.
 constexpr std::uintmax_t kLargestBytes = 64 << 20;
 
 std::string DescriptionOf(const fs::directory_entry& entry) {
@@ -37,7 +37,7 @@ bool IsBelow(const std::string& path, const std::string& folder) {
          path[folder.size()] == '/';
 }
 
-// Those of `paths` whose folder is not among them.
+// Returns those of `paths` whose folder is not among them.
 std::vector<std::string> Outermost(const std::vector<std::string>& paths) {
   std::vector<std::string> outermost;
   for (const std::string& path : paths) {
@@ -69,7 +69,7 @@ FolderTree TreeOf(const std::string& folder) {
 }
 
 std::vector<std::string> Changes(const FolderTree& before, const FolderTree& after) {
-  std::map<std::string, std::string> kinds;  // by path
+  std::map<std::string, std::string> kinds;  // the key is the path
   for (const std::string& path : MissingIn(before, after)) kinds[path] = "new ";
   for (const std::string& path : MissingIn(after, before)) kinds[path] = "gone ";
   for (const auto& [path, description] : before) {

@@ -7,13 +7,13 @@
 
 namespace thicklens::hostile {
 
-// What lies below a folder: for each path (as seen from the folder) its kind, its permissions and
-// its content. Links are not followed.
+// Content of a folder: maps each path, relative to the folder, to its kind, its permissions and its
+// content. Links are not followed.
 using FolderTree = std::map<std::string, std::string>;
 FolderTree TreeOf(const std::string& folder);
 
-// "new PATH", "gone PATH", "changed PATH"; sorted by path. What lies below a new or vanished folder
-// is not listed.
+// Returns lines "new PATH", "gone PATH" and "changed PATH", sorted by path. The content of a new or
+// vanished folder is not listed.
 std::vector<std::string> Changes(const FolderTree& before, const FolderTree& after);
 
 }  // namespace thicklens::hostile

@@ -26,8 +26,8 @@ std::string ExrAttribute(const std::string& name, const std::string& type,
   return name + '\0' + type + '\0' + LittleEndian(static_cast<std::uint32_t>(value.size())) + value;
 }
 
-// Without the stream's header and checksum, and with its last block left open: several of them
-// behind each other are one stream.
+// Compresses the bytes without the header and the checksum of the stream and leaves the last block
+// open, so that several results in a row form one stream.
 std::string DeflatedBlocks(const std::string& bytes) {
   z_stream stream{};
   constexpr int kRaw = -15, kMemoryLevel = 8;
@@ -44,7 +44,7 @@ std::string DeflatedBlocks(const std::string& bytes) {
 }
 
 std::string Stream(const std::string& blocks, std::uint32_t checksum) {
-  const std::string last("\x01\0\0\xFF\xFF", 5);  // an empty one
+  const std::string last("\x01\0\0\xFF\xFF", 5);  // an empty block
   return "\x78\xDA" + blocks + last + BigEndian(checksum);
 }
 
@@ -62,7 +62,7 @@ std::string DeflatedZeros(std::size_t count) {
   std::string blocks;
   for (std::size_t i = 0; i < count / kPart; ++i) blocks += part;
   blocks += DeflatedBlocks(std::string(count % kPart, '\0'));
-  // Adler-32 of zeros: one sum stays 1, the other counts them.
+  // Adler-32 of zeros: one of its sums stays 1, the other one counts the zeros.
   constexpr std::size_t kModulus = 65521;
   return Stream(blocks, static_cast<std::uint32_t>(count % kModulus) << 16 | 1U);
 }
@@ -109,7 +109,7 @@ std::string TiffOf(const TiffParts& parts) {
 std::string ExrOf(std::int32_t last_index) {
   const std::string last = LittleEndian(static_cast<std::uint32_t>(last_index));
   const std::string window = std::string(8, '\0') + last + last;
-  const std::string one("\0\0\x80\x3F", 4);  // as a float
+  const std::string one("\0\0\x80\x3F", 4);  // 1 as a float
   const std::string channel = std::string("Y\0", 2) + LittleEndian(2) + LittleEndian(0) +
                               LittleEndian(1) + LittleEndian(1) + '\0';
   return std::string("\x76\x2F\x31\x01\x02\0\0\0", 8) +

@@ -70,7 +70,7 @@ std::vector<std::string> LinesOf(const std::string& text) {
 
 std::string PathOf(const std::string& change) { return change.substr(change.find(' ') + 1); }
 
-// A message is for a person: longer than this it is read by nobody.
+// Messages are for people, and nobody reads one that is longer than this.
 constexpr std::size_t kLongestMessageBytes = 6000;
 
 }  // namespace
@@ -125,7 +125,7 @@ Outcome HostileTest::Shell(const std::string& script, double limit_seconds) {
                             "\nexport T\nTMPDIR=" + Quoted(root_ / "tmp") + "\nexport TMPDIR\ncd " +
                             Quoted(root_ / "work") + " || exit 99\n" + script;
   const FolderTree before = TreeOf(root_ / "work");
-  // `timeout` ends the whole group of processes, RunProgram only what it started.
+  // `timeout` ends the whole group of processes, RunProgram only the process that it started.
   const tools::ProgramRun run = tools::RunProgram(
       "/usr/bin/timeout",
       {"-s", "KILL", std::to_string(static_cast<int>(limit_seconds)), "/bin/sh", "-c", whole},

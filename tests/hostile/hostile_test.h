@@ -13,48 +13,47 @@
 
 namespace thicklens::hostile {
 
-// How a script ended.
+// The outcome of a script.
 struct Outcome {
   int exit_code = -1;
   bool timed_out = false;
   double seconds = 0;
   std::string out, err;
-  std::vector<std::string> changes;  // to the work folder, see Changes()
+  std::vector<std::string> changes;  // changes to the work folder, as returned by Changes()
 };
 
-// A folder `work` with small inputs, in which the built program is started as a person would start
-// it: by a script of /bin/sh. The inputs:
+// A folder `work` with small inputs, in which a script of /bin/sh starts the built program as a
+// user would. The inputs are:
 //   camera.yaml picture.png depth.pfm     a photograph of 24 x 16 px with its camera and its depth
 //   lf/                                   a light field of 2 x 2 views of that size
 //   scene.yaml recipe.yaml                for `simulate picture` and `simulate sweep`
-// and after MakeSweep() also sweep/, 11 simulated frames of 96 x 96 px that can be calibrated.
+// and, after MakeSweep(), also sweep/: 11 simulated frames of 96 x 96 px that can be calibrated.
 class HostileTest : public ::testing::Test {
  protected:
   HostileTest();
 
-  // Runs the script in the work folder, where "$T" is the program. It is ended after the limit,
-  // along with all that it started, and fails the test then. Files for temporary use are asked for
-  // in a folder that must be empty afterwards.
+  // Runs the script in the work folder; "$T" is the program. After the limit, the script and
+  // everything that it started are ended, and the test fails. Temporary files go to a folder that
+  // must be empty afterwards.
   Outcome Shell(const std::string& script, double limit_seconds = kLimitSeconds);
 
-  // The outcome of what must have been refused: with this exit code and one line of error that
-  // holds all these texts and nothing that a terminal would obey, and without a change to the work
-  // folder.
+  // Checks that the program refused: with this exit code and one line of error, which contains all
+  // these texts and no control characters for a terminal, and without a change to the work folder.
   void ExpectRefused(const Outcome& outcome, int exit_code,
                      const std::vector<std::string>& told) const;
-  // The outcome of what must have been done: exit code 0, no error, and these changes.
+  // Checks that the program succeeded: exit code 0, no error, and these changes.
   void ExpectDone(const Outcome& outcome, const std::vector<std::string>& changes) const;
-  // What holds after each script, whatever came of it: the inputs are as they were, and nothing
-  // lies beside them but these outputs, which may be missing.
+  // Checks what holds after every script, whether it succeeded or not: the inputs are unchanged,
+  // and there is nothing beside them except these outputs, which may be missing.
   void ExpectNothingBut(const Outcome& outcome, const std::vector<std::string>& outputs) const;
 
   void MakeSweep();
 
-  // Gives the work folder to the user nobody, and tells how to start a program as that user: root
-  // may do everything. Of a user who is not root it changes nothing. Empty, and `why_not` says why,
-  // where that cannot be had.
+  // Gives the work folder to the user nobody and returns how to start a program as that user,
+  // because root may do everything. If the user is not root, nothing changes. If this is not
+  // possible, the result is empty and `why_not` gets the reason.
   std::string AsOrdinaryUser(std::string* why_not);
-  // Whether a mount namespace of one's own can be had.
+  // True if this process may create a mount namespace; otherwise `why_not` gets the reason.
   static bool HasMountNamespaces(std::string* why_not);
 
   std::string Work(const std::string& name) const { return root_ / ("work/" + name); }
@@ -77,15 +76,15 @@ class HostileTest : public ::testing::Test {
 
 std::string Repeated(const std::string& text, int times);
 
-// As one word of /bin/sh.
+// Returns the text quoted as one word of /bin/sh.
 std::string Quoted(const std::string& text);
 
-// The lines of what the program told that are errors of its own, without their prefix.
+// Returns the error lines of the program in its standard error, without their prefix.
 std::vector<std::string> ErrorsIn(const std::string& err);
 
 }  // namespace thicklens::hostile
 
-// Leaves the test where what it needs cannot be had: a reason in place of an outcome.
+// Skips the test, with the reason, if mount namespaces are not available.
 #define SKIP_WITHOUT_MOUNTS()                                   \
   do {                                                          \
     std::string why_not;                                        \

@@ -1,4 +1,4 @@
-// Images that are small files and want to become large.
+// Images that are small files and claim to be large.
 #include <cstdint>
 
 #include "hostile/hostile_images.h"
@@ -10,7 +10,7 @@ namespace {
 
 class HostileImages : public HostileTest {
  protected:
-  // Each is refused as an image and as a depth map, soon and with little memory.
+  // Each image is refused as an image and as a depth map, soon and with little memory.
   void ExpectRefusedSoon(const std::string& name, const std::vector<std::string>& told) {
     std::vector<std::string> all = {name};
     all.insert(all.end(), told.begin(), told.end());

@@ -1,4 +1,5 @@
-// Everything that a name can lead to in place of a file, for every input of every command.
+// Every kind of object that a name can refer to instead of a file, for every input of every
+// command.
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -16,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Commands with each of their inputs in turn, where an @ stands. What they write is called new.
+// Each command with an @ in the place of each of its inputs in turn. The output is called new.
 const std::vector<std::string>& Slots() {
   static const std::string estimate =
       "estimate picture.png depth.pfm --depth-kind z --depth-unit "
@@ -40,7 +41,7 @@ const std::vector<std::string>& Slots() {
       "report lf --calibration @ -o new", "report lf --estimate @ -o new",
       "report lf --comparison @ -o new",
       "camera init --from-exif @ --focal-mm 50 --f-number 2 --pitch-um 5 -o new",
-      // Those that are named in other files.
+      // Inputs that other files name.
       "calibrate sweep-of-it.yaml -o new", "calibrate camera-of-it.yaml -o new",
       "simulate picture texture-of-it.yaml -o new", "simulate picture scene-of-it.yaml -o new",
       "render views-of-it --as-captured -o new"};
@@ -57,9 +58,9 @@ class HostileInputs : public HostileTest {
         "  - {image: frames/a.png, reading_mm: 1}\n");
   }
 
-  // Makes what names the input `name` in other files.
+  // Makes the files that name the input `name`.
   void NameInFiles(const std::string& name) {
-    // Large enough a sensor for a calibration to begin.
+    // The sensor is large enough for a calibration to start.
     std::string sweep = "schema: thicklens/sweep/1\ncamera: " THICKLENS_SOURCE_DIR
                         "/configs/cameras/case-ii.yaml\nframes:\n  - {image: " +
                         name + ", reading_mm: 1}\n";
@@ -85,8 +86,8 @@ class HostileInputs : public HostileTest {
     fs::create_symlink("../../" + name, Work("views-of-it/views/view_00_01.png"));
   }
 
-  // Every command is refused by the name of that input, soon and with little memory; `usual` is
-  // how a program is started.
+  // Every command refuses the input and names it, soon and with little memory. `usual` is how a
+  // program is started.
   void ExpectEachRefusesIt(const std::string& name, const std::string& start = "") {
     for (const std::string& slot : Slots()) {
       std::string arguments = slot;
@@ -96,9 +97,9 @@ class HostileInputs : public HostileTest {
       const std::string limit = testing::kIsSanitized ? "" : "ulimit -v 4000000; ";
       const Outcome outcome = Shell(limit + start + " \"$T\" " + arguments, kSoon);
       const int code = outcome.exit_code == 2 ? 2 : 1;
-      // A view has its name in its folder.
+      // The name of a view is relative to its folder.
       const bool is_view = slot.rfind("render views-", 0) == 0;
-      if (outcome.timed_out) return;  // so would the others be
+      if (outcome.timed_out) return;  // the other commands would time out as well
       ExpectRefused(outcome, code, {is_view ? "view_00_01.png" : name});
     }
   }

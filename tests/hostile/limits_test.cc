@@ -1,4 +1,4 @@
-// What `ulimit` takes away.
+// Resources that `ulimit` takes away.
 #include <filesystem>
 
 #include "hostile/hostile_test.h"
@@ -17,8 +17,9 @@ class HostileLimits : public HostileTest {
     if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer takes memory, threads and files itself";
   }
 
-  // Done, or refused with a reason by the program, by the loader, which has no room for it, or by a
-  // library that wants threads. The output is there in the first case only; nothing else comes.
+  // The command either succeeds or is refused with a reason by the program, by the loader, which
+  // has no memory for it, or by a library that needs threads. Only if it succeeds does it leave an
+  // output, and it leaves nothing besides.
   Outcome ExpectDoneOrTold(const std::string& limit, const std::string& script) {
     SCOPED_TRACE(limit + script);
     const Outcome outcome = Shell(limit + script);

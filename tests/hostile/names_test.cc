@@ -1,4 +1,4 @@
-// Names of files as nobody would choose them.
+// Unusual names of files.
 #include <sys/stat.h>
 
 #include <filesystem>

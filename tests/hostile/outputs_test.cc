@@ -1,4 +1,4 @@
-// Places that an output cannot or must not be written to.
+// Places to which an output cannot or must not be written.
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>

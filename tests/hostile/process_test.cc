@@ -14,12 +14,12 @@ using ::testing::IsEmpty;
 
 class HostileProcess : public HostileTest {
  protected:
-  // The content of a JSON file that a run wrote, without what differs from run to run.
+  // Returns the content of a JSON file that a run wrote, without what differs from run to run.
   nlohmann::json JsonIn(const std::string& name) {
     return nlohmann::json::parse(testing::ContentOf(Work(name)), nullptr, false);
   }
 
-  // Sends the signal after so many seconds to the command, which writes `new`.
+  // Starts the command, which writes `new`, and sends it the signal after so many seconds.
   void Stop(const std::string& script, const std::string& signal, double seconds) {
     SCOPED_TRACE("SIG" + signal + " after " + std::to_string(seconds) + " s: " + script);
     const Outcome outcome = Shell(
@@ -28,7 +28,7 @@ class HostileProcess : public HostileTest {
             "1000000)); exit $code",
         kLimitSeconds);
     ExpectNothingBut(outcome, {"new"});
-    // Before it listens, the signal ends it as it ends any program.
+    // Until the program installs its handler, the signal ends it as it ends any program.
     EXPECT_THAT(outcome.exit_code, AnyOf(0, 1, 128 + 15, 128 + 1)) << outcome.err;
     if (outcome.exit_code != 0) {
       EXPECT_FALSE(fs::exists(Work("new")));
@@ -36,7 +36,7 @@ class HostileProcess : public HostileTest {
     if (outcome.exit_code == 1) {
       EXPECT_THAT(ErrorsIn(outcome.err), ::testing::ElementsAre(HasSubstr("interrupted")));
     }
-    // It is promised within 1 s; a machine that runs much else may take longer.
+    // The program promises to stop within 1 s, but a busy machine may take longer.
     constexpr int kMostMs = 10000;
     EXPECT_LE(std::atoi(outcome.out.c_str()), kMostMs);
     fs::remove_all(Work("new"));
@@ -68,7 +68,7 @@ THICKLENS_SITUATION(HostileProcess, ClosedDescriptors,
                                      ((closed & 2) != 0 ? " >&-" : "") +
                                      ((closed & 4) != 0 ? " 2>&-" : "");
     SCOPED_TRACE(redirections);
-    // Not --quiet: results and warnings are told.
+    // The command runs without --quiet, so that it prints results and warnings.
     const Outcome outcome =
         Shell("\"$T\" explain camera.yaml --depth-range 290:310 --json new.json" + redirections);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -12,17 +12,17 @@ namespace thicklens::hostile {
 struct Situation {
   std::string test;      // "HostileNames.ANewline"
   std::string done;      // what is done to the program
-  std::string required;  // what must come of it
+  std::string required;  // the required outcome
 };
 
-// All situations of this test program, in no certain order.
+// All situations of this test program, in no particular order.
 std::vector<Situation>& Situations();
 bool ListSituation(const std::string& test, const std::string& done, const std::string& required);
 
 }  // namespace thicklens::hostile
 
-// A test of a situation, which stands in the table with these words. `group` is a name for
-// HostileTest.
+// Defines the test of a situation, which has a row with these words in the table. `group` is an
+// alias of HostileTest.
 #define THICKLENS_SITUATION(group, name, done, required)                     \
   [[maybe_unused]] static const bool group##_##name##_is_listed =            \
       ::thicklens::hostile::ListSituation(#group "." #name, done, required); \

@@ -1,4 +1,4 @@
-// docs/hostile-situations.md has a row for each situation that is tested, word for word.
+// docs/hostile-situations.md has a row for each tested situation, word for word.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -14,7 +14,7 @@ using ::testing::Not;
 class HostileText : public HostileTest {
  protected:
   std::string Camera() const { return testing::ContentOf(Work("camera.yaml")); }
-  // camera.yaml with another value.
+  // Returns camera.yaml with another value.
   std::string CameraWith(const std::string& from, const std::string& to) const {
     std::string camera = Camera();
     EXPECT_NE(camera.find(from), std::string::npos) << from << "\n" << camera;

@@ -1,9 +1,9 @@
-// Loaded before the C library (LD_PRELOAD), it makes the program's writing to a folder fail from a
-// chosen call on, as a disk does that is full, over its quota or broken:
+// This library is loaded before the C library (LD_PRELOAD). It makes the program's writing to a
+// folder fail from a chosen call on, as on a disk that is full, over its quota or broken:
 //   THICKLENS_WRITE_FAULT=N:ERRNO:FOLDER   N counts from 1 in each process
 //   THICKLENS_FAULT_MARK=FILE              is made when a call failed for the first time
-// Only calls that write, create or rename below the folder count and fail: those that remove do
-// not, and reading works.
+// Only calls that write, create or rename below the folder count and fail. Calls that remove
+// something do not fail, and reading works.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -45,7 +45,7 @@ const Fault& TheFault() {
   return fault;
 }
 
-// True, with errno set, where this call must fail.
+// Returns true and sets errno if this call must fail.
 bool FailsNow() {
   static std::atomic<int> calls{0};
   const int call = ++calls;
@@ -64,7 +64,7 @@ bool IsBelow(const char* path) {
   return std::strncmp(path, TheFault().folder, length) == 0;
 }
 
-// What an open file is called now.
+// Looks at the name that the open file has now.
 bool IsBelow(int fd) {
   char link[64], path[4096];
   std::snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
@@ -74,7 +74,8 @@ bool IsBelow(int fd) {
   return IsBelow(path);
 }
 
-// A name as the program gives it, which may begin in the current folder or in an open one.
+// Looks at a name as the program gives it, which may be relative to the current folder or to an
+// open one.
 bool IsBelow(int folder, const char* path) {
   if (path[0] == '/') return IsBelow(path);
   if (folder != AT_FDCWD) return IsBelow(folder);
