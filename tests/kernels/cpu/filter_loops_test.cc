@@ -18,8 +18,8 @@ using ::thicklens::testing::kUntouched;
 using ::thicklens::testing::Planes;
 using ::thicklens::testing::RandomPlanes;
 
-// Whatever this processor chooses, the loops for the others are tested as well: these and the
-// fastest must agree. What is right is tested with the fastest.
+// The loops for all processors are tested, not only those that this processor selects: they must
+// agree with the fastest ones, whose results are compared with the reference.
 template <typename Real>
 class FilterLoopsTest : public ::testing::Test {
  protected:

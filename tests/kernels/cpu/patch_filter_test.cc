@@ -33,7 +33,7 @@ double Cosine(int k, int j) {
   return table[Index(k * kEdge + j)];
 }
 
-// Patch by patch, by the sums that define it.
+// Filters patch by patch with the sums that define the filter.
 std::vector<double> FilterPlane(int width, int height, const std::vector<double>& picture,
                                 double threshold) {
   std::vector<double> sum(picture.size()), weights(picture.size());
@@ -70,7 +70,7 @@ std::vector<double> FilterPlane(int width, int height, const std::vector<double>
   return sum;
 }
 
-// Noise around a mean with an edge and a slope.
+// Makes noise around a mean, with an edge and a slope.
 template <typename Real>
 std::vector<Real> Sample(int width, int height, int channels, double sigma, unsigned seed) {
   std::mt19937 engine(seed);
@@ -109,7 +109,8 @@ TYPED_TEST(PatchFilterTest, DoesWhatDefinesIt) {
       const std::vector<double> right = FilterPlane(size.width, size.height, from, 0.05);
       double squares = 0;
       for (std::size_t i = 0; i < pixels; ++i) {
-        // A wave that is about as high as the threshold may fall to either side.
+        // Rounding decides about a wave whose coefficient is close to the threshold, so a single
+        // pixel may differ by more.
         const double error = static_cast<double>(found[plane + i]) - right[i];
         squares += error * error;
         ASSERT_NEAR(error, 0, sizeof(TypeParam) == sizeof(float) ? 2e-3 : 1e-12)
@@ -149,7 +150,7 @@ TYPED_TEST(PatchFilterTest, LeavesAConstantAndAWaveAsTheyAre) {
   std::vector<TypeParam> constant(kWidth * kHeight, TypeParam(0.7)), wave;
   const auto flat = FilterPatches(kWidth, kHeight, 1, constant, 1e9, 1);
   for (const TypeParam value : flat) EXPECT_NEAR(value, 0.7, this->kTolerance);
-  // A wave of period 8: what any patch sees of it is far above the threshold, but for nothing.
+  // In a wave of period 8, every coefficient of a patch is either 0 or far above the threshold.
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       wave.push_back(static_cast<TypeParam>(std::cos(kPi * (2 * x + 1) / kEdge)));
@@ -172,12 +173,13 @@ TYPED_TEST(PatchFilterTest, TakesNoiseOut) {
     }
     return std::sqrt(sum / static_cast<double>(values.size()));
   };
-  // Of 64 cosines the mean is left, whose deviation is 1/8 of the pixels', less by what patches
-  // share; and a few in a thousand.
+  // Only the mean is left of the 64 cosines of a patch, with 1/8 of the standard deviation of the
+  // pixels, reduced further because patches overlap, and a few in a thousand of the other
+  // coefficients.
   const double left = rms(FilterPatches(kWidth, kHeight, 3, noise, 0.03, 1));
   EXPECT_LT(left, 0.0016);
   EXPECT_GT(left, 0.0005);
-  // And all of it where nothing is cut.
+  // With the threshold 0 all noise is left.
   EXPECT_NEAR(rms(FilterPatches(kWidth, kHeight, 3, noise, 0.0, 1)), rms(noise), 1e-6);
 }
 
@@ -196,7 +198,7 @@ TYPED_TEST(PatchFilterTest, DoesNotDependOnThreads) {
   }
 }
 
-// Rows farther than 7 px change nothing, so that bands of a picture fit together.
+// Rows farther than 7 px have no influence, so that bands of a picture fit together.
 TYPED_TEST(PatchFilterTest, LooksNoFartherThanAPatch) {
   const auto picture = Sample<TypeParam>(40, 60, 1, 0.02, 6);
   const std::vector<TypeParam> part(picture.begin() + 40 * 20, picture.end());
@@ -216,7 +218,7 @@ TYPED_TEST(PatchFilterTest, LoopsForAllProcessorsAgree) {
     std::copy_n(picture.begin() + y * kWidth, kWidth, from.begin() + y * kStride);
   }
   std::vector<TypeParam> columns(from.size());
-  // No threshold: rounding could otherwise tell for or against a wave.
+  // The threshold is 0, because rounding could otherwise decide whether a wave is kept.
   const auto filter = [&](const PatchLoops<TypeParam>& loops) {
     std::vector<TypeParam> sum(from.size()), weight(from.size());
     loops.filter_row({from.data(), columns.data(), kStride, kWidth - kPatchPx + 1, TypeParam(0),

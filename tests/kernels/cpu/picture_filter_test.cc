@@ -27,7 +27,8 @@ using ::thicklens::testing::RandomPlanes;
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// Radii 0 to 11 mixed, and one that is larger than most of the pictures.
+// Makes a filter whose radii are a mixture of 0 to 11, and one that is larger than most of the
+// pictures.
 template <typename Real>
 PixelFilter<Real> RandomFilter(Axis axis, int width, int height, std::uint32_t seed) {
   PixelFilter<Real> filter;
@@ -56,7 +57,7 @@ PixelFilter<Real> RandomFilter(Axis axis, int width, int height, std::uint32_t s
   return filter;
 }
 
-// Calls entry(p, q, c_n(p)) for pixel numbers p and q = p + n e that are inside.
+// Calls entry(p, q, c_n(p)) for the pixel numbers p and q = p + n e that are inside.
 template <typename Real, typename Entry>
 void ForEachCoefficient(const PixelFilter<Real>& filter, const Entry& entry) {
   for (int y = 0; y < filter.height_px; ++y) {
@@ -99,7 +100,7 @@ const std::vector<Size>& Sizes() {
 template <typename Real>
 class PictureFilterTest : public ::testing::Test {
  protected:
-  // Of sums of some hundred numbers below 1.
+  // The tolerance is that of sums of some hundred numbers below 1.
   static constexpr double kTolerance = sizeof(Real) == sizeof(float) ? 2e-5 : 1e-13;
 };
 using Reals = ::testing::Types<float, double>;
@@ -133,8 +134,8 @@ TYPED_TEST(PictureFilterTest, FiltersLikeThePlainSum) {
   }
 }
 
-// What is read beside the picture has no coefficient: it must not be seen if it is not a number,
-// either, be it left from another row or block.
+// Values outside the picture have no coefficient. They must have no influence even if they are NaN,
+// for example because they were left by another row or block.
 TYPED_TEST(PictureFilterTest, WhatIsNotANumberStaysInItsFan) {
   for (const Size size : {Size{130, 60}, Size{64, 5}, Size{37, 30}}) {
     for (const Axis axis : {Axis::kAcross, Axis::kDown}) {
@@ -184,8 +185,7 @@ TYPED_TEST(PictureFilterTest, TransposedIsTheAdjoint) {
   }
 }
 
-// A filter with one block's coefficients 1 puts every pixel of the block, and no other, where it
-// belongs.
+// A filter whose coefficients are 1 in one block shifts every pixel of that block, and no other.
 TYPED_TEST(PictureFilterTest, ShiftsBlocksByHand) {
   PixelFilter<TypeParam> filter;
   filter.width_px = 128;
@@ -230,7 +230,7 @@ std::vector<Real> AllResults(int threads) {
 
 TYPED_TEST(PictureFilterTest, ThreadsDoNotChangeABit) {
   const std::vector<TypeParam> one = AllResults<TypeParam>(1);
-  // Several times, for two threads that disturb each other to have a chance of it.
+  // Several runs give two threads a chance to disturb each other.
   for (const int threads : {2, 3, 7, 2, 2, 2, 2, 2}) {
     const std::vector<TypeParam> many = AllResults<TypeParam>(threads);
     ASSERT_EQ(many.size(), one.size());

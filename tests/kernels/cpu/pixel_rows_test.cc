@@ -27,7 +27,7 @@ class PixelRowsTest : public ::testing::Test {};
 using Reals = ::testing::Types<float, double>;
 TYPED_TEST_SUITE(PixelRowsTest, Reals);
 
-// Rows with 0 to 40 entries, some pixels twice.
+// Makes rows with 0 to 40 entries, in which some pixels occur twice.
 template <typename Real>
 PixelRows<Real> RandomRows(int pixels, std::uint32_t seed) {
   PixelRows<Real> rows;
@@ -47,7 +47,7 @@ PixelRows<Real> RandomRows(int pixels, std::uint32_t seed) {
   return rows;
 }
 
-// (row, column) -> values of that entry, in order.
+// Maps (row, column) to the values of that entry, in order.
 template <typename Real>
 std::map<std::pair<int, int>, std::vector<Real>> Entries(const PixelRows<Real>& rows,
                                                          bool swapped) {
@@ -77,7 +77,7 @@ TYPED_TEST(PixelRowsTest, TransposedRowsAreTheTransposedMatrix) {
   const PixelRows<TypeParam> twice = Transposed(transposed);
   Check(twice);
   EXPECT_EQ(Entries(twice, false), Entries(rows, false));
-  // Sorted once, rows come back number by number.
+  // Rows that are sorted stay identical if they are transposed twice.
   const PixelRows<TypeParam> four_times = Transposed(Transposed(twice));
   EXPECT_EQ(four_times.pixel, twice.pixel);
   EXPECT_EQ(four_times.start, twice.start);
@@ -109,7 +109,7 @@ TYPED_TEST(PixelRowsTest, DotIsThePlainSum) {
       weighted += static_cast<long double>(x[i]) * static_cast<long double>(y[i]) *
                   static_cast<long double>(w[i]);
     }
-    // In double, for float, too.
+    // Sums are computed in double, for float as well.
     EXPECT_NEAR(Dot<TypeParam>(x.data(), y.data(), nullptr, count, 2), static_cast<double>(plain),
                 1e-15 * static_cast<double>(count));
     EXPECT_NEAR(Dot(x.data(), y.data(), w.data(), count, 2), static_cast<double>(weighted),

@@ -24,14 +24,14 @@ std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 template <typename Real>
 class PixelRunsTest : public ::testing::Test {
  protected:
-  // Of sums of some hundred numbers below 1.
+  // The tolerance is that of sums of some hundred numbers below 1.
   static constexpr double kTolerance = sizeof(Real) == sizeof(float) ? 5e-5 : 1e-13;
 };
 using Reals = ::testing::Types<float, double>;
 TYPED_TEST_SUITE(PixelRunsTest, Reals);
 
-// Two thirds of the pixels have rows, or few, with 0 to 12 runs that begin at most `reach` rows
-// above or below their pixel, anywhere in the row; some overlap.
+// Two thirds of the pixels have rows, or only a few have. A row has 0 to 12 runs, which begin at
+// most `reach` rows above or below their pixel, anywhere in the row. Some runs overlap.
 template <typename Real>
 PixelRuns<Real> RandomRuns(int width_px, int height_px, int reach, std::uint32_t seed,
                            bool few = false) {
@@ -58,7 +58,7 @@ PixelRuns<Real> RandomRuns(int width_px, int height_px, int reach, std::uint32_t
   return runs;
 }
 
-// All of them, as (pixel, pixel that it reads, weight).
+// Calls use(pixel, pixel that it reads, weight) for all entries.
 template <typename Real, typename Use>
 void ForWeights(const PixelRuns<Real>& runs, const Use& use) {
   for (std::size_t r = 0; r < runs.pixel.size(); ++r) {
@@ -93,7 +93,7 @@ TYPED_TEST(PixelRunsTest, RunsAreThePlainSum) {
         for (int p = 0; p < pixels; ++p) {
           ASSERT_NEAR(y.at(c, p), plain[Index(p)], this->kTolerance)
               << width << " pixels wide, channel " << c << " of " << channels;
-          // Beside 1234 there are 4 digits less.
+          // The sum is added to 1234, which costs it 4 digits.
           ASSERT_NEAR(back.at(c, p), plain_back[Index(p)], 100 * this->kTolerance);
         }
       }
@@ -163,7 +163,7 @@ TYPED_TEST(PixelRunsTest, FormsSayTheSame) {
   for (std::size_t i = 0; i < y.values.size(); ++i) {
     ASSERT_NEAR(y.values[i], z.values[i], this->kTolerance);
   }
-  // What follows each other shares a run.
+  // Consecutive entries share a run.
   EXPECT_LE(again.index.size(), runs.index.size());
 }
 

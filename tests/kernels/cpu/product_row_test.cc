@@ -1,4 +1,4 @@
-// Whole rows of rays against a plain check of one ray at a time.
+// Whole rows of rays are compared with a plain check of one ray at a time.
 #include "thicklens/kernels/product_row.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// The device's steps against the native ones, which are given the dense matrix of the projection.
+// The device's steps are compared with the native ones, which get the dense matrix of the
+// projection.
 #include "thicklens/kernels/radiance_steps.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +24,7 @@ namespace {
 
 using ::thicklens::testing::SampleProjection;
 
-// A machine on which tests run has an OpenCL device: none is a failure here.
+// A machine that runs the tests has an OpenCL device, so a missing one is a failure.
 std::shared_ptr<const OpenClDevice> Device() {
   static const std::shared_ptr<const OpenClDevice> device = [] {
     DeviceRequest request;
@@ -34,7 +35,7 @@ std::shared_ptr<const OpenClDevice> Device() {
   return device;
 }
 
-// The device as it is, or as one whose items are single pixels.
+// The device as it is, or with single pixels as its items.
 enum class Form { kOwn, kSinglePixels };
 
 std::shared_ptr<const OpenClDevice> DeviceIn(Form form) {
@@ -59,14 +60,14 @@ double RelativeError(const std::vector<Real>& found, const std::vector<Real>& ri
     scale = std::max(scale, std::abs(static_cast<double>(right[i])));
     const double difference =
         std::abs(static_cast<double>(found[i]) - static_cast<double>(right[i]));
-    if (!(difference <= error)) error = difference;  // keeps NaN
+    if (!(difference <= error)) error = difference;  // also if it is NaN
   }
   return scale > 0 ? error / scale : error;
 }
 
 struct Case {
   int width, height, channels, products;
-  unsigned every;  // pixel with a row; 0: none
+  unsigned every;  // every how many pixels one has a row; 0: none has one
 };
 const std::vector<Case>& Cases() {
   static const std::vector<Case> cases = {{37, 21, 3, 1, 4}, {64, 9, 1, 1, 0}, {65, 8, 3, 0, 1},
@@ -92,7 +93,7 @@ class RadianceStepsTest : public ::testing::Test {
     EXPECT_NEAR(found, right, 10 * kTolerance * std::abs(right) + 1e-30);
   }
 
-  // The steps of both, each with the native one's numbers.
+  // Compares the steps of both. Before each step, the device gets the numbers of the native one.
   static void ExpectSameSteps(int count, RadianceSteps<Number>* device,
                               RadianceSteps<Number>* native, bool touch) {
     ExpectAlike(device->SquaredRightSide(), native->SquaredRightSide());
@@ -211,7 +212,7 @@ TYPED_TEST(RadianceStepsTest, StepsAreTheNativeOnes) {
     }
     this->ExpectSameSteps(3, device.get(), native.get(), true);
     SCOPED_TRACE("then one plane");
-    // One plane, with the quadratic that was touched last.
+    // The steps for one plane use the quadratic that was set last.
     const std::vector<Real> other = SampleProjection<Real>::Numbers(data.pixels(), ++seed);
     for (auto* steps : {device.get(), native.get()}) {
       steps->StartFor(other, std::vector<Real>(data.pixels(), Real{0}));

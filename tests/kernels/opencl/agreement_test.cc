@@ -16,14 +16,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// What a device may do wrong: `method` adds `amount` to one of its numbers.
+// A fault of a device: `method` adds `amount` to one of its numbers.
 struct Fault {
   std::string method;
   double amount = 0;
   bool has_double = true;
 };
 
-// The twin with a fault. Of each result the last number but one is changed.
+// The reference with a fault. In each result the last number but one is changed.
 template <typename Real>
 class Faulty : public Kernels<Real> {
  public:
@@ -90,7 +90,8 @@ class Faulty : public Kernels<Real> {
   std::unique_ptr<Kernels<Real>> twin_;
 };
 
-// The native steps with a fault: sums are wrong by that share, of pictures the last number but one.
+// The native steps with a fault: sums are wrong by that relative amount, and in pictures the last
+// number but one is changed.
 template <typename Real>
 class FaultySteps : public RadianceSteps<Real> {
  public:
@@ -194,7 +195,7 @@ TEST(Agreement, TheTwinAgreesWithItself) {
   EXPECT_EQ(check.double_error, 0);
 }
 
-// A wrong number in any of the methods is seen, in either precision, and told.
+// A wrong number in any of the methods is detected and reported, in both precisions.
 TEST(Agreement, SeesAFaultOfEveryMethod) {
   for (const char* method :
        {"FindRays", "WeighRays", "WarpDifferences", "SixTermMasks", "Multiply",
@@ -215,7 +216,7 @@ TEST(Agreement, SeesAFaultOfEveryMethod) {
   }
 }
 
-// Views are made in float alone.
+// Views are made in float only.
 TEST(Agreement, SeesAFaultyView) {
   const AgreementCheck check = Check({"WarpView", 0.01}, {});
   EXPECT_FALSE(check.agrees);
@@ -228,11 +229,11 @@ TEST(Agreement, HasItsLimits) {
   EXPECT_FALSE(Check({"FormPicture", 1e-3}, {}).agrees);
   EXPECT_TRUE(Check({}, {"FormPicture", 1e-12}).agrees);
   EXPECT_FALSE(Check({}, {"FormPicture", 1e-9}).agrees);
-  // Pictures are of 0 to 1.
+  // The values of pictures are between 0 and 1.
   EXPECT_NEAR(Check({"FormPicture", 1e-3}, {}).float_error, 1e-3, 1e-3);
 }
 
-// NaN passes every comparison with < unless it is asked for.
+// Comparisons of NaN with < are always false, so NaN needs a check of its own.
 TEST(Agreement, NoNumberIsADifference) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(Check({"Multiply", nan}, {}).agrees);

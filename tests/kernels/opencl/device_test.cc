@@ -39,7 +39,8 @@ using Kind = DeviceRequest::Kind;
 
 constexpr double kLongS = 60;
 
-// The process's first use of OpenCL has to be a child: tests that need a device start here.
+// The first use of OpenCL must be in a child process, so tests that need a device begin with this
+// function.
 const DeviceDescription& AnyDevice() {
   const DeviceSurvey& survey = SurveyDevices();
   for (const DeviceDescription& device : survey.devices) {
@@ -190,7 +191,7 @@ TEST(RunInChild, CatchesWhatIsPrintedAndTellsItsLastLine) {
   EXPECT_THAT(outcome.failure, ::testing::EndsWith("last words: second: cause"));
 }
 
-// A grandchild that outlives the child must not keep the parent waiting.
+// A grandchild that outlives the child must not block the parent.
 TEST(RunInChild, DoesNotWaitForGrandchildren) {
   const ChildOutcome outcome = RunInChild(
       [](const Tell& tell) {
@@ -213,8 +214,9 @@ TEST(RunInChild, DoesNotInheritSignalHandlersOrBlockedSignals) {
   EXPECT_THAT(outcome.failure, HasSubstr("crashed (signal 14"));
 }
 
-// As Ctrl-C in a terminal does, and a service's stop. The child sends the signals itself, so that
-// they come while it works; all in a group of its own, so that nobody else hears them.
+// Ctrl-C in a terminal and the stop of a service signal the whole group. The child sends the
+// signals itself, so that they arrive while it works, and it is in a group of its own, so that no
+// other process gets them.
 TEST(RunInChild, LeavesRequestsToStopToTheParent) {
   const ChildOutcome tested = RunInChild(
       [](const Tell& tell_test) {
@@ -249,7 +251,7 @@ TEST(RunInChild, ARequestToStopEndsTheChildAndItsChildren) {
                    kLongS,
                    [&] {
                      char both[2];
-                     // Both are there before the end begins.
+                     // Both processes run before the end begins.
                      if (++calls == 3) {
                        EXPECT_EQ(::read(ends[0], both, 1), 1);
                        EXPECT_EQ(::read(ends[0], both, 1), 1);
@@ -258,7 +260,7 @@ TEST(RunInChild, ARequestToStopEndsTheChildAndItsChildren) {
                    }),
                Interrupted);
   EXPECT_EQ(calls, 3);
-  // Ends only when nobody has the other end any more.
+  // Ends only after all copies of the other end are closed.
   ::close(ends[1]);
   pollfd hang_up{ends[0], 0, 0};
   EXPECT_EQ(::poll(&hang_up, 1, 10000), 1) << "what the child started lives on";
@@ -266,7 +268,8 @@ TEST(RunInChild, ARequestToStopEndsTheChildAndItsChildren) {
   EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "the child was not waited for";
 }
 
-// However that ends: here at once, as after a second signal.
+// The child must end however its parent ends. Here the parent ends at once, as after a second
+// signal.
 TEST(RunInChild, EndsWithTheProcessThatStartedIt) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
@@ -284,7 +287,7 @@ TEST(RunInChild, EndsWithTheProcessThatStartedIt) {
       },
       kLongS);
   EXPECT_THAT(outcome.failure, HasSubstr("exit code 3"));
-  // Ends only when nobody has the other end any more.
+  // Ends only after all copies of the other end are closed.
   ::close(ends[1]);
   pollfd hang_up{ends[0], 0, 0};
   EXPECT_EQ(::poll(&hang_up, 1, 10000), 1) << "the child lives on";
@@ -345,7 +348,7 @@ TEST(Survey, EveryFieldOfADeviceIsReported) {
   EXPECT_EQ(read.problem, "a problem");
 }
 
-// One driver that crashes does not hide the devices of the others.
+// A driver that crashes does not hide the devices of the others.
 TEST(Survey, GoesOnAfterAPlatformThatCrashes) {
   const DeviceSurvey survey = SurveyWith(
       [](int first_platform, const Tell& tell) {
@@ -376,7 +379,7 @@ TEST(Survey, EndsIfTheDriversCannotEvenBeLoaded) {
   EXPECT_THAT(hung.problems[0], HasSubstr("did not end within 0.2 s"));
 }
 
-// The real thing. Every machine that runs these tests has a device: PoCL.
+// A survey of the drivers of this machine. Every machine that runs these tests has a device: PoCL.
 TEST(Survey, FindsADevice) {
   const DeviceDescription& device = AnyDevice();
   EXPECT_FALSE(device.name.empty());
@@ -411,7 +414,7 @@ TEST(OpenBackend, AutoIsADeviceWhereThereIsOne) {
   EXPECT_EQ(same->name(), backend->name());
 }
 
-// First the survey is broken off, then the trial of a device.
+// The request arrives first during the survey, then during the trial of a device.
 TEST(OpenBackend, ARequestToStopIsObeyed) {
   const auto stop = [] { throw Interrupted(); };
   if (IsOpenClInUse()) GTEST_SKIP() << "OpenCL is in use: no child is waited for any more";
@@ -460,7 +463,7 @@ TEST(BuildProgram, HasTheCompilersMessageWithFileAndLine) {
   EXPECT_THAT(message, Not(HasSubstr("first.cl:")));
 }
 
-// What NVIDIA's compiler said of the program of the test above.
+// The log is what NVIDIA's compiler printed for the program of the test above.
 TEST(BuildProgram, NamesFilesWhereTheCompilerCountsTheLinesOfAllOfThem) {
   const std::string source =
       "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n"
@@ -473,7 +476,8 @@ TEST(BuildProgram, NamesFilesWhereTheCompilerCountsTheLinesOfAllOfThem) {
                            source),
             "kernels/opencl/second.cl:2:10: error: use of undeclared identifier 'nonsense'\n"
             "  x[0] = nonsense;\n         ^\nkernels/opencl/first.cl:1:1: note: see here\n");
-  // Of no file, of no line there is, and of other compilers: as they are.
+  // Logs that name no file, a line that does not exist, or that are from other compilers stay
+  // unchanged.
   for (const char* log : {"<kernel>:1:1: x", "<kernel>:0:1: x", "<kernel>:11:1: x", "a.cl:8:1: x",
                           "<kernel>:99999999999:1: x", ""}) {
     EXPECT_EQ(WithFilesNamed(log, source), log);

@@ -35,7 +35,7 @@ TEST(EmbeddedKernelFiles, AreTheFilesOfTheSourceTree) {
   EXPECT_EQ(embedded, there);
 }
 
-// The bytes that a C++ compiler would read in the array `name`, less the closing 0.
+// Returns the bytes that a C++ compiler would read in the array `name`, without the 0 at the end.
 std::string BytesOf(const std::string& source, const std::string& name) {
   const std::size_t begin = source.find('{', source.find("char " + name + "[]"));
   const std::string list = source.substr(begin, source.find('}', begin) - begin);

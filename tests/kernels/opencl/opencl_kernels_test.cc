@@ -33,7 +33,7 @@ using ::thicklens::testing::RandomReals;
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// A machine on which tests run has an OpenCL device: none is a failure here.
+// A machine that runs the tests has an OpenCL device, so a missing one is a failure.
 Backend* OpenClBackend() {
   static const std::shared_ptr<Backend> backend = [] {
     DeviceRequest request;
@@ -43,8 +43,8 @@ Backend* OpenClBackend() {
   return backend.get();
 }
 
-// A real number, and how the device comes to its arrays. PoCL shares the host's memory, which hides
-// whatever is not brought to the device or home; so that both ways are gone.
+// A number type, and how the device accesses its arrays. PoCL shares the host's memory, which would
+// hide a missing copy to or from the device. Therefore copied memory is tested as well.
 template <typename RealType, HostMemory kMemory>
 struct Setting {
   using Real = RealType;
@@ -73,7 +73,7 @@ std::unique_ptr<Kernels<typename Setting::Real>> NewOnDevice() {
   }
 }
 
-// Largest difference, relative to the largest value of the twin.
+// The largest difference, relative to the largest value of the reference.
 template <typename Real>
 double RelativeError(const std::vector<Real>& device, const std::vector<Real>& twin) {
   EXPECT_EQ(device.size(), twin.size());
@@ -84,7 +84,7 @@ double RelativeError(const std::vector<Real>& device, const std::vector<Real>& t
     scale = std::max(scale, std::abs(static_cast<double>(twin[i])));
     const double difference =
         std::abs(static_cast<double>(device[i]) - static_cast<double>(twin[i]));
-    if (!(difference <= error)) error = difference;  // keeps NaN
+    if (!(difference <= error)) error = difference;  // also if it is NaN
   }
   return scale > 0 ? error / scale : error;
 }
@@ -148,7 +148,7 @@ TYPED_TEST(OpenClKernelsTest, Projection) {
                             this->twin_->WeighRays(block, splat, rays, irradiance));
       this->ExpectAgreement(this->device_->WeighRays(block, splat, rays, {}),
                             this->twin_->WeighRays(block, splat, rays, {}));
-      // Some views without weight, then all: rows without a sum.
+      // First some views have no weight, then all, which leaves rows without a sum.
       for (std::size_t view = 0; view < block.view_weight.size(); view += 2) {
         block.view_weight[view] = 0;
       }
@@ -179,7 +179,8 @@ TYPED_TEST(OpenClKernelsTest, Masks) {
     for (std::size_t i = 5; i < slope_v.size(); i += 7) slope_v[i] = special[i / 7 % 6];
     this->ExpectAgreement(this->device_->WarpDifferences(block, slope_u, slope_v),
                           this->twin_->WarpDifferences(block, slope_u, slope_v));
-    // Without the squares of huge numbers, beside which all else would agree.
+    // Without the squares of huge numbers: relative to them, any other difference would be
+    // negligible.
     for (Real& slope : slope_u) slope = std::abs(slope) > 3 ? kNan : slope;
     for (Real& slope : slope_v) slope = std::abs(slope) > 3 ? kInfinity : slope;
     this->ExpectAgreement(this->device_->SixTermMasks(block, slope_u, slope_v),
@@ -200,7 +201,7 @@ TYPED_TEST(OpenClKernelsTest, SparseProducts) {
       this->ExpectAgreement(this->device_->Multiply(a, x), this->twin_->Multiply(a, x));
       this->ExpectAgreement(this->device_->MultiplyTransposed(a, y),
                             this->twin_->MultiplyTransposed(a, y));
-      // A pattern with more than the product has.
+      // The pattern has more entries than the product.
       const CsrPattern pattern =
           SumPattern(NormalPattern(a), PatternOf(RandomCsr<float>(columns, columns, 0.2, seed)));
       auto on_device = RandomReals<Real>(pattern.column.size(), -1, 1, seed);
@@ -242,7 +243,7 @@ TYPED_TEST(OpenClKernelsTest, Picture) {
       auto views = RandomReals<Real>(view_samples * Index(block.views()), -1, 1, seed);
       this->ExpectAgreement(this->device_->FormPicture(block, splat, views),
                             this->twin_->FormPicture(block, splat, views));
-      // A view without weight is not looked at.
+      // A view without weight is ignored.
       block.view_weight[0] = 0;
       std::fill_n(views.begin(), view_samples, std::numeric_limits<Real>::quiet_NaN());
       this->ExpectAgreement(this->device_->FormPicture(block, splat, views),
@@ -290,7 +291,7 @@ TYPED_TEST(OpenClKernelsTest, EmptyArgumentsHaveEmptyResults) {
   device->AddBlock(block, 0, {});
   EXPECT_EQ(device->FinishWhole(), std::vector<float>(Index(4 * 81)));
 
-  // No view, and a light field without samples.
+  // A block without a view, and a light field without samples.
   block = RandomBlock({0, 0, 3, 5, 9, 9, 0, 2}, 0, 1);
   EXPECT_TRUE(device->FindRays(block, Splat::kBilinear).empty());
   EXPECT_EQ(device->FormPicture(block, Splat::kNearest, {}), std::vector<Real>(15));
@@ -336,7 +337,7 @@ TYPED_TEST(OpenClKernelsTest, WhatTheDeviceCannotAllocateIsNamed) {
   EXPECT_NE(said.find("400000000000000 bytes are needed"), std::string::npos) << said;
   EXPECT_NE(said.find("channel of the light field"), std::string::npos) << said;
   EXPECT_NE(said.find("--device cpu computes it"), std::string::npos) << said;
-  // And it goes on.
+  // The device still works afterwards.
   this->device_->StartWhole(2, 2, 1, 1, 1);
   EXPECT_EQ(this->device_->FinishWhole().size(), 4U);
 }
@@ -381,7 +382,7 @@ TYPED_TEST(OpenClKernelsTest, TheSameBitsEveryTime) {
   EXPECT_EQ(this->device_->Clone()->FormPicture(block, Splat::kBilinear, views), once);
 }
 
-// Memory that is lent goes when an error, or somebody who stops the run, unwinds its owner.
+// Memory that is lent to the device is freed when an error or a request to stop unwinds its owner.
 TEST(DeviceArray, WaitsForCallsThatWorkInItBeforeItGoes) {
   const DeviceRequest place = ParseDeviceRequest(OpenClBackend()->name());
   const auto device = OpenOpenClDevice(place.platform, place.device);

@@ -19,7 +19,7 @@ using ::thicklens::testing::SampleRows;
 
 std::size_t Index(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-// The matrix that a packed filter stands for, on the picture without the room beside it.
+// The matrix that a packed filter represents, on the picture without the padding.
 Eigen::MatrixXd DenseOf(const PackedFilter<double>& packed, const PackedPlane& plane, Axis axis,
                         int tile) {
   const int pixels = plane.width_px * plane.height_px;

@@ -31,11 +31,12 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
-// Samples of a light field as (s, t, k, l): what rays are before a block numbers them.
+// Samples of a light field as (s, t, k, l), which is how rays are known before a block numbers
+// them.
 using Sample = std::array<int, 4>;
 
-// The samples that land nearest to a pixel of the block, with their numbers, from where they land
-// alone.
+// Returns the samples that land nearest to a pixel of the block, with their numbers, computed only
+// from where they land.
 std::map<Sample, int> SamplesOf(const BlockGeometry& block) {
   std::map<Sample, int> samples;
   for (int l = 0; l < block.v_count; ++l) {
@@ -63,7 +64,7 @@ double Impulse(Splat splat, double distance) {
   return std::floor(distance + 0.5) == 0 ? 1 : 0;
 }
 
-// H from every sample to every pixel, by positions.
+// H from every sample to every pixel, computed from positions.
 Matrix NaiveProjection(const BlockGeometry& block, Splat splat, const std::vector<double>& e) {
   Matrix h = Matrix::Zero(block.pixels(), block.rays());
   for (const auto& [sample, ray] : SamplesOf(block)) {
@@ -84,7 +85,7 @@ Matrix NaiveProjection(const BlockGeometry& block, Splat splat, const std::vecto
   return h;
 }
 
-// The light field's values at a block's rays; 0 for those that do not exist.
+// Returns the light field's values at a block's rays, and 0 for rays that do not exist.
 Vector RaysOf(const BlockGeometry& block,
               const std::function<double(int s, int t, int k, int l)>& light_field) {
   Vector rays = Vector::Zero(block.rays());
@@ -94,7 +95,8 @@ Vector RaysOf(const BlockGeometry& block,
   return rays;
 }
 
-// Blocks inside, at corners, half outside, wider than the light field; with 1 view, 1 pixel.
+// The blocks are inside, at corners, half outside, or wider than the light field. Some have 1 view
+// or 1 pixel.
 const std::vector<BlockSize>& BlockSizes() {
   static const std::vector<BlockSize> sizes = {
       {5, 4, 7, 5, 20, 16, 3, 3}, {0, 0, 5, 7, 9, 9, 3, 2},     {6, 5, 3, 4, 9, 9, 2, 3},
@@ -114,7 +116,8 @@ class ReferenceTest : public ::testing::Test {
 };
 
 TEST_F(ReferenceTest, ProjectionByHand) {
-  // One row, two views: the first lands a quarter to the right, the second exactly one to the left.
+  // In one row of two views, the first view lands a quarter to the right and the second one exactly
+  // one to the left.
   BlockGeometry block;
   block.width_px = 3;
   block.height_px = 1;
@@ -129,7 +132,8 @@ TEST_F(ReferenceTest, ProjectionByHand) {
   block.view_weight = {2, 1};
 
   const std::vector<std::int32_t> rays = twin_->FindRays(block, Splat::kBilinear);
-  // Slots: view 0 (y0 x0), (y0 x1), (y1 x0), (y1 x1), then view 1, whose sample 3 does not exist.
+  // The slots are those of view 0, (y0 x0), (y0 x1), (y1 x0), (y1 x1), then those of view 1, whose
+  // sample 3 does not exist.
   const std::vector<std::int32_t> expected = {0, 1, 2,  -1, 0,  1,  -1, -1, -1, -1, -1, -1,
                                               3, 4, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
   EXPECT_EQ(rays, expected);
@@ -194,7 +198,8 @@ TEST_F(ReferenceTest, ViewsWithoutWeightAreUnused) {
   EXPECT_EQ(Compress(Projection(block, Splat::kBilinear)).entries(), 0);
 }
 
-// The rows of D by positions: a sample, a slope, and the samples of the next view around.
+// The rows of D, computed from positions: a sample, a slope, and the samples of the next view
+// around it.
 Matrix NaiveDifferences(const BlockGeometry& block, const std::vector<double>& slope_u,
                         const std::vector<double>& slope_v) {
   const std::map<Sample, int> samples = SamplesOf(block);
@@ -206,7 +211,7 @@ Matrix NaiveDifferences(const BlockGeometry& block, const std::vector<double>& s
       const int row = axis * block.rays() + ray;
       Eigen::RowVectorXd weights = Eigen::RowVectorXd::Zero(block.rays());
       double found = 0;
-      // The samples of the next view with a hat at s + m.
+      // The samples of the next view are weighted with a hat at s + m.
       for (const auto& [other, other_ray] : samples) {
         if (other[Index(1 - axis)] != sample[Index(1 - axis)]) continue;
         if (other[Index(2 + axis)] != sample[Index(2 + axis)] + 1) continue;
@@ -230,7 +235,7 @@ TEST_F(ReferenceTest, DifferencesAreTheNaiveOnes) {
     const BlockGeometry block = RandomBlock(size, 2, ++seed);
     auto slope_u = RandomReals<double>(Index(block.rays()), -2.5, 2.5, seed);
     auto slope_v = RandomReals<double>(Index(block.rays()), -2.5, 2.5, seed + 100);
-    // Whole slopes have one tap, NaN none.
+    // Integer slopes have one tap, NaN has none.
     for (std::size_t i = 0; i < slope_u.size(); i += 3) slope_u[i] = std::round(slope_u[i]);
     for (std::size_t i = 1; i < slope_v.size(); i += 3) slope_v[i] = std::round(slope_v[i]);
     for (std::size_t i = 0; i < slope_v.size(); i += 7) slope_v[i] = kNan;
@@ -243,7 +248,7 @@ TEST_F(ReferenceTest, DifferencesAreTheNaiveOnes) {
 }
 
 TEST_F(ReferenceTest, DifferencesReachPastTheShiftsOfTheViews) {
-  // Slope 0 relates equal samples, wherever the views have them land.
+  // A slope of 0 relates equal samples, wherever they land in their views.
   const BlockGeometry block = RandomBlock({2, 2, 9, 8, 14, 14, 3, 3}, 2, 3);
   const std::vector<double> zero(Index(block.rays()), 0);
   const Vector l = RaysOf(block, [](int s, int t, int, int) { return 1 + s + 100 * t; });
@@ -259,12 +264,12 @@ TEST_F(ReferenceTest, DifferencesOfAConstantAndAlongTheSlopeAreZero) {
   const Matrix d = DenseOf(twin_->WarpDifferences(block, slope_u, slope_v));
   const Vector ones = RaysOf(block, [](int, int, int, int) { return 1; });
   EXPECT_LE((d * ones).cwiseAbs().maxCoeff(), 1e-15);
-  // Constant along (m, 1) in (s, u) and (n, 1) in (t, v).
+  // This light field is constant along (m, 1) in (s, u) and (n, 1) in (t, v).
   const Vector along = RaysOf(
       block, [](int s, int t, int k, int l) { return 2 * (s - 0.7 * k) + 3 * (t + 1.3 * l); });
   EXPECT_LE((d * along).cwiseAbs().maxCoeff(), 1e-12);
   const Vector against = RaysOf(block, [](int s, int, int k, int) { return s + 0.7 * k; });
-  // Where it is not empty, the difference is m + .7 in u, and 0 in v.
+  // In rows that are not empty, the difference is m + 0.7 in u and 0 in v.
   const Vector change = d * against;
   int used = 0;
   for (int row = 0; row < block.rays(); ++row) {
@@ -284,7 +289,7 @@ TEST_F(ReferenceTest, HugeSlopesHaveNoDifference) {
   }
 }
 
-// Whether all neighbours of the sample that the six terms take are in the block.
+// True if all neighbours of the sample that the six terms use are in the block.
 bool HasAllNeighbours(const std::map<Sample, int>& samples, const Sample& sample) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     for (int ds = -1; ds <= 1; ++ds) {
@@ -360,7 +365,7 @@ TEST_F(ReferenceTest, SixTermsOfAConstantAreZeroEverywhere) {
 }
 
 TEST_F(ReferenceTest, SixTermsAtABorder) {
-  // One view, three samples in a row: m^2 L_ss alone, one-sided at the ends.
+  // One view has three samples in a row, so that only m^2 L_ss is left, one-sided at the ends.
   const BlockGeometry block = RandomBlock({0, 0, 3, 1, 3, 1, 1, 1}, 0, 9);
   const std::vector<double> m = {2, 3, 5};
   const std::vector<double> n = {7, 7, 7};
@@ -434,7 +439,8 @@ TEST_F(ReferenceTest, ThePictureDoesNotLookAtViewsWithoutWeight) {
 
 TEST_F(ReferenceTest, BlocksShareTheRaysOfAPicture) {
   for (std::uint32_t seed = 0; seed < 5; ++seed) {
-    // 11 x 9 px in blocks of 4 x 5, all rays 1 + their place in the light field.
+    // An image of 11 x 9 px in blocks of 4 x 5, in which every ray is 1 + its position in the light
+    // field.
     const BlockGeometry whole = RandomBlock({0, 0, 11, 9, 11, 9, 3, 2}, 4, seed);
     twin_->StartWhole(11, 9, 3, 2, 2);
     for (int y = 0; y < 9; y += 5) {
@@ -447,7 +453,7 @@ TEST_F(ReferenceTest, BlocksShareTheRaysOfAPicture) {
         const Vector rays = RaysOf(
             block, [](int s, int t, int k, int l) { return 1 + s + 11 * (t + 9 * (k + 3 * l)); });
         std::vector<double> values(rays.begin(), rays.end());
-        // Numbers without a ray are left out, whatever they hold.
+        // Numbers without a ray are left out, whatever their value is.
         for (double& value : values) value = value == 0 ? kNan : value;
         twin_->AddBlock(block, 1, values);
       }

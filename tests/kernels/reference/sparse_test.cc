@@ -30,7 +30,8 @@ void ExpectSorted(const Matrix& matrix) {
   }
 }
 
-// Rows in any order, with a column twice or more, unused slots anywhere, and empty rows.
+// Makes rows in any order, in which columns occur twice or more, slots are unused anywhere, and
+// rows are empty.
 EllMatrix<double> ShuffledEll(int rows, int columns, int slots, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_int_distribution<int> column(-1, columns - 1);
@@ -46,7 +47,7 @@ EllMatrix<double> ShuffledEll(int rows, int columns, int slots, std::uint32_t se
 }
 
 TEST(SparseTest, CompressionSortsAndAddsUp) {
-  // 2 rows of 3 slots: (2: 5, 0: 7, 2: 1) and (unused, 1: 3, unused), slot by slot.
+  // 2 rows of 3 slots, (2: 5, 0: 7, 2: 1) and (unused, 1: 3, unused), are stored slot by slot.
   const EllMatrix<float> ell{2, 3, 3, {2, -1, 0, 1, 2, -1}, {5, 9, 7, 3, 1, 9}};
   const CsrMatrix<float> csr = Compress(ell);
   EXPECT_EQ(csr.rows, 2);
@@ -58,7 +59,7 @@ TEST(SparseTest, CompressionSortsAndAddsUp) {
 
 TEST(SparseTest, CompressionIsTheSameMatrix) {
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
-    // With one slot, rows often end and begin with the same column.
+    // With one slot, the last column of a row is often the first one of the next row.
     for (const int slots : {1, 2, 9}) {
       const EllMatrix<double> ell = ShuffledEll(13, 6, slots, seed);
       const CsrMatrix<double> csr = Compress(ell);
@@ -85,7 +86,7 @@ TEST(SparseTest, NormalPatternIsWhereTheProductAndTheDiagonalAre) {
     const CsrMatrix<double> a = RandomCsr<double>(9, 12, 0.15, seed);
     const CsrPattern pattern = NormalPattern(a);
     ExpectSorted(pattern);
-    // Without values nothing cancels.
+    // A pattern has no values, so its entries cannot cancel.
     const Eigen::MatrixXi present = DenseOf(PatternOf(a));
     const Eigen::MatrixXi product =
         present.transpose() * present + Eigen::MatrixXi::Identity(12, 12);

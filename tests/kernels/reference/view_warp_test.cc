@@ -1,4 +1,4 @@
-// A picture read for a view, against sums by hand; and a device's views against these.
+// The reference is compared with sums computed by hand, and a device's views with the reference.
 #include "thicklens/kernels/view_warp.h"
 
 #include <gmock/gmock.h>
@@ -36,8 +36,8 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 std::size_t At(int x, int y) { return static_cast<std::size_t>(y * kW + x); }
 
-// The twin, a device as it is (a machine on which tests run has one), or as one whose items are
-// single samples.
+// The reference, a device as it is (a machine that runs the tests has one), or one with single
+// samples as its items.
 enum class Form { kTwin, kDevice, kSingleSamples };
 
 std::unique_ptr<ViewWarp> NewWarp(Form form, const SurfacePicture& picture) {
@@ -67,13 +67,13 @@ class ViewWarpTest : public ::testing::TestWithParam<Form> {
     hidden_.push_back({static_cast<std::int32_t>(i), source_x, source_y, of_view_[i]});
     of_view_[i] = kNone;
   }
-  // All samples, of that disparity.
+  // Hides all samples, with that disparity.
   void HideAll(float source_x, float source_y, float disparity) {
     hidden_.clear();
     of_view_.assign(kPixels, disparity);
     for (std::size_t i = 0; i < kPixels; ++i) Hide(i, source_x, source_y);
   }
-  // The picture and the view are of one disparity.
+  // Gives the picture and the view one disparity.
   void Flatten(float disparity) {
     disparity_.assign(kPixels, disparity);
     of_view_.assign(kPixels, disparity);
@@ -103,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(SingleSamples, ViewWarpTest, ::testing::Values(Form::kS
 TEST_P(ViewWarpTest, IsThePictureWhereNothingMoves) {
   FillPolynomial();
   EXPECT_THAT(Warp(), ::testing::Pointwise(FloatNear(1e-6F), values_));
-  shift_x_ = 2, shift_y_ = -3;  // px per unit of a disparity of 0
+  shift_x_ = 2, shift_y_ = -3;  // px per unit of disparity
   EXPECT_THAT(Warp(), ::testing::Pointwise(FloatNear(1e-6F), values_));
 }
 
@@ -130,7 +130,7 @@ TEST_P(ViewWarpTest, ReadsHiddenSamplesWhereTheyAre) {
   disparity_[At(9, 6)] = 0;
   shift_x_ = 0.5;  // one pixel
   Hide(At(0, 0), 11, 8);
-  Hide(At(4, 5), 5, 1);  // to (9, 6), which is of another surface
+  Hide(At(4, 5), 5, 1);  // lands at (9, 6), which is of another surface
   hidden_.back().disparity = 0;
   Hide(At(11, 8), -11, 0);
   const std::vector<float> warped = Warp();
@@ -153,11 +153,11 @@ TEST_P(ViewWarpTest, MixesWhatStandsAtAnotherPlaceIntoASample) {
                        float share) {
     mixed_.push_back({static_cast<std::int32_t>(at), {0, source_x, source_y, disparity}, share});
   };
-  mix(At(0, 0), 3.25F, 2.5F, 2, 0.25F);  // linear between four
-  mix(At(2, 2), -400, 3, 2, 1);          // cut to the picture
-  mix(At(4, 5), 1, 0, 2, 0.75F);         // into a hidden one
-  mix(At(8, 6), 0.5F, 0, 0, 0.5F);       // the one of two that is of its surface
-  mix(At(11, 8), 0.5F, 0.5F, 2, 0);      // nothing
+  mix(At(0, 0), 3.25F, 2.5F, 2, 0.25F);  // interpolated between four pixels
+  mix(At(2, 2), -400, 3, 2, 1);          // clamped to the picture
+  mix(At(4, 5), 1, 0, 2, 0.75F);         // into a hidden sample
+  mix(At(8, 6), 0.5F, 0, 0, 0.5F);       // the pixel of the two that is of its surface
+  mix(At(11, 8), 0.5F, 0.5F, 2, 0);      // a fraction of 0 has no effect
   const std::vector<float> plain = [&] {
     const std::vector<MixedSample> mixed = std::exchange(mixed_, {});
     std::vector<float> values = Warp();
@@ -176,8 +176,8 @@ TEST_P(ViewWarpTest, MixesWhatStandsAtAnotherPlaceIntoASample) {
   EXPECT_THAT(Warp(), ::testing::Pointwise(FloatNear(1e-5F), expected));
 }
 
-// Rounded to float, the shift would lead a digit short of the pixel, which is of another surface,
-// to the one before it.
+// In float, the shift would round down to the pixel before its target, and that pixel is of another
+// surface.
 TEST_P(ViewWarpTest, TakesAShiftWithMoreDigitsThanAFloat) {
   for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i % kW);
   Flatten(2.6F);
@@ -188,7 +188,7 @@ TEST_P(ViewWarpTest, TakesAShiftWithMoreDigitsThanAFloat) {
 }
 
 TEST_P(ViewWarpTest, StaysOnItsSurface) {
-  // Bright pixels to the right are of another surface.
+  // The bright pixels to the right are of another surface.
   for (int y = 0; y < kH; ++y) {
     for (int x = 0; x < kW; ++x) {
       values_[At(x, y)] = x < 6 ? 0.25F : 1.0F;
@@ -197,16 +197,17 @@ TEST_P(ViewWarpTest, StaysOnItsSurface) {
   }
   HideAll(0.5F, 0, 0);
   const std::vector<float> warped = Warp();
-  EXPECT_NEAR(warped[At(5, 4)], 0.25, 1e-6);  // of 5 and 6 only 5 is the sample's
+  // Of the pixels 5 and 6 only 5 is of the sample's surface
+  EXPECT_NEAR(warped[At(5, 4)], 0.25, 1e-6);
   EXPECT_NEAR(warped[At(4, 4)], 0.25, 1e-6);  // no bicubic taps past the edge
   HideAll(0.5F, 0, 1);
   EXPECT_NEAR(Warp()[At(5, 4)], 1, 1e-6);
-  // On no surface around: the one that is nearest in disparity.
+  // If no surface around matches, the one that is nearest in disparity is used.
   HideAll(0.5F, 0, 0.6F);
   EXPECT_NEAR(Warp()[At(5, 4)], 1, 1e-6);
   HideAll(0.5F, 0, 0.4F);
   EXPECT_NEAR(Warp()[At(5, 4)], 0.25, 1e-6);
-  // The same of samples that are seen.
+  // Visible samples behave the same.
   hidden_.clear();
   of_view_.assign(kPixels, 0.625F);
   shift_x_ = 0.8;
@@ -220,7 +221,7 @@ TEST_P(ViewWarpTest, WeighsWhatIsLeftOfTheFourAround) {
   for (std::size_t i = 0; i < kPixels; ++i) values_[i] = static_cast<float>(i);
   disparity_[At(5, 5)] = 9;
   HideAll(0.25F, 0.5F, 0);
-  // At (4.25, 4.5): without (5, 5).
+  // The sample at (4.25, 4.5) is interpolated without the pixel (5, 5).
   const float expected =
       (0.375F * values_[At(4, 4)] + 0.125F * values_[At(5, 4)] + 0.375F * values_[At(4, 5)]) /
       (0.375F + 0.125F + 0.375F);
@@ -242,7 +243,7 @@ TEST_P(ViewWarpTest, IsCutToThePicture) {
 TEST_P(ViewWarpTest, KeepsChannelsApart) {
   Flatten(1);
   shift_x_ = 0.5;
-  // Left of an edge, where four pixels are read, 16, and one.
+  // Near the edge, four pixels are read, or 16, or one.
   for (int y = 0; y < kH; ++y) disparity_[At(9, y)] = 2;
   for (const std::size_t channels : {1, 2, 3, 4, 5, 8, 9}) {
     values_.clear();
@@ -301,7 +302,7 @@ TEST_P(ViewWarpTest, IsUsedByManyThreads) {
   std::array<std::vector<float>, kThreads> warped;
   std::vector<std::thread> threads;
   for (std::size_t t = 0; t < kThreads; ++t) {
-    threads.emplace_back([&, t] {  // each so many pixels to the right
+    threads.emplace_back([&, t] {  // each thread shifts by another number of pixels
       for (int i = 0; i < 20; ++i) {
         warp->Warp({&of_view_, static_cast<double>(t), 0, &hidden_, nullptr}, &warped[t]);
       }
@@ -314,7 +315,8 @@ TEST_P(ViewWarpTest, IsUsedByManyThreads) {
   }
 }
 
-// Pictures of all kinds of sizes and channels, surfaces that are flat, rough and steep.
+// The pictures have various sizes and numbers of channels, and surfaces that are flat, rough or
+// steep.
 class DeviceWarpTest : public ::testing::TestWithParam<Form> {};
 INSTANTIATE_TEST_SUITE_P(Device, DeviceWarpTest, ::testing::Values(Form::kDevice));
 INSTANTIATE_TEST_SUITE_P(SingleSamples, DeviceWarpTest, ::testing::Values(Form::kSingleSamples));
@@ -357,7 +359,7 @@ TEST_P(DeviceWarpTest, IsThatOfTheTwin) {
       const auto source_x = numbers(pixels, -reach, reach);
       const auto source_y = numbers(pixels, -reach, reach);
       for (const std::vector<float>* surface : {&std::as_const(disparity), &of_view}) {
-        // None is hidden, the first, every third, all.
+        // No sample is hidden, then the first, every third, and all of them.
         for (const int every : {0, pixels, 3, 1}) {
           std::vector<float> seen = *surface;
           std::vector<HiddenSample> hidden;
