@@ -8,8 +8,8 @@
 
 namespace thicklens::testing {
 
-// What of a blur lies on one side of a straight line, and what a pixel makes of it: areas and
-// integrals, no transfer functions.
+// The share of a blur on one side of a straight line, and its mean over a pixel, computed from
+// areas and integrals without transfer functions.
 
 // Share of a Gaussian below x.
 inline double GaussianShare(double x, double sigma) {
@@ -23,7 +23,7 @@ inline double DiscShare(double x, double radius) {
   return 0.5 + (std::asin(t) + t * std::sqrt(1 - t * t)) / std::acos(-1.0);
 }
 
-// Of a blur of standard deviation sigma per axis.
+// Share below x of a blur with the standard deviation sigma per axis.
 inline double ShareBelow(model::Psf psf, double x, double sigma) {
   return psf == model::Psf::kDisc && sigma > 0 ? DiscShare(x, 2 * sigma) : GaussianShare(x, sigma);
 }
@@ -38,8 +38,8 @@ double MeanOverPixel(const Function& f, int pairs) {
   return sum / (6 * pairs);
 }
 
-// Transfer functions at the frequency f, cycles per px: of a pixel, of a Gaussian, and of a uniform
-// disc, whose projection on the frequency's direction is added up in `steps` parts.
+// Transfer functions at the frequency f, in cycles per px, of a pixel, a Gaussian and a uniform
+// disc. The projection of the disc on the direction of the frequency is summed in `steps` parts.
 inline double BoxTransfer(double f) {
   constexpr double kPi = 3.14159265358979323846;
   return f == 0 ? 1 : std::sin(kPi * f) / (kPi * f);

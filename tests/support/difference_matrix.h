@@ -5,7 +5,8 @@
 
 namespace thicklens::testing {
 
-// Differences of neighbouring aperture samples, ends free: rows across, then down.
+// Differences of neighbouring aperture samples with free ends: first the rows across, then those
+// down.
 inline Eigen::MatrixXd DifferenceMatrix(int u_count, int v_count) {
   const int across = (u_count - 1) * v_count, down = u_count * (v_count - 1);
   Eigen::MatrixXd d = Eigen::MatrixXd::Zero(across + down, u_count * v_count);

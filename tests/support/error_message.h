@@ -7,7 +7,8 @@
 
 namespace thicklens::testing {
 
-// What the Error that `call` throws says; "(no error)" if it throws none. Other exceptions pass.
+// Returns the message of the Error that `call` throws, or "(no error)" if it throws none. Other
+// exceptions pass through.
 template <typename Call>
 std::string ErrorOf(const Call& call) {
   try {

@@ -11,7 +11,7 @@
 
 namespace thicklens::testing {
 
-// Random blocks, vectors and sparse matrices, and what they are as dense matrices.
+// Random blocks, vectors and sparse matrices, and their dense matrices.
 
 template <typename Real>
 using Dense = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
@@ -20,7 +20,8 @@ struct BlockSize {
   int first_x, first_y, width_px, height_px, s_count, t_count, u_count, v_count;
 };
 
-// Shifts of up to `largest_shift` samples, fractions of all kinds, positive weights.
+// A block with shifts of up to `largest_shift` samples, fractions of all kinds and positive
+// weights.
 inline kernels::BlockGeometry RandomBlock(const BlockSize& size, int largest_shift,
                                           std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -36,7 +37,7 @@ inline kernels::BlockGeometry RandomBlock(const BlockSize& size, int largest_shi
   block.t_count = size.t_count;
   block.u_count = size.u_count;
   block.v_count = size.v_count;
-  // The first ones are the special ones: exactly on a pixel, and halfway.
+  // The first shifts are special: exactly on a pixel, and halfway.
   for (int k = 0; k < size.u_count; ++k) {
     block.s_shift.push_back(shift(random));
     block.s_fraction.push_back(k == 1 ? 0.0 : k == 2 ? -0.5 : fraction(random));
@@ -60,7 +61,7 @@ std::vector<Real> RandomReals(std::size_t count, double low, double high, std::u
   return reals;
 }
 
-// Some of the columns in each row, none in every third row.
+// Each row has some of the columns, and every third row has none.
 template <typename Real>
 kernels::CsrMatrix<Real> RandomCsr(int rows, int columns, double density, std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -106,7 +107,7 @@ Dense<Real> DenseOf(const kernels::CsrMatrix<Real>& csr) {
   return dense;
 }
 
-// 1 where the pattern has an entry, more where it has it twice.
+// An entry is 1 where the pattern has an entry, and larger where it has the entry twice.
 inline Eigen::MatrixXi DenseOf(const kernels::CsrPattern& pattern) {
   Eigen::MatrixXi dense = Eigen::MatrixXi::Zero(pattern.rows, pattern.columns);
   for (int row = 0; row < pattern.rows; ++row) {

@@ -11,14 +11,14 @@
 
 namespace thicklens::testing {
 
-// A thick macro lens, focused at 300 mm, and scenes before it whose blur is easy to state.
+// A thick macro lens, focused at 300 mm, and scenes in front of it whose blur has a simple formula.
 struct MacroScene {
   static constexpr double kFrontMm = 50, kRearMm = 52, kThicknessMm = 4, kRadiusMm = 9;
   static constexpr double kFocusMm = 300, kPitchMm = 0.0045, kRatio = 0.45;
 
   // K/p, by similar triangles.
   static double ScalePx() { return kFrontMm * kFocusMm / (kFocusMm - kFrontMm) / kPitchMm; }
-  // Sigma of the defocus, px; positive nearer than the plane of focus.
+  // Sigma of the defocus, px. It is positive for points nearer than the plane of focus.
   static double DefocusPx(double depth_mm) {
     return kRatio * kRadiusMm * ScalePx() * (1 / depth_mm - 1 / kFocusMm);
   }
@@ -45,7 +45,8 @@ struct MacroScene {
     return layer;
   }
 
-  // 0.5 + 0.4 cos(2 pi f . (x - principal point)) where it is sharp, f = direction/period.
+  // A layer whose sharp image is 0.5 + 0.4 cos(2 pi f . (x - principal point)), f =
+  // direction/period.
   static model::SceneLayer Sine(double depth_mm, double period_px, double angle_deg) {
     model::SceneLayer layer = Uniform(depth_mm, 0.5);
     layer.texture.kind = model::TextureKind::kSine;
@@ -59,7 +60,7 @@ struct MacroScene {
     return {std::cos(angle_rad), std::sin(angle_rad)};
   }
 
-  // `rays` a pixel, everywhere.
+  // Options with `rays` rays for every pixel.
   static model::SceneSimulationOptions Options(const model::Camera& camera,
                                                std::vector<model::SceneLayer> layers,
                                                const model::EffectSet& effects, int rays) {

@@ -18,11 +18,12 @@ struct RefractingSurface {
   double to_next_vertex_mm = 0;  // 0 at the last surface
 };
 
-// Paraxial rays through a row of refracting surfaces, one surface after the other. It knows nothing
-// of focal lengths or principal planes: those are read off the product of its matrices. An oracle
-// for the thick-lens formulas.
+// Paraxial rays through a row of refracting surfaces, one surface after the other: an oracle for
+// the thick-lens formulas. The class uses no focal lengths or principal planes, but reads them from
+// the product of the matrices.
 //
-// A ray is (height, slope), light going in +y of the axis coordinate, 0 at the first vertex.
+// A ray is (height, slope). Light travels in +y of the axis coordinate, which is 0 at the first
+// vertex.
 class MatrixLens {
  public:
   MatrixLens(std::string name, double index_before, std::vector<RefractingSurface> surfaces)
@@ -41,12 +42,12 @@ class MatrixLens {
   double index_before() const { return index_before_; }
   double index_after() const { return index_after_; }
 
-  // A ray that comes in parallel at height 1 leaves with slope C at height A: the rear principal
-  // plane is where it has height 1, the rear focal point where it has height 0.
+  // A ray that is parallel to the axis at height 1 leaves with slope C at height A. The rear
+  // principal plane is where its height is 1, the rear focal point where it is 0.
   double rear_principal_mm() const { return last_vertex_mm_ + (1 - system_(0, 0)) / system_(1, 0); }
   double rear_focal_point_mm() const { return last_vertex_mm_ - system_(0, 0) / system_(1, 0); }
 
-  // The ray that leaves parallel at height 1 came in as the inverse matrix says.
+  // The ray that leaves parallel at height 1 enters as the inverse matrix says.
   double front_principal_mm() const {
     const Eigen::Vector2d in = RayThatLeavesParallel();
     return (1 - in(0)) / in(1);
@@ -56,7 +57,7 @@ class MatrixLens {
     return -in(0) / in(1);
   }
 
-  // What the model calls this lens.
+  // This lens as a lens of the model.
   model::ThickLens AsThickLens(double aperture_radius_mm) const {
     model::ThickLens lens;
     lens.front_focal_length_mm = front_principal_mm() - front_focal_point_mm();
@@ -66,14 +67,14 @@ class MatrixLens {
     return lens;
   }
 
-  // The ray behind the last surface: height extrapolated to the aperture plane, and slope. In
-  // front it passes height `object_mm` at `depth_mm` before the aperture plane (the front principal
-  // plane) and is aimed at height `aperture_mm` on it.
+  // Returns the ray behind the last surface: its height extrapolated to the aperture plane, and its
+  // slope. In front, the ray passes height `object_mm` at `depth_mm` before the aperture plane (the
+  // front principal plane) and is aimed at height `aperture_mm` on that plane.
   Eigen::Vector2d Trace(double object_mm, double depth_mm, double aperture_mm) const {
     return TraceSlope(aperture_mm, (aperture_mm - object_mm) / depth_mm);
   }
 
-  // The same for a ray given by its height on the aperture plane and its slope in front.
+  // Traces a ray given by its height on the aperture plane and its slope in front.
   Eigen::Vector2d TraceSlope(double aperture_mm, double slope) const {
     Eigen::Vector2d ray = Gap(-front_principal_mm()) * Eigen::Vector2d(aperture_mm, slope);
     double index = index_before_;
@@ -85,13 +86,13 @@ class MatrixLens {
     return Gap(front_principal_mm() - last_vertex_mm_) * ray;
   }
 
-  // Height of such a ray on a sensor `image_distance_mm` behind the aperture plane.
+  // Height of the ray of Trace() on a sensor `image_distance_mm` behind the aperture plane.
   double Landing(double object_mm, double depth_mm, double aperture_mm,
                  double image_distance_mm) const {
     return (Gap(image_distance_mm) * Trace(object_mm, depth_mm, aperture_mm))(0);
   }
 
-  // Where the rays of an axial point meet again, mm behind the aperture plane.
+  // Distance behind the aperture plane, mm, at which the rays of a point on the axis meet again.
   double ConjugateMm(double depth_mm) const {
     const Eigen::Vector2d ray = Trace(0, depth_mm, 1);
     return -ray(0) / ray(1);
@@ -125,17 +126,18 @@ class MatrixLens {
   Eigen::Matrix2d system_;
 };
 
-// Lenses of every sort that the formulas must hold for. rho is positive unless the name says so.
+// Lenses of all kinds for which the formulas must hold. rho is positive unless the name says
+// otherwise.
 inline std::vector<MatrixLens> MatrixLenses() {
   return {
-      // f1 = f2.
+      // Here f1 = f2.
       {"biconvex in air", 1, {{14, 1.52, 4}, {-18, 1, 0}}},
       {"meniscus in air", 1, {{8, 1.7, 3}, {25, 1, 0}}},
-      // Thicker than a ball of the same radii: the principal planes cross.
+      // This lens is thicker than a ball of the same radii, so the principal planes cross.
       {"crossed planes in air", 1, {{10, 1.5, 25}, {-10, 1, 0}}},
-      // Two positive lenses apart, a camera lens of old: crossed planes again.
+      // Two separate positive lenses, as in an early camera lens. The planes cross here, too.
       {"crossed planes, two lenses", 1, {{30, 1.6, 2}, {-30, 1, 16}, {30, 1.6, 2}, {-30, 1, 0}}},
-      // f2/f1 = n2/n1.
+      // Here f2/f1 = n2/n1.
       {"water in front", 1.333, {{9, 1.62, 4}, {-11, 1, 0}}},
       {"oil behind", 1, {{12, 1.6, 3}, {-30, 1.4, 0}}},
       {"crossed planes, water in front", 1.333, {{12, 1.9, 30}, {-12, 1, 0}}},

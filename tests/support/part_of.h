@@ -7,8 +7,8 @@
 
 namespace thicklens::testing {
 
-// The place where the output NAME of that folder is made, ".NAME.RANDOM.part";
-// empty: nothing.
+// Returns the path ".NAME.RANDOM.part" at which the output NAME of that folder is being made, or an
+// empty path if there is none.
 inline std::string PartOf(const std::string& folder, const std::string& name) {
   std::error_code failure;
   for (std::filesystem::directory_iterator entry(folder, failure), end; !failure && entry != end;

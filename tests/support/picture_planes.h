@@ -13,7 +13,7 @@
 
 namespace thicklens::testing {
 
-// Planes that are farther apart than they are large, with something else in between.
+// Planes with gaps between them, which contain another value.
 template <typename Real>
 struct Planes {
   int width_px, height_px, channels;
@@ -37,7 +37,7 @@ struct Planes {
   int pixels() const { return width_px * height_px; }
 };
 
-// NaN in between, which would be seen in whatever is computed from it.
+// The gaps contain NaN, which would spread to whatever is computed from it.
 template <typename Real>
 Planes<Real> RandomPlanes(int width, int height, int channels, std::uint32_t seed) {
   Planes<Real> planes(width, height, channels, std::numeric_limits<Real>::quiet_NaN());

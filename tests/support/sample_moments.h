@@ -22,7 +22,8 @@ inline Moments MomentsOf(const std::vector<double>& values) {
   return moments;
 }
 
-// Sample moments of n normal draws stay within 4.5 of their own standard deviations.
+// Expects that the moments of n normal draws differ from the true ones by at most 4.5 of their own
+// standard deviations.
 inline void ExpectMoments(const std::vector<double>& values, double mean, double variance) {
   const auto n = static_cast<double>(values.size());
   const Moments found = MomentsOf(values);

@@ -12,9 +12,9 @@
 
 namespace thicklens::testing {
 
-// Random maps between pictures, as numbers and as the dense matrix that they stand for.
+// Random maps between pictures, as numbers and as the dense matrix that they represent.
 
-// Radii 0 to `most_radius`, from block to block.
+// A filter with radii from 0 to `most_radius`, which change from block to block.
 template <typename Real>
 kernels::PixelFilter<Real> SampleFilter(kernels::Axis axis, int width, int height, int most_radius,
                                         std::uint32_t seed) {
@@ -67,7 +67,7 @@ Eigen::MatrixXd DenseOf(const kernels::PixelFilter<Real>& filter) {
   return dense;
 }
 
-// Every `every`-th pixel or so has a row, of 0 to 40 entries; some pixels are read twice.
+// About every `every`-th pixel has a row of 0 to 40 entries. Some pixels are read twice.
 template <typename Real>
 kernels::PixelRows<Real> SampleRows(int pixels, unsigned every, std::uint32_t seed) {
   kernels::PixelRows<Real> rows;
@@ -87,7 +87,7 @@ kernels::PixelRows<Real> SampleRows(int pixels, unsigned every, std::uint32_t se
   return rows;
 }
 
-// `products` products, and rows at every `every`-th pixel (0: none; 1: all).
+// A map of `products` products, and rows at every `every`-th pixel (0: none; 1: all).
 template <typename Real>
 class SampleProjection {
  public:
@@ -114,7 +114,7 @@ class SampleProjection {
 
   const Eigen::MatrixXd& dense() const { return dense_; }
 
-  // Refers to this.
+  // The result refers to this object.
   kernels::FilteredMap<Real> filters() const {
     kernels::FilteredMap<Real> map;
     for (std::size_t i = 0; i < filters_.size(); i += 2) {
@@ -124,7 +124,7 @@ class SampleProjection {
     return map;
   }
 
-  // By the dense matrix.
+  // Multiplies by the dense matrix.
   std::vector<Real> Multiply(bool transposed, const Real* x, int channels) const {
     std::vector<Real> y;
     for (int channel = 0; channel < channels; ++channel) {
@@ -138,7 +138,7 @@ class SampleProjection {
     return y;
   }
 
-  // A photograph with this projection; refers to this.
+  // A photograph with this projection. The result refers to this object.
   kernels::DataTerm<Real> Data(int channels, std::uint32_t seed) const {
     kernels::DataTerm<Real> data;
     data.width_px = width_;

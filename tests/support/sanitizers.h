@@ -3,8 +3,8 @@
 
 namespace thicklens::testing {
 
-// Whether this build checks memory or threads while it runs, for which it takes memory and time of
-// its own. GCC and clang say it in different ways.
+// True if this build checks memory or threads while it runs, which takes additional memory and
+// time. GCC and clang define different macros.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kIsSanitized = true;
 #elif defined(__has_feature)

@@ -12,7 +12,7 @@
 
 namespace thicklens::testing {
 
-// A new empty folder, gone with everything in it at the end of the test.
+// A new empty folder, which is removed with its content at the end of the test.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -30,7 +30,7 @@ class TemporaryFolder {
   const std::string& path() const { return path_; }
   std::string operator/(const std::string& name) const { return path_ + "/" + name; }
 
-  // Writes a file, with the folders in front of it, and gives its path.
+  // Writes a file, creates the folders of its path, and returns its path.
   std::string Put(const std::string& name, const std::string& content = "") const {
     const std::string file = *this / name;
     std::filesystem::create_directories(std::filesystem::path(file).parent_path());
@@ -38,7 +38,7 @@ class TemporaryFolder {
     return file;
   }
 
-  // Names of what lies directly in the folder, sorted.
+  // Names of the entries directly in the folder, sorted.
   std::vector<std::string> Entries() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(path_))

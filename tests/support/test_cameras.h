@@ -9,10 +9,10 @@
 
 namespace thicklens::testing {
 
-// Lenses, sensors and cameras that several tests use, and parts of which a test builds its own.
+// Lenses, sensors and cameras that several tests use, and parts from which a test builds its own.
 
-// A thick lens of a short focal length: f1 12.5 mm, f2 12.8 mm, thickness 3 mm; f/1.4 if no other
-// aperture is given.
+// A thick lens of a short focal length: f1 12.5 mm, f2 12.8 mm, thickness 3 mm. The default
+// aperture is f/1.4.
 inline model::ThickLens WideLens(double aperture_radius_mm = 4.46) {
   return {12.5, 12.8, 3, aperture_radius_mm};
 }
@@ -51,14 +51,15 @@ inline model::Camera TestCamera(const std::string& name, const model::ThickLens&
   camera.calibration->blur_ratio = blur_ratio;
   return camera;
 }
-// The same, with the exact image distance for that plane of focus.
+// TestCamera() with the exact image distance for that plane of focus.
 inline model::Camera TestCameraFocusedAt(double focus_depth_mm, const std::string& name,
                                          const model::ThickLens& lens, const model::Sensor& sensor,
                                          const model::Estimate& blur_ratio = {0.45, 0}) {
   return TestCamera(name, lens, sensor, {model::ImageDistanceMm(lens, focus_depth_mm), 0},
                     blur_ratio);
 }
-// The same camera with a statement of how it was calibrated; "assumed": nothing was measured.
+// The same camera with a description of how it was calibrated. "assumed" means that nothing was
+// measured.
 inline model::Camera WithMethod(model::Camera camera, const std::string& method = "assumed") {
   camera.calibration->evidence.method = method;
   return camera;
