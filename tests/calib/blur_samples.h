@@ -12,8 +12,8 @@
 
 namespace thicklens::testing {
 
-// A bench whose blur is known in closed form, and what meters say of it. Case iii of the sweeps:
-// A uf^2 = 116.6 px^2.
+// A bench whose blur is known in closed form, and the samples that its blur estimators return. It
+// is case iii of the sweeps: A uf^2 = 116.6 px^2.
 struct BlurBench {
   model::ThickLens lens = WideLens(4.4643);
   double pitch_mm = 0.006;
@@ -24,23 +24,23 @@ struct BlurBench {
   double first_mm = 330, last_mm = 480;
   int count = 31;
   std::size_t reference = 12;
-  double reading_sigma_mm = 0;       // of the readings as they are
-  double scale_sigma = 0;            // of the scales, if `scales_tell`
-  bool scales_tell = false;          // the setup gets the scales' errors
+  double reading_sigma_mm = 0;       // sigma of the readings
+  double scale_sigma = 0;            // sigma of the scales, if `scales_tell`
+  bool scales_tell = false;          // the setup gets the errors of the scales
   bool states_reading_sigma = true;  // false: the setup gets 0
-  double noise = 1;                  // times the stated errors of the meters
+  double noise = 1;                  // noise of the blur estimators, in their stated errors
 
   double Depth(std::size_t i) const {
     return first_mm + (last_mm - first_mm) * static_cast<double>(i) / (count - 1);
   }
-  // A uf^2, px^2, by the lens' numbers: (kappa r f1/(p (zf - f1)))^2.
+  // A uf^2, px^2, computed from the lens: (kappa r f1/(p (zf - f1)))^2.
   double Curvature() const {
     return std::pow(ratio * lens.aperture_radius_mm * lens.front_focal_length_mm /
                         (pitch_mm * (focus_mm - lens.front_focal_length_mm)),
                     2);
   }
-  // sigma^2 of the lens, px^2 of the sensor: by the lens' own blur radius, or for a telecentric one
-  // by the same slope at focus.
+  // sigma^2 of the lens, px^2 of the sensor, computed from the blur radius of the lens, or for a
+  // telecentric lens from the same slope at focus.
   double Variance(double depth_mm) const {
     const double d1_mm = model::ImageDistanceMm(lens, focus_mm);
     double radius_mm = 0;
@@ -59,7 +59,7 @@ struct BlurBench {
     return Variance(depth_mm) / std::pow(Scale(depth_mm), 2);
   }
 
-  // Everything but the meters; `errors_mm` gets what the readings were drawn to be off by.
+  // Returns everything except the blur samples. `errors_mm` gets the errors of the readings.
   calib::BlurFitSetup Setup(std::mt19937* random, std::vector<double>* errors_mm = nullptr) const {
     std::normal_distribution<double> normal(0, 1);
     calib::BlurFitSetup setup;
@@ -82,7 +82,7 @@ struct BlurBench {
     return setup;
   }
 
-  // sigma^2/scale^2 + softness of every frame, each with an error of its own.
+  // sigma^2/scale^2 + softness of every frame, each with an independent error.
   calib::BlurSamples Absolute(double error_px2, double softness_px2, std::mt19937* random) const {
     std::normal_distribution<double> normal(0, 1);
     calib::BlurSamples samples;
@@ -97,8 +97,8 @@ struct BlurBench {
     return samples;
   }
 
-  // The same relative to the reference frame, which is said to have `reference_px2` and no error:
-  // its own is in all the others.
+  // The same samples relative to the reference frame, whose variance is stated as `reference_px2`
+  // without an error. Its own error is in all the other samples.
   calib::BlurSamples Relative(double error_px2, double reference_px2, std::mt19937* random) const {
     calib::BlurSamples samples = Absolute(error_px2, 0, random);
     const auto r = static_cast<Eigen::Index>(reference);
@@ -110,16 +110,17 @@ struct BlurBench {
   }
 };
 
-// One whose meters are exact.
+// A bench without noise.
 inline BlurBench ExactBench() {
   BlurBench bench;
   bench.noise = 0;
   return bench;
 }
 
-inline constexpr double kReferencePx2 = 1.7;  // what a relative meter calls the reference's blur
+// The blur of the reference that a relative blur estimator states
+inline constexpr double kReferencePx2 = 1.7;
 
-// One meter of a kind, with the noise that the bench says.
+// A setup with one blur estimator of a kind, with the noise of the bench.
 inline calib::BlurFitSetup WithEdge(const BlurBench& bench, double error_px2,
                                     std::mt19937* random) {
   calib::BlurFitSetup setup = bench.Setup(random);
@@ -133,7 +134,7 @@ inline calib::BlurFitSetup WithTexture(const BlurBench& bench, double error_px2,
   std::normal_distribution<double> normal(0, 1);
   calib::BlurFitSetup setup = bench.Setup(random);
   setup.meters = {bench.Relative(error_px2, kReferencePx2, random)};
-  // A floor that is given was measured: it scatters with its error.
+  // A given floor was measured, so it scatters with its error.
   setup.floor_variance_px2 = model::Estimate{
       bench.floor_px2 + bench.noise * floor_sigma_px2 * normal(*random), floor_sigma_px2};
   return setup;

@@ -6,7 +6,7 @@
 
 namespace thicklens::testing {
 
-// The calibration of a simulated sweep without its map of the field, which takes most of the time.
+// Calibrates a simulated sweep without the map of the field, which takes most of the time.
 inline calib::Calibration CalibrateWithoutMap(const SimulatedSweep& simulated) {
   calib::CalibrationOptions options;
   options.map_field = false;

@@ -13,10 +13,10 @@
 
 #include "tests/calib/simulated_sweep.h"
 
-// What goes wrong on a bench, done to a simulated sweep.
+// Faults of a bench, applied to a simulated sweep.
 namespace thicklens::testing {
 
-// A sweep whose frames may be damaged without touching the original's.
+// Copies the frames as well, so that they can be damaged without a change to the original.
 inline SimulatedSweep DeepCopy(const SimulatedSweep& original) {
   SimulatedSweep copy = original;
   copy.stored = std::make_shared<std::vector<cv::Mat>>();
@@ -25,7 +25,7 @@ inline SimulatedSweep DeepCopy(const SimulatedSweep& original) {
   return copy;
 }
 
-// Every `every`th frame, the first included.
+// Keeps every `every`th frame, including the first one.
 inline SimulatedSweep Thinned(const SimulatedSweep& original, std::size_t every) {
   SimulatedSweep thinned = original;
   thinned.stored = std::make_shared<std::vector<cv::Mat>>();
@@ -38,8 +38,8 @@ inline SimulatedSweep Thinned(const SimulatedSweep& original, std::size_t every)
   return thinned;
 }
 
-// Which frames PlantFaults damaged; a reading that is off by `shift_mm`, and two frames in each
-// other's place, whose readings are off by `swap_mm`.
+// The frames that PlantFaults damaged: among them a reading that is off by `shift_mm`, and two
+// exchanged frames, whose readings are off by `swap_mm`.
 struct PlantedFaults {
   std::size_t black = 0, white = 0, overexposed = 0, smeared = 0;
   std::size_t shifted = 0;
@@ -48,8 +48,8 @@ struct PlantedFaults {
   double swap_mm = 0;
 };
 
-// Seven frames of a sweep of thirty or more, on both sides of a focus in the middle. The smeared
-// one is near focus: where the defocus is larger than the smear, there is nothing to be seen of it.
+// Damages seven frames of a sweep of thirty or more, on both sides of a focus in the middle. The
+// smeared frame is near focus, because a smear that is smaller than the defocus is invisible.
 inline PlantedFaults PlantFaults(SimulatedSweep* simulated) {
   const auto at = [&](double part) {
     return static_cast<std::size_t>(part * static_cast<double>(simulated->stored->size()));
@@ -77,7 +77,7 @@ inline PlantedFaults PlantFaults(SimulatedSweep* simulated) {
   return faults;
 }
 
-// The last frame's reading beside the first frame, and so on.
+// Gives the first frame the reading of the last one, and so on.
 inline void ReverseReadings(SimulatedSweep* simulated) {
   auto& frames = simulated->sweep.frames;
   for (std::size_t i = 0, j = frames.size() - 1; i < j; ++i, --j) {
@@ -97,7 +97,7 @@ inline void StoreAsJpeg(SimulatedSweep* simulated, int quality) {
   }
 }
 
-// Multiplies and adds, pixel by pixel, the same in each frame.
+// Multiplies and adds pixel by pixel, in the same way in each frame.
 inline void ApplyToEachFrame(SimulatedSweep* simulated, const cv::Mat& gain, const cv::Mat& add) {
   for (cv::Mat& frame : *simulated->stored) {
     cv::Mat light;
@@ -132,7 +132,7 @@ inline void AddDust(SimulatedSweep* simulated) {
   ApplyToEachFrame(simulated, gain, cv::Mat::zeros(size, CV_32F));
 }
 
-// The light falls with the square of the distance from the centre, by `loss` in the corners.
+// The light decreases with the square of the distance from the centre, by `loss` in the corners.
 inline void Vignette(SimulatedSweep* simulated, double loss) {
   const cv::Size size = simulated->frame(0).size();
   const cv::Point2d centre((size.width - 1) / 2.0, (size.height - 1) / 2.0);
@@ -146,7 +146,7 @@ inline void Vignette(SimulatedSweep* simulated, double loss) {
   ApplyToEachFrame(simulated, gain, cv::Mat::zeros(size, CV_32F));
 }
 
-// A reflection that stands still on the sensor.
+// A reflection that is fixed on the sensor.
 inline void AddGlare(SimulatedSweep* simulated) {
   const cv::Size size = simulated->frame(0).size();
   const cv::Point2d centre(0.62 * size.width, 0.4 * size.height);

@@ -11,9 +11,10 @@
 
 namespace thicklens::testing {
 
-// A straight edge through the middle of the frame, blurred by a Gaussian of `sigma_px` and seen by
-// square pixels: Phi(distance/sigma) averaged over each pixel by 5 x 5 Gauss-Legendre points. Its
-// normal stands `angle_deg` from the x axis. An oracle that shares nothing with the simulator.
+// A straight edge through the middle of the frame, blurred by a Gaussian of `sigma_px` and
+// integrated by square pixels: Phi(distance/sigma) averaged over each pixel by 5 x 5 Gauss-Legendre
+// points. The angle between its normal and the x axis is `angle_deg`. This oracle is independent of
+// the simulator.
 inline cv::Mat DrawnEdge(int size_px, double angle_deg, double sigma_px, double dark,
                          double bright) {
   constexpr std::array<double, 5> kNode = {-0.4530899229693320, -0.2692346550528415, 0,
@@ -43,8 +44,8 @@ inline cv::Mat DrawnEdge(int size_px, double angle_deg, double sigma_px, double 
   return edge;
 }
 
-// As a camera of `levels` grey values stores it, with Gaussian noise of so many of them; back in
-// [0, 1].
+// Stores the image as a camera with `levels` grey values does, with Gaussian noise of
+// `noise_levels` of them. The result is in [0, 1].
 inline cv::Mat Stored(const cv::Mat& grey, double noise_levels, int levels, unsigned seed) {
   const double full_scale = levels - 1.0;
   std::mt19937 random(seed);
@@ -61,7 +62,7 @@ inline cv::Mat Stored(const cv::Mat& grey, double noise_levels, int levels, unsi
   return stored;
 }
 
-// The same as 8-bit values.
+// Stores the image as 8-bit values.
 inline cv::Mat StoredBytes(const cv::Mat& grey, double noise_levels, unsigned seed) {
   cv::Mat bytes;
   Stored(grey, noise_levels, 256, seed).convertTo(bytes, CV_8U, 255);

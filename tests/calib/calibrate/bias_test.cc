@@ -1,4 +1,4 @@
-// A calibration has errors, but their mean is 0, or as small as is known.
+// The errors of a calibration have the mean 0, or a bias that is known and small.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,12 +21,13 @@ struct Errors {
   double image_distance_mm = 0, blur_ratio = 0;
 };
 
-// The mean errors of all sweeps of a case, where they are known not to be 0.
+// The mean errors over all sweeps of a case, where they are known to differ from 0.
 struct Bias {
   double image_distance_mm = 0, blur_ratio = 0;
 };
 
-// The mean error differs from the known bias by at most two of its own standard errors.
+// Expects that the mean error differs from the known bias by at most two of its own standard
+// errors.
 void ExpectBias(const std::string& name, const std::vector<double>& errors, double bias) {
   const auto count = static_cast<double>(errors.size());
   double mean = 0, variance = 0;
@@ -41,8 +42,9 @@ void ExpectBias(const std::string& name, const std::vector<double>& errors, doub
                                   std::to_string(1e6 * standard_error) + "e-6");
 }
 
-// A hundred sweeps of leaves, with floors drawn from their stated error. At the known bias one of
-// the two results is outside its two standard errors for one in ten choices of seeds.
+// Calibrates a hundred sweeps of leaves, with floors drawn from their stated error. Even at the
+// known bias, one of the two results is outside its two standard errors for one in ten choices of
+// seeds.
 void ExpectBiasOfSweeps(const std::string& case_name, const Bias& bias) {
   constexpr int kSweeps = 100, kSizePx = 96;
   CalibrationOptions how;

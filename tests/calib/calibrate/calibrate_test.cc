@@ -28,7 +28,7 @@ using thicklens::testing::SweepWithFloor;
 
 constexpr int kSizePx = 160;
 
-// Case iii on a small field, dead leaves, floor and bench zero given.
+// Case iii on a small field with dead leaves. The floor and the bench zero are given.
 SimulatedSweep Good() {
   static const SimulatedSweep rendered = SweepWithFloor("iii", kSizePx, 1);
   return DeepCopy(rendered);
@@ -56,7 +56,7 @@ void ExpectRefused(const Calibration& c, const std::string& why) {
   EXPECT_FALSE(c.blur_ratio);
 }
 
-// Right within its own errors, and those are small.
+// Expects that the results are right within their own errors and that these are small.
 void ExpectRight(const Calibration& c, const model::SweepTruth& truth) {
   ASSERT_TRUE(c.focus_depth_mm) << c.reason;
   EXPECT_EQ(c.outcome, Outcome::kOk) << c.reason;
@@ -163,7 +163,7 @@ TEST(Calibrate, AnUnknownBenchZeroIsFound) {
   EXPECT_NEAR(c.bench_offset_mm->value, 45, 3 * c.bench_offset_mm->sigma);
   ASSERT_TRUE(c.focus_depth_mm);
   EXPECT_NEAR(c.focus_depth_mm->value, s.truth.focus_depth_mm, 3 * c.focus_depth_mm->sigma);
-  // The bench zero's error is in the focus' error.
+  // The error of the bench zero is contained in that of the focus.
   EXPECT_GE(c.focus_depth_mm->sigma, 0.8 * c.bench_offset_mm->sigma);
 }
 
@@ -212,7 +212,7 @@ TEST(Calibrate, AFocusFarBeyondTheSweepIsRefusedWithItsSide) {
 TEST(Calibrate, AWrongFocalLengthIsRefusedAsUnphysical) {
   SimulatedSweep s = SweepWithFloor("ii", kSizePx, 1);
   s.sweep.camera.lens.front_focal_length_mm = s.sweep.camera.lens.rear_focal_length_mm = 35;
-  // The aperture's radius follows from the f-number.
+  // The radius of the aperture follows from the f-number.
   s.sweep.camera.lens.aperture_radius_mm *= 35.0 / 50;
   ExpectRefused(Calibrated(s), "which no lens has");
 }
@@ -228,10 +228,10 @@ TEST(Calibrate, StopsWhenProgressSaysSo) {
     return ++calls < 10;
   };
   EXPECT_THROW(Calibrate(s.sweep, options), Interrupted);
-  EXPECT_LT(calls, 14);  // other threads may finish a frame meanwhile
+  EXPECT_LT(calls, 14);  // other threads may finish a frame in the meantime
 }
 
-// Whatever step it is at, nothing takes the end for a frame or a fit that failed.
+// Whatever step is interrupted, the interruption is not mistaken for a frame or a fit that failed.
 TEST(Calibrate, IsCancelledAtEachStep) {
   const SimulatedSweep s = Good();
   CalibrationOptions options;
@@ -255,8 +255,8 @@ TEST(Calibrate, IsCancelledAtEachStep) {
   }
 }
 
-// d1 = rho + f2 zf/(zf - f1): a tolerance of f2 goes into it times zf/(zf - f1), one of the pitch
-// into kappa in proportion.
+// d1 = rho + f2 zf/(zf - f1), so the tolerance of f2 is multiplied by zf/(zf - f1). The tolerance
+// of the pitch changes kappa in proportion.
 TEST(Calibrate, StatedTolerancesWidenTheSystematicInterval) {
   SimulatedSweep s = Good();
   const Calibration exact = Calibrated(s);
@@ -270,7 +270,7 @@ TEST(Calibrate, StatedTolerancesWidenTheSystematicInterval) {
   const double half_mm = 0.1 * zf / (zf - s.sweep.camera.lens.front_focal_length_mm);
   EXPECT_NEAR(c.image_distance_mm->systematic->y() - exact.image_distance_mm->systematic->y(),
               half_mm, 1e-3);
-  // With what the meter itself is good for, and whatever else there is, in quadrature.
+  // The limited accuracy of the blur estimator and all other parts are added in quadrature.
   const double before = exact.blur_ratio->systematic->y() - exact.blur_ratio->value;
   const double after = c.blur_ratio->systematic->y() - c.blur_ratio->value;
   EXPECT_NEAR(std::sqrt(after * after - before * before), 0.02 * c.blur_ratio->value,

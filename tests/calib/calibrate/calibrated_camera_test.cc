@@ -11,7 +11,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// Every number another one, so that none can stand in another's place.
+// All numbers are different, so that a test notices if two are exchanged.
 Calibration Found() {
   Calibration c;
   c.outcome = Outcome::kOk;
@@ -74,7 +74,7 @@ TEST(CalibratedCamera, TheJointFitHasEveryResultInItsPlace) {
   ExpectFrames(c.evidence);
 }
 
-// The recipe has no errors, and says nothing of a floor.
+// The recipe has no errors and does not determine a floor.
 TEST(CalibratedCamera, TheSourcesRecipeHasItsOwnNumbersAlone) {
   const model::Camera camera = CalibratedCamera({}, Found(), true);
   const model::CameraCalibration& c = *camera.calibration;

@@ -1,4 +1,4 @@
-// The errors that a calibration states are the errors that it makes.
+// The errors that a calibration states agree with the errors that it makes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,11 +18,12 @@ TEST(BinomialTestP, IsWhatCanBeCountedByHand) {
   EXPECT_NEAR(BinomialTestP(0, 10, 0.5), 2.0 / 1024, 1e-12);
   EXPECT_NEAR(BinomialTestP(2, 10, 0.5), 2 * (1 + 10 + 45) / 1024.0, 1e-12);
   EXPECT_NEAR(BinomialTestP(5, 10, 0.5), 1, 1e-12);
-  // 0.95^3 is the most likely; the two less likely ones are 3 * .95 .05^2 and .05^3.
+  // The most likely outcome has the probability 0.95^3; the two less likely ones have 3 * 0.95 *
+  // 0.05^2 and 0.05^3.
   EXPECT_NEAR(BinomialTestP(1, 3, 0.95), 3 * 0.95 * 0.0025 + 0.000125, 1e-12);
 }
 
-// A normalised error of each result and each sweep.
+// The normalised error of each result of each sweep.
 struct ZScores {
   std::vector<double> focus_depth, image_distance, blur_ratio;
 };
@@ -38,7 +39,7 @@ void ExpectHonest(const std::string& name, const std::vector<double>& z) {
       << inside << " of " << z.size() << " within 1.96 sigma";
 }
 
-// Sweeps of three textures, floors drawn from their stated error.
+// Calibrates sweeps of three textures, with floors drawn from their stated error.
 void ExpectHonestErrors(const std::string& case_name, int size_px, int sweeps_per_texture,
                         int most_refused) {
   CalibrationOptions how;
@@ -76,11 +77,12 @@ TEST(CoverageSlow, CaseI) { ExpectHonestErrors("i", 128, 14, 0); }
 TEST(CoverageSlow, CaseII) { ExpectHonestErrors("ii", 128, 14, 0); }
 TEST(CoverageSlow, CaseIII) { ExpectHonestErrors("iii", 128, 14, 0); }
 TEST(CoverageSlow, CaseIV) { ExpectHonestErrors("iv", 128, 14, 0); }
-// Of seven frames of white noise too few may show the same: one sweep in a hundred is refused.
+// With white noise and seven frames, too few frames may show the same texture, so one sweep in a
+// hundred is refused.
 TEST(CoverageSlow, CaseV) { ExpectHonestErrors("v", 192, 40, 2); }
 
-// Fewer frames of the same sweep say the same with larger errors. The part's frames are in the
-// whole, too, so that the difference is smaller than either error.
+// Fewer frames of the same sweep give the same results with larger errors. The difference is
+// smaller than either error, because the frames of the part are in the whole sweep, too.
 TEST(CoverageSlow, ThinningMovesTheFocusByLessThanTheErrors) {
   for (const std::string name : {"i", "iii"}) {
     SimulatedSweep whole = SweepWithFloor(name, 192, 7);

@@ -1,5 +1,6 @@
-// What goes wrong on a bench must not go into the result unnoticed: damaged frames are named and do
-// no harm, sweeps that would give a confident wrong answer are refused, harmless things are.
+// Faults of a bench must not enter the result unnoticed. Damaged frames are named and do no harm,
+// sweeps that would give a wrong answer with a small error are refused, and harmless changes are
+// accepted.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +32,7 @@ const SimulatedSweep& Clean(const std::string& name) {
   return rendered.emplace(name, sweep).first->second;
 }
 
-// Of the clean sweep of a case, calibrated once.
+// The calibration of the clean sweep of a case, computed once.
 const Calibration& CleanResult(const std::string& name) {
   static std::map<std::string, Calibration> results;
   const auto found = results.find(name);
@@ -39,12 +40,12 @@ const Calibration& CleanResult(const std::string& name) {
   return results.emplace(name, CalibrateWithoutMap(Clean(name))).first->second;
 }
 
-// "frame-3" and not "frame-31".
+// Distinguishes "frame-3" from "frame-31".
 bool NamesFrame(const std::string& text, const std::string& name) {
   return std::regex_search(text, std::regex(name + "([^0-9]|$)"));
 }
 
-// All that is said of one frame.
+// Returns all messages about one frame.
 std::string Said(const Calibration& c, std::size_t frame) {
   std::string said = c.frames[frame].rejection;
   for (const std::string& warning : c.warnings) {
@@ -61,7 +62,7 @@ void ExpectRefused(const Calibration& c, const std::string& why) {
   EXPECT_FALSE(c.blur_ratio);
 }
 
-// "reading off by 15.1 mm": the amount, without its sign.
+// Returns the amount in "reading off by 15.1 mm", without its sign.
 std::optional<double> AmountOff(const std::string& said) {
   static const std::regex amount(R"(reading off by (?:about )?([-+]?[0-9]+\.?[0-9]*) mm)");
   std::smatch found;
@@ -98,7 +99,7 @@ void ExpectRightInSpiteOfFaults(const std::string& name) {
   ExpectReadingOffBy(c, faults.shifted, faults.shift_mm);
   ExpectReadingOffBy(c, faults.swapped_first, faults.swap_mm);
   ExpectReadingOffBy(c, faults.swapped_second, faults.swap_mm);
-  // And hardly a sound one is called off.
+  // Hardly any undamaged frame is reported.
   EXPECT_LE(std::count_if(c.frames.begin(), c.frames.end(),
                           [&](const FrameMeasurement& frame) { return !frame.rejection.empty(); }),
             7 + static_cast<int>(c.frames.size()) / 20);
@@ -117,7 +118,7 @@ TEST_P(WrongSweep, TheSamePictureRepeatedIsRefusedForItsScale) {
   ExpectRefused(CalibrateWithoutMap(s), "scale|repeated|does not change");
 }
 
-// Noise of their own does not make pictures different.
+// Independent noise does not make pictures different.
 TEST_P(WrongSweep, TheSameSceneWithFreshNoiseIsRefusedForItsScale) {
   SimulatedSweep s = DeepCopy(Clean(GetParam()));
   cv::RNG random(3);
@@ -154,14 +155,14 @@ TEST_P(WrongSweep, ReadingsOfCentimetresInMillimetresAreRefused) {
 INSTANTIATE_TEST_SUITE_P(LongLens, WrongSweep, ::testing::Values("ii"));
 INSTANTIATE_TEST_SUITE_P(SlowThickLens, WrongSweep, ::testing::Values("iii"));
 
-// By the blur law a focal length of 35 mm in place of 50 asks for kappa = 0.975, and to be seen so
-// wide behind so short a lens, whose rim fall-off darkens more, for 1.00: as a Gaussian, more light
-// than an aperture passes.
+// With a focal length of 35 mm instead of 50, the blur law requires kappa = 0.975. Because the rim
+// fall-off of such a short lens darkens more, an aperture that looks so wide requires kappa = 1.00.
+// As a Gaussian this is more light than an aperture passes.
 TEST(WrongSweepOfALongLens, AWrongFocalLengthIsRefusedOrWarnedOf) {
   SimulatedSweep s = DeepCopy(Clean("ii"));
   model::ThickLens& lens = s.sweep.camera.lens;
   lens.front_focal_length_mm = lens.rear_focal_length_mm = 35;
-  lens.aperture_radius_mm *= 35.0 / 50;  // it follows from the f-number
+  lens.aperture_radius_mm *= 35.0 / 50;  // follows from the f-number
   const Calibration c = CalibrateWithoutMap(s);
   std::string said = c.outcome == Outcome::kRefused ? c.reason : "";
   for (const std::string& warning : c.warnings) said += " | " + warning;
@@ -169,7 +170,8 @@ TEST(WrongSweepOfALongLens, AWrongFocalLengthIsRefusedOrWarnedOf) {
   EXPECT_THAT(said, ContainsRegex("no lens|not physical|kappa|blur ratio"));
 }
 
-// Not confidently wrong: refused, or the truth within 3 sigma of what is stated.
+// Expects no wrong result with a small error: either the sweep is refused, or the truth is within 3
+// sigma of the stated values.
 void ExpectHonest(const Calibration& c, const model::SweepTruth& truth) {
   if (c.outcome == Outcome::kRefused) {
     EXPECT_FALSE(c.focus_depth_mm);
@@ -193,9 +195,10 @@ TEST(PeriodicTarget, SlowIsNeverConfidentlyWrong) {
   }
 }
 
-// What must do no harm: zf stays within 2.5 of its sigmas of the truth or within 5 % of a step, and
-// moves by less than 2 of them, or by 5 % of a step, from where it was; kappa likewise, or by 1 %;
-// sigma stays what it was. (Where sigma is 1 % of a step, no eye would see what JPEG does.)
+// Expects that a change is harmless: zf stays within 2.5 sigma of the truth or within 5 % of a
+// step, and moves by less than 2 sigma or 5 % of a step; the same holds for kappa, with 1 % instead
+// of 5 % of a step; sigma stays the same. (If sigma is 1 % of a step, the effect of JPEG is
+// invisible to the eye.)
 void ExpectHarmless(const SimulatedSweep& touched, const std::string& name) {
   const Calibration& clean = CleanResult(name);
   ASSERT_TRUE(clean.focus_depth_mm) << clean.reason;
@@ -221,7 +224,7 @@ class Harmless : public ::testing::TestWithParam<std::string> {};
 TEST_P(Harmless, FlickerOfAFifth) {
   model::SweepSimulationOptions options = SweepCase(GetParam(), kSizePx, 1);
   options.flicker = 0.2;
-  options.light_level *= 0.7;  // flicker that is bright enough to clip is another thing
+  options.light_level *= 0.7;  // flicker that is bright enough to clip is another case
   SimulatedSweep s = Simulate(options);
   GiveFloor(&s);
   ExpectHarmless(s, GetParam());

@@ -1,4 +1,4 @@
-// What a solution says of single frames: those that do not follow, and those that do.
+// Messages of a solution about single frames, both outliers and those that follow the law.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ FocusCase Texture(const BlurBench& bench = ExactBench()) {
   return c;
 }
 
-// The same measurement without one of its samples.
+// Removes one sample of the measurement.
 void Remove(std::size_t frame, BlurSamples* meter) {
   std::vector<Eigen::Index> kept;
   std::vector<std::size_t> frames;
@@ -44,7 +44,8 @@ void Remove(std::size_t frame, BlurSamples* meter) {
 
 // ---- frames that do not follow the parabola ----
 
-// Written minus true reading, on both sides of focus, the scale running either way.
+// The amount is the written minus the true reading. It is tested on both sides of focus, with the
+// scale running either way.
 TEST(SolveFocus, AWrongReadingIsNamedWithWhatItIsOffBy) {
   for (const auto direction : {model::BenchDirection::kAway, model::BenchDirection::kToward}) {
     for (const std::size_t frame : {3U, 26U}) {
@@ -72,7 +73,7 @@ TEST(SolveFocus, AWrongReadingIsNamedWithWhatItIsOffBy) {
   }
 }
 
-// A blur that no reading within the sweep explains.
+// No reading within the sweep explains this blur.
 TEST(SolveFocus, ADamagedFrameIsNotReportedAsAWrongReading) {
   FocusCase c = Texture();
   c.evidence.setup.meters[0].variances_px2[13] += 60;
@@ -99,7 +100,7 @@ TEST(SolveFocus, WhatIsRejectedIsNotInTheFit) {
   EXPECT_EQ(with.evidence.setup.meters[0].covariance.rows(), 30);
 }
 
-// What one meter finds wrong with a frame holds for the other.
+// A frame that is an outlier of one blur estimator is left out of the other one as well.
 TEST(SolveFocus, AFrameIsRejectedForBothMeters) {
   for (const std::size_t meter : {0U, 1U}) {
     FocusCase c = FocusCase().WithTexture(kErrorPx2).WithKnifeEdge(kErrorPx2);
@@ -110,7 +111,7 @@ TEST(SolveFocus, AFrameIsRejectedForBothMeters) {
       EXPECT_EQ(left.frames.size(), 30U);
       EXPECT_THAT(left.frames, Not(Contains(22U)));
     }
-    // What is known of the meters stays with them.
+    // Properties of the blur estimators stay unchanged.
     EXPECT_FALSE(c.evidence.setup.meters[0].held_softness_px2);
     EXPECT_TRUE(c.evidence.setup.meters[1].held_softness_px2);
   }
@@ -119,7 +120,7 @@ TEST(SolveFocus, AFrameIsRejectedForBothMeters) {
 TEST(SolveFocus, AFrameWhoseSpectrumScattersIsRejected) {
   FocusCase c = Texture();
   std::vector<double>& ratios = c.evidence.frame_noise_ratios;
-  ratios.assign(static_cast<std::size_t>(c.bench.count), 0);  // of most there is no spectrum
+  ratios.assign(static_cast<std::size_t>(c.bench.count), 0);  // most frames have no spectrum
   for (std::size_t i = 0; i < 9; ++i) ratios[i] = 1.2;
   ratios[4] = 1.2 * 36;
   ratios[5] = 1.2 * 29;
@@ -141,7 +142,7 @@ TEST(SolveFocus, TheFirstReasonStands) {
   EXPECT_EQ(c.frame(6).reading_error_mm, 0);
 }
 
-// The sweep that remains is what the focus is inside of.
+// A focus counts as inside or outside of the sweep of the remaining frames.
 TEST(SolveFocus, RejectedFramesDoNotReachTheSweepsRange) {
   BlurBench bench = ExactBench();
   bench.last_mm = 402;
@@ -153,9 +154,10 @@ TEST(SolveFocus, RejectedFramesDoNotReachTheSweepsRange) {
   EXPECT_THAT(c.calibration.warnings, Contains(HasSubstr("is extrapolated")));
 }
 
-// ---- frames that weigh less ----
+// ---- frames with less weight ----
 
-// Off by many of the meter's errors, and yet within what no lens follows the law better than.
+// The samples are off by many standard errors of the blur estimator, but by less than the accuracy
+// of the law for any lens.
 FocusCase WithLight(const std::vector<Eigen::Index>& frames) {
   FocusCase c = FocusCase().WithTexture(5e-4).WithTrueFloor();
   for (const Eigen::Index i : frames) c.evidence.setup.meters[0].variances_px2[i] += 0.02;
@@ -183,7 +185,7 @@ TEST(SolveFocus, ThreeLightFramesAreNamedAndTheOthersCounted) {
                              HasSubstr(" and 2 more"), Not(HasSubstr("frame-24.png")))));
 }
 
-// Four of their errors cost no weight.
+// Deviations of up to four standard errors cost no weight.
 TEST(SolveFocus, FramesWithinTheirErrorsWeighOne) {
   FocusCase c = FocusCase().WithTexture(5e-4).WithTrueFloor();
   c.evidence.setup.meters[0].variances_px2[8] += 0.0015;
@@ -212,7 +214,8 @@ TEST(SolveFocus, EveryFrameGetsItsBlur) {
       EXPECT_TRUE(frame.in_blur_fit);
       EXPECT_EQ(frame.blur_fit_weight, 1);
       EXPECT_EQ(frame.not_in_fit, "");
-      // d sigma = dV scale^2/(2 sigma); of a relative meter the reference's is in all but its own.
+      // d sigma = dV scale^2/(2 sigma). For a relative blur estimator, the error of the reference
+      // is in all frames except the reference itself.
       const double error_px2 = is_edge                  ? kErrorPx2
                                : i == c.bench.reference ? 0
                                                         : std::sqrt(2) * kErrorPx2;
@@ -225,12 +228,12 @@ TEST(SolveFocus, EveryFrameGetsItsBlur) {
   }
 }
 
-// Where nothing is left of the blur its error is that of the variance's root.
+// If no blur is left, the error is that of the root of the variance.
 TEST(SolveFocus, TheErrorOfNoBlurIsBounded) {
   BlurBench bench = ExactBench();
   bench.floor_px2 = 0;
   bench.first_mm = 340;
-  bench.last_mm = 460;  // frame 15 stands in the plane of focus
+  bench.last_mm = 460;  // frame 15 is in the plane of focus
   FocusCase c = FocusCase(bench).WithKnifeEdge(kErrorPx2);
   c.evidence.setup.meters[0].variances_px2[15] -= 1e-3;
   c.Solve();
@@ -239,7 +242,7 @@ TEST(SolveFocus, TheErrorOfNoBlurIsBounded) {
   EXPECT_NEAR(c.frame(15).blur_sigma_error_px, std::sqrt(kErrorPx2 * s2), 1e-9);
 }
 
-// Readings that scatter: what each is believed to be off by is told.
+// The readings scatter, and the estimated error of each is reported.
 TEST(SolveFocus, ReadingErrorsAreReported) {
   BlurBench bench = thicklens::testing::WithReadings(0.1, 1e-5);
   bench.noise = 0;

@@ -1,4 +1,4 @@
-// When a solution is refused, and with what reason.
+// Conditions under which a solution is refused, and the stated reasons.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -37,8 +37,8 @@ FocusCase Solved(const BlurBench& bench, double error_px2, double offset_sigma_m
   return c;
 }
 
-// The meter's error that makes the answer's sigma, proportional to it, so large. (The data are
-// exact, so that the answer stays where it is.)
+// Returns the error of the blur estimator that makes the sigma of the result this large. The sigma
+// is proportional to that error. (The data are exact, so that the result stays the same.)
 double ErrorFor(const BlurBench& bench, BlurParameter parameter, double sigma) {
   constexpr double kTrialPx2 = 1e-3;
   const FocusCase c = Solved(bench, kTrialPx2);
@@ -70,7 +70,7 @@ TEST(SolveFocus, FourFramesAreTooFewAndFiveAreNot) {
   }
 }
 
-// The larger of two meters counts.
+// The estimator with more frames counts.
 TEST(SolveFocus, AFewEdgesBesideEnoughTextureDoNoHarm) {
   for (const bool edges_first : {false, true}) {
     FocusCase c;
@@ -112,13 +112,14 @@ TEST(SolveFocus, ABlurWithinItsErrorsIsRefused) {
   EXPECT_EQ(passes.calibration.outcome, Outcome::kOk) << passes.calibration.reason;
 }
 
-// The blur fixes where focus lies in the sweep; what is missing is where the sweep lies.
+// The blur determines where focus is in the sweep; unknown is where the sweep is.
 TEST(SolveFocus, ABenchZeroThatIsNotKnownIsNotBlamedOnTheBlur) {
   BlurBench bench = ExactBench();
-  bench.first_mm = 380;  // so short that the blur ratio is known better than zf
+  // So short that the relative error of the blur ratio is smaller than that of zf
+  bench.first_mm = 380;
   bench.last_mm = 425;
   const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
-  // The bench zero's error goes nearly whole into zf.
+  // Nearly the whole error of the bench zero enters zf.
   const FocusCase trial = Solved(bench, 0.001, 10);
   const double per_zero = trial.calibration.focus_depth_mm->sigma / 10;
   EXPECT_NEAR(per_zero, 1, 0.1);
@@ -138,14 +139,14 @@ TEST(SolveFocus, AFocusThatTheBlurDoesNotFixIsRefused) {
   bench.last_mm = 425;
   const double half_mm = 0.5 * (bench.last_mm - bench.first_mm);
   const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.1 * half_mm));
-  // Where the blur ratio is known worse still, that is the reason.
+  // If the blur ratio is even less certain, it is the stated reason.
   EXPECT_EQ(c.calibration.outcome, Outcome::kRefused);
   EXPECT_THAT(c.calibration.reason, AnyOf(HasSubstr("the depth of focus is not fixed by the blur"),
                                           HasSubstr("the blur does not change over the sweep")));
   EXPECT_FALSE(c.calibration.focus_reading_mm) << "it is not determined";
 }
 
-// Sweeps that end short of the focus at 400 mm, in steps of 3 mm.
+// Sweeps that end before they reach the focus at 400 mm, in steps of 3 mm.
 BlurBench Beyond(bool focus_is_nearer) {
   BlurBench bench = ExactBench();
   bench.count = 21;
@@ -181,7 +182,7 @@ TEST(SolveFocus, AFocusBeyondTheSweepThatIsNotKnownToAStepIsRefused) {
   }
 }
 
-// Within the sweep the same error would do.
+// Inside the sweep the same error is accepted.
 TEST(SolveFocus, AFocusInsideNeedNotBeKnownToAStep) {
   const BlurBench bench = ExactBench();
   const FocusCase c = Solved(bench, ErrorFor(bench, kFocusDepth, 1.5 * 5));
@@ -189,7 +190,7 @@ TEST(SolveFocus, AFocusInsideNeedNotBeKnownToAStep) {
   EXPECT_THAT(c.calibration.warnings, Not(Contains(HasSubstr("extrapolated"))));
 }
 
-// A gap in the readings, and readings that were taken twice, do not make the step longer or 0.
+// A gap in the readings does not increase the step, and repeated readings do not make it 0.
 TEST(SolveFocus, TheStepIsTheUsualOne) {
   const BlurBench bench = Beyond(true);
   FocusCase c = FocusCase(bench).WithTexture(ErrorFor(bench, kFocusDepth, 0.9 * 3)).WithTrueFloor();
@@ -202,7 +203,7 @@ TEST(SolveFocus, TheStepIsTheUsualOne) {
   EXPECT_EQ(c.calibration.outcome, Outcome::kOk) << c.calibration.reason;
 }
 
-// A blur ratio that no lens has: the stated aperture is wrong. kappa r is what is measured.
+// No lens has such a blur ratio, so the stated aperture is wrong. The sweep measures kappa r.
 TEST(SolveFocus, AnImplausibleBlurRatioIsRefusedAndAnUnusualOneWarnedOf) {
   struct Case {
     double ratio;

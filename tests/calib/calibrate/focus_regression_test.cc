@@ -1,4 +1,5 @@
-// The calibration against simulated sweeps whose truth is known: configs/sweeps/case-*.yaml.
+// The calibration is compared with simulated sweeps whose truth is known:
+// configs/sweeps/case-*.yaml.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,22 +26,22 @@ struct Bounds {
   double focus_mm;
   double ratio;  // relative
 };
-// Dead leaves, floor given as .5 +- .01 px.
+// Dead leaves with a given floor of 0.5 +- 0.01 px.
 constexpr Bounds kLeaves[] = {{"i", 0.5, 0.007},
                               {"ii", 0.045, 0.01},
                               {"iii", 0.1, 0.002},
                               {"iv", 0.23, 0.004},
                               {"v", 0.035, 0.015}};
-// A knife edge, floor fitted: what one sweep's standard deviations may be at most, a fifth more
-// than they are. Errors are held against the standard deviations that are stated.
+// A knife edge with a fitted floor. The limits for the standard deviations of one sweep are a fifth
+// above the present ones. Errors are compared with the stated standard deviations.
 constexpr Bounds kEdge[] = {{"i", 0.21, 0.0026},
                             {"ii", 0.017, 0.0019},
                             {"iii", 0.038, 0.0009},
                             {"iv", 0.1, 0.0014},
                             {"v", 0.034, 0.0037}};
-// What is left without noise, in kappa (KnifeEdgesInDarkCornersAreMeasured): the paper's pupil law
-// gives the blur tails that the family does not have, and the fit of an edge answers to them by as
-// much.
+// Error of kappa that remains without noise (KnifeEdgesInDarkCornersAreMeasured): the paper's pupil
+// law gives the blur tails that the family does not have, and the fit of an edge responds to them
+// by as much.
 constexpr double kModelRatio = 5e-4;
 constexpr double kReach = 4;  // standard deviations
 
@@ -55,7 +56,7 @@ Calibration Measured(const SimulatedSweep& s) {
   return c;
 }
 
-// The truth lies in the systematic interval widened by three sigma.
+// Expects the truth in the systematic interval widened by three sigma.
 void ExpectCovered(const Result& result, double truth) {
   ASSERT_TRUE(result.systematic);
   EXPECT_GT(truth, result.systematic->x() - 3 * result.sigma);
@@ -94,15 +95,15 @@ void CheckEdge(const Bounds& bounds, std::uint64_t seed) {
               kReach * c.blur_ratio->sigma + kModelRatio * truth.blur_ratio);
   ExpectCovered(*c.focus_depth_mm, truth.focus_depth_mm);
   ExpectCovered(*c.blur_ratio, truth.blur_ratio);
-  // A coarse sweep may not fix the floor.
+  // A coarse sweep may leave the floor undetermined.
   if (c.blur_floor_px) {
     EXPECT_NEAR(c.blur_floor_px->value, truth.blur_floor_px, kReach * c.blur_floor_px->sigma);
   }
 }
 
-// Errors over their stated standard deviations, of many sweeps: no bias beyond three standard
-// errors of their mean, and a spread that is 1 within three standard errors of its own, 1/sqrt(2
-// n).
+// Errors divided by their stated standard deviations, over many sweeps. The bias is less than three
+// standard errors of the mean, and the spread is 1 within three of its own standard errors,
+// 1/sqrt(2 n).
 struct Pulls {
   double count = 0, sum = 0, squares = 0;
   void Add(const Result& result, double truth) {
@@ -136,11 +137,12 @@ TEST(FocusRegression, LeavesInCaseThree) { CheckLeaves(kLeaves[2], 1); }
 TEST(FocusRegression, LeavesInCaseFive) { CheckLeaves(kLeaves[4], 1); }
 TEST(FocusRegression, KnifeEdgeInCaseTwo) { CheckEdge(kEdge[1], 1); }
 TEST(FocusRegression, KnifeEdgeInCaseFive) { CheckEdge(kEdge[4], 1); }
-// Of seed 3, two readings lie 3.3 and 2 sigma off, and so does kappa.
+// With seed 3, two readings are off by 3.3 and 2 sigma, and so is kappa.
 TEST(FocusRegression, SlowKnifeEdgesInCaseFiveScatterAsStated) { CheckEdges(kEdge[4], 20); }
 
-// An edge across a sensor wide enough for fall-off to darken its ends by 14 %, without noise. With
-// levels that do not bend along the edge, kappa was .36 % too large and the floor .002 px.
+// An edge without noise crosses a sensor that is wide enough for the fall-off to darken its ends by
+// 14 %. When the levels were constant along the edge, kappa was 0.36 % too large and the floor
+// 0.002 px.
 TEST(FocusRegression, KnifeEdgesInDarkCornersAreMeasured) {
   model::SweepSimulationOptions options = SweepCase("i", 800, 1);
   options.target.kind = model::TargetKind::kKnifeEdge;
@@ -167,7 +169,7 @@ TEST(FocusRegression, SlowKnifeEdgeInEveryCase) {
 }
 TEST(FocusRegression, SlowKnifeEdgesInCaseOneScatterAsStated) { CheckEdges(kEdge[0], 12); }
 
-// Of a printed edge nobody knows how much of its softness is the lens.
+// The share of the lens in the softness of a printed edge is unknown.
 void CheckPrinted(const char* name) {
   SCOPED_TRACE(name);
   const SimulatedSweep s = Sweep(name, model::TargetKind::kPrintedEdge, 1);
@@ -185,8 +187,9 @@ TEST(FocusRegression, SlowAPrintedEdgeOfUnknownFloorCoversTheTruth) {
   CheckPrinted("iv");
 }
 
-// Found from the image scale the bench zero is good to a few tenths of a millimetre where the scale
-// changes enough (i, iii, iv), and says so where it is not. Its error goes into zf one to one.
+// A bench zero that is found from the image scale is accurate to a few tenths of a millimetre if
+// the scale changes enough (i, iii, iv). Otherwise its stated error is large. Its error enters zf
+// one to one.
 void CheckUnknownOffset(const char* name, double within_mm) {
   SCOPED_TRACE(name);
   SimulatedSweep s = Sweep(name, model::TargetKind::kDeadLeaves, 1);
@@ -209,8 +212,8 @@ TEST(FocusRegression, SlowAnUnknownOffsetIsFoundFromTheImageScale) {
   CheckUnknownOffset("v", 2.9);
 }
 
-// Error of the source: the sharpest raw frame is not the plane of focus (lamp, magnification and
-// floor pull it), and the mean of sigma/r is the mean of a quantity that diverges at focus.
+// Errors of the paper: the sharpest raw frame is not the plane of focus (lamp, magnification and
+// floor shift it), and the mean of sigma/r is the mean of a quantity that diverges at focus.
 void CheckSourceRecipe(const char* name) {
   SCOPED_TRACE(name);
   SimulatedSweep s = Sweep(name, model::TargetKind::kDeadLeaves, 1);
@@ -221,7 +224,7 @@ void CheckSourceRecipe(const char* name) {
   const double source_mm = std::abs(c.source.focus_depth_mm - s.truth.focus_depth_mm);
   EXPECT_GT(source_mm, 5 * ours_mm);
   EXPECT_GT(source_mm, 5 * c.focus_depth_mm->sigma);
-  EXPECT_LT(c.source.focus_depth_mm, s.truth.focus_depth_mm);  // pulled to the near side
+  EXPECT_LT(c.source.focus_depth_mm, s.truth.focus_depth_mm);  // shifted to the near side
   EXPECT_GT(std::abs(c.source.blur_ratio / s.truth.blur_ratio - 1), 0.3);
   EXPECT_LT(std::abs(c.blur_ratio->value / s.truth.blur_ratio - 1), 0.004);
 }
@@ -232,7 +235,8 @@ TEST(SourceRecipe, RatioDivergesTowardFocusEvenWithTheTruePlane) {
   SimulatedSweep s = Sweep("iii", model::TargetKind::kKnifeEdge, 1);
   s.sweep.target = model::SweepTarget::kKnifeEdge;
   const Calibration c = Measured(s);
-  // The ratio as the source takes it, at the true plane of focus, by the distance from it.
+  // The mean ratio as the paper defines it, at the true plane of focus, for frames about a distance
+  // from it.
   const auto ratio_near = [&](double distance_mm) {
     double best = 0, apart = 1e9;
     for (std::size_t i = 0; i < c.frames.size(); ++i) {
@@ -245,7 +249,7 @@ TEST(SourceRecipe, RatioDivergesTowardFocusEvenWithTheTruePlane) {
     }
     return best / s.truth.blur_ratio;
   };
-  // Frames stand 1.3 and 2.7 mm from focus, then every 4 mm.
+  // The first frames are 1.3 and 2.7 mm from focus, the others every 4 mm.
   EXPECT_GT(ratio_near(1), 20);
   EXPECT_GT(ratio_near(1), 1.5 * ratio_near(2.7));
   EXPECT_GT(ratio_near(2.7), 1.5 * ratio_near(6));

@@ -1,4 +1,4 @@
-// What a solution states: what is known of the floor, the values, their errors.
+// Contents of a solution: the values, their errors, and how well the floor is known.
 #include "calib/calibrate/focus_solution.h"
 
 #include <gmock/gmock.h>
@@ -34,7 +34,7 @@ void ExpectTrueFocus(const FocusCase& c, double within_mm) {
             model::ImageDistanceMm(c.bench.lens, found.focus_depth_mm->value));
 }
 
-// d1 by the imaging equation's own difference, not by the formula of its slope.
+// d1 is computed from differences of the imaging equation, not from the formula of its slope.
 void ExpectImageDistanceSigma(const FocusCase& c) {
   const Result& zf = *c.calibration.focus_depth_mm;
   const double h = 1e-3;
@@ -46,7 +46,8 @@ void ExpectImageDistanceSigma(const FocusCase& c) {
               1e-6 * std::abs(slope) * zf.sigma);
 }
 
-// Against linear error propagation, in the order that is stated: rows of the twin.
+// The covariance is compared with linear error propagation, in the stated order of the rows of the
+// reference.
 void ExpectCovariance(const Calibration& c, const Eigen::Matrix4d& twin,
                       const std::vector<int>& rows) {
   ASSERT_EQ(c.covariance.rows(), static_cast<Eigen::Index>(rows.size()));
@@ -77,18 +78,19 @@ TEST(SolveFocus, AGivenFloorIsWrittenWithItsError) {
   ExpectImageDistanceSigma(c);
   ASSERT_TRUE(c.calibration.blur_floor_px);
   EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
-  // A texture says next to nothing of the floor: its error stays what it was.
+  // A texture contains almost no information about the floor, so the error of the floor stays the
+  // same.
   EXPECT_NEAR(c.calibration.blur_floor_px->sigma, 0.03, 1e-4);
   EXPECT_FALSE(c.calibration.blur_floor_px->systematic);
   EXPECT_THAT(c.calibration.covariance_order,
               ElementsAre("image_distance_mm", "blur_ratio", "blur_floor_px", "bench_offset_mm"));
   LinearTwin twin{kErrorPx2, true, 0.03};
   ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
-  // No interval of the floor, and so no part of it.
+  // The floor has no interval, and therefore no systematic part.
   EXPECT_EQ(c.Part("lens floor"), nullptr);
 }
 
-// What is not known of the floor is in zf: dzf = zf dS0/(A uf^2), S0 the floor squared.
+// The error of the floor enters zf: dzf = zf dS0/(A uf^2), where S0 is the floor squared.
 TEST(SolveFocus, AGivenFloorsErrorIsInTheFocus) {
   FocusCase c = FocusCase().WithTexture(1e-4).WithTrueFloor(0.05);
   c.Solve();
@@ -147,7 +149,7 @@ TEST(SolveFocus, AKnifeEdgeBesideATextureFixesTheTexturesFloorToo) {
   ExpectTrueFocus(c, 1e-3);
   EXPECT_NEAR(c.calibration.blur_floor_px->value, 0.5, 1e-4);
   EXPECT_EQ(c.calibration.blur.meter, "edges and relative spectrum");
-  // Frames, not samples.
+  // Frames are counted, not samples.
   EXPECT_EQ(c.calibration.blur.frames_used, c.bench.count);
 }
 
@@ -158,7 +160,7 @@ TEST(SolveFocus, WhatIsGivenCountsMoreThanTheKnifeEdge) {
   EXPECT_LT(c.calibration.blur_floor_px->sigma, 0.0011);
 }
 
-// A lens so sharp that the edge cannot tell its floor from none.
+// The lens is so sharp that the edge cannot distinguish its floor from 0.
 TEST(SolveFocus, AFloorBelowItsOwnErrorIsLeftOpen) {
   BlurBench bench = ExactBench();
   bench.floor_px2 = 1e-4;
@@ -175,7 +177,7 @@ TEST(SolveFocus, AFloorBelowItsOwnErrorIsLeftOpen) {
 
 // ---- an interval ----
 
-// Everything that is stated of an interval (px), given or found.
+// Checks everything that is stated about an interval (px), given or found.
 void ExpectInterval(const FocusCase& c, double from_px, double to_px, double within_px) {
   const Calibration& found = c.calibration;
   EXPECT_EQ(found.outcome, Outcome::kPartial);
@@ -192,8 +194,8 @@ void ExpectInterval(const FocusCase& c, double from_px, double to_px, double wit
   EXPECT_TRUE(found.covariance.allFinite());
 }
 
-// zf for a floor, from the vertex of the parabola that the blur follows on the target, whatever
-// floor is assumed: vertex = zf (1 - S0/(A uf^2 + S0)).
+// Returns zf for a floor. The vertex of the parabola that the blur follows on the target does not
+// depend on the assumed floor: vertex = zf (1 - S0/(A uf^2 + S0)).
 double FocusWithFloor(const BlurBench& bench, double floor_px2) {
   const double a_px2 = bench.Curvature() + bench.floor_px2;
   const double vertex_mm = bench.focus_mm * bench.Curvature() / a_px2;
@@ -206,16 +208,16 @@ TEST(SolveFocus, AnIntervalIsAnIntervalOfTheFocus) {
   c.sweep.floor.to_px = 0.8;
   c.Solve();
   ExpectInterval(c, 0.3, 0.8, 1e-12);
-  // The middle of the squares is what is assumed.
+  // The mean of the squares is assumed.
   const double middle_px2 = 0.5 * (0.09 + 0.64);
   EXPECT_NEAR(c.calibration.focus_depth_mm->value, FocusWithFloor(c.bench, middle_px2), 1e-3);
   ASSERT_TRUE(c.calibration.focus_depth_mm->systematic);
   EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->x(), FocusWithFloor(c.bench, 0.09), 1e-2);
   EXPECT_NEAR(c.calibration.focus_depth_mm->systematic->y(), FocusWithFloor(c.bench, 0.64), 1e-2);
   ASSERT_NE(c.Part("lens floor"), nullptr);
-  // Nothing to warn of: it was stated.
+  // The floor was stated, so there is no warning.
   EXPECT_THAT(c.calibration.warnings, IsEmpty());
-  // The rows left are those of the twin that holds the floor.
+  // The remaining rows equal those of the reference with a fixed floor.
   BlurBench assumed = c.bench;
   assumed.floor_px2 = middle_px2;
   assumed.focus_mm = c.calibration.focus_depth_mm->value;
@@ -224,7 +226,7 @@ TEST(SolveFocus, AnIntervalIsAnIntervalOfTheFocus) {
                    {0, 1, 3});
 }
 
-// Nothing is known of this texture's fine detail, that would exclude a soft lens.
+// The fine detail of this texture is unknown, so a soft lens cannot be excluded.
 TEST(SolveFocus, AnUnknownFloorIsUpToASoftLens) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2);
   c.Solve();
@@ -235,13 +237,13 @@ TEST(SolveFocus, AnUnknownFloorIsUpToASoftLens) {
                                 HasSubstr("0 to 3.0 px"), HasSubstr("state blur_floor_px"))));
 }
 
-// Lens and ink together are what the edges show: sqrt(.25 + .39) px.
+// The edges show the blur of lens and ink together: sqrt(0.25 + 0.39) px.
 constexpr double kInkPx2 = 0.39;
 
 TEST(SolveFocus, PrintedEdgesBoundTheFloor) {
   FocusCase c = FocusCase().WithPrintedEdge(kErrorPx2, kInkPx2);
   c.Solve();
-  ExpectInterval(c, 0, 0.8, 0.02);  // ink is fitted as if it were lens
+  ExpectInterval(c, 0, 0.8, 0.02);  // the ink is fitted as if it were lens blur
   EXPECT_THAT(c.calibration.warnings,
               ElementsAre(AllOf(HasSubstr("px soft at focus"), HasSubstr("knife edge"))));
   const Eigen::Vector2d& zf = *c.calibration.focus_depth_mm->systematic;
@@ -251,7 +253,7 @@ TEST(SolveFocus, PrintedEdgesBoundTheFloor) {
 
 TEST(SolveFocus, EdgesOfATextureBoundTheFloor) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2);
-  // Nine frames about focus, as the measurement chooses them, one of them spoilt.
+  // Nine frames about focus, as the measurement selects them. One of them is spoilt.
   BlurSamples edges = c.bench.Absolute(kErrorPx2, kInkPx2, &c.random);
   const std::vector<Eigen::Index> about = {10, 11, 12, 13, 14, 15, 16, 17, 18};
   c.evidence.unstated_edges = BlurSamples{};
@@ -265,7 +267,8 @@ TEST(SolveFocus, EdgesOfATextureBoundTheFloor) {
   EXPECT_EQ(c.calibration.blur.meter, "relative spectrum");
 }
 
-// Off focus and off the reference's scale they say the same, if less well.
+// Frames off focus, whose scale differs from that of the reference, give the same bound, although a
+// weaker one.
 TEST(SolveFocus, EdgesOfATextureBoundTheFloorOnOneSideToo) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2);
   const BlurSamples edges = c.bench.Absolute(kErrorPx2, kInkPx2, &c.random);
@@ -277,7 +280,7 @@ TEST(SolveFocus, EdgesOfATextureBoundTheFloorOnOneSideToo) {
   ExpectInterval(c, 0, 0.8, 0.1);
 }
 
-// Edges that seem sharper than sharp are no bound.
+// Edges that seem sharper than possible give no bound.
 TEST(SolveFocus, EdgesWithoutSoftnessAreNoBound) {
   FocusCase c = FocusCase().WithPrintedEdge(kErrorPx2, -0.6);
   c.Solve();
@@ -304,12 +307,12 @@ TEST(SolveFocus, TheBenchZerosErrorIsInTheCovariance) {
   LinearTwin twin{kErrorPx2, true, 0.03};
   twin.offset_sigma_mm = kZeroSigmaMm;
   ExpectCovariance(c.calibration, twin.Covariance(c.bench), {0, 1, 2, 3});
-  // A zero that is too large makes zf too large, d1 too small.
+  // If the zero is too large, zf is too large and d1 too small.
   EXPECT_LT(c.calibration.covariance(0, 3), 0);
   EXPECT_GT(c.calibration.focus_depth_mm->sigma, 0.9 * kZeroSigmaMm);
 }
 
-// ---- what is told of the blur ----
+// ---- messages about the blur ----
 
 TEST(SolveFocus, MessagesOfTheMetersAreKept) {
   FocusCase c = FocusCase().WithTexture(kErrorPx2).WithTrueFloor();
@@ -334,7 +337,7 @@ TEST(SolveFocus, AnotherShapeIsWarnedOfWhereItFitsClearlyBetter) {
   struct Case {
     model::Psf stated;
     double gaussian, disc;
-    const char* warning;  // nothing: none
+    const char* warning;  // null: no warning
   };
   const Case cases[] = {
       {model::Psf::kGaussian, 1.21, 1.0,

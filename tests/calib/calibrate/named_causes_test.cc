@@ -1,5 +1,5 @@
-// Whole sweeps that went wrong in ways that look like something else: the reason must be the cause,
-// and what was determined in spite of it must be told.
+// Whole sweeps with faults that resemble other faults. The stated reason must be the cause, and
+// results that could be determined nevertheless must be reported.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ using namespace thicklens::testing;
 
 constexpr int kSizePx = 192;
 
-// 50 mm f/2.8, in focus at 300 mm, 31 frames of 1 mm.
+// A lens of 50 mm f/2.8 in focus at 300 mm, with 31 frames at steps of 1 mm.
 SimulatedSweep Good() {
   static const SimulatedSweep rendered = SweepWithFloor("ii", kSizePx, 1);
   return DeepCopy(rendered);
@@ -47,7 +47,7 @@ TEST(Reason, ReadingsInInchesWithAStatedErrorAreStillAskedAbout) {
   s.sweep.offset_mm.reset();
   for (model::SweepFrame& frame : s.sweep.frames)
     frame.reading_mm = (frame.reading_mm - 190) / 25.4;
-  s.sweep.reading_sigma_mm = 0.05;  // 4 % of the readings' range
+  s.sweep.reading_sigma_mm = 0.05;  // 4 % of the range of the readings
   const Calibration c = CalibrateWithoutMap(s);
   EXPECT_EQ(c.outcome, Outcome::kRefused);
   EXPECT_THAT(c.reason, AllOf(StartsWith("the image scale puts the target at 1"),
@@ -56,7 +56,7 @@ TEST(Reason, ReadingsInInchesWithAStatedErrorAreStillAskedAbout) {
   ExpectSharpestAt(c, 110 / 25.4, 0.03);
 }
 
-// As a focus stacker brings the frames to one scale, with mirrored borders.
+// Scales all frames to one size with mirrored borders, as focus stacking programs do.
 TEST(Reason, AlignedFramesAreNotCalledDistorted) {
   SimulatedSweep s = Good();
   for (std::size_t i = 0; i < s.stored->size(); ++i) {
@@ -77,7 +77,8 @@ TEST(Reason, AlignedFramesAreNotCalledDistorted) {
   ExpectSharpestAt(c, 300, 0.7);
 }
 
-// The target of the sweeps below: blots of all sizes, so that every frame sees the same ones.
+// The target of the sweeps below has blots of all sizes, so that every frame contains the same
+// ones.
 model::LinearPicture Blots() {
   constexpr int kSide = 900;
   cv::Mat picture(kSide, kSide, CV_32F, cv::Scalar(0.5));
@@ -95,7 +96,7 @@ model::LinearPicture Blots() {
   return result;
 }
 
-// The target stands at 300 mm, the sensor moves by +-0.6 mm about 60 mm behind the lens.
+// The target is at 300 mm, and the sensor moves by +-0.6 mm, about 60 mm behind the lens.
 SimulatedSweep FocusRing() {
   const model::LinearPicture target = Blots();
   SimulatedSweep sweep;
@@ -139,7 +140,7 @@ TEST(Reason, ALensThatMovesIsNamedAndNotTheDirectionOrTheUnit) {
   }
 }
 
-// 1:1, 3 mm of sweep at 200 mm: the scale fixes the zero to some millimetres only.
+// At 1:1, with 3 mm of sweep at 200 mm, the scale determines the zero only to some millimetres.
 TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusReported) {
   model::SweepSimulationOptions options = SweepCase("ii", 384, 1);
   options.camera.lens = testing::ThinLens(100, 17.86);
@@ -169,7 +170,7 @@ TEST(Reason, AnUnknownZeroOfAMacroSweepIsNamedAndTheFocusReported) {
   }
 }
 
-// Bands that keep most frames from being registered to one another.
+// The bands prevent most frames from being registered to one another.
 TEST(Reason, AFlickeringLampIsNamedWhereFramesDoNotRegister) {
   SimulatedSweep s = Good();
   std::mt19937 engine(2);

@@ -1,4 +1,4 @@
-// Sweeps that fail for something plain: the reason must say that, not what follows from it.
+// Sweeps that fail for a simple reason. The message must state that reason, not its consequences.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -41,7 +41,7 @@ SimulatedSweep KnifeEdge() {
   return sweep;
 }
 
-// All but the frames from `first` to `last`.
+// Changes the exposure of all frames except those from `first` to `last`.
 void Expose(SimulatedSweep* s, double gain, int first, int last) {
   for (int i = 0; i < static_cast<int>(s->stored->size()); ++i) {
     if (i < first || i > last) s->frame(i).convertTo(s->frame(i), CV_8U, gain);
@@ -64,7 +64,7 @@ TEST(Exposure, AnOverExposedSweepGetsTheAdviceToLowerIt) {
   }
 }
 
-// Thirteen frames about focus are enough for a result; that it is one of few is still told.
+// Thirteen frames about focus are enough for a result, but the message says that they are few.
 TEST(Exposure, AResultFromTheFewGoodFramesSaysSo) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 14, 26);
@@ -92,7 +92,7 @@ TEST(Exposure, AFewBadFramesAreNotTheCause) {
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("exposed"))));
 }
 
-// Half of the sweep is missing because of the light: no other advice beside it.
+// Half of the sweep is missing because of the light, so no other advice is given.
 TEST(Exposure, WhatFollowsFromItIsNotAdvisedOn) {
   SimulatedSweep s = Good();
   Expose(&s, 6, 0, 6);

@@ -1,4 +1,5 @@
-// What a calibration says of the image scale: a lone edge that has none, readings that bend.
+// Messages of a calibration about the image scale, for a lone edge, which has none, and for
+// nonlinear readings.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -59,7 +60,8 @@ TEST(LoneEdge, NeedsAGivenOffset) {
               AllOf(HasSubstr("a lone edge shows no image scale;"), HasSubstr("state offset_mm")));
 }
 
-// What nobody said to be a lone edge may be a printed one, as soft as that comes out.
+// If the target is not stated to be a lone edge, it may be a printed edge with a softness of its
+// own.
 TEST(LoneEdge, OfAnUnstatedTargetItsSoftnessIsOpen) {
   SimulatedSweep s = KnifeEdge();
   s.sweep.target = model::SweepTarget::kAuto;
@@ -84,7 +86,7 @@ TEST_P(StraightLaw, SlowAStraightLawHasNoNoteOfABend) {
 }
 INSTANTIATE_TEST_SUITE_P(Cases, StraightLaw, ::testing::Values("i", "ii", "iii", "iv", "v"));
 
-// Readings of a rail whose screw is not even: +0.8 mm at both ends against the middle.
+// The readings are from a rail with an uneven screw: +0.8 mm at both ends relative to the middle.
 TEST(BentLaw, IsWarnedOfWithItsSize) {
   SimulatedSweep s = Good();
   for (model::SweepFrame& frame : s.sweep.frames) {

@@ -1,4 +1,4 @@
-// Readings that are wrong together, and a wrong reading of the frame that all others refer to.
+// Readings that are wrong together, and a wrong reading of the frame to which all others refer.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -38,7 +38,8 @@ TEST(SlippedReadings, AJumpIsNamedAndWidensTheInterval) {
       std::find_if(c.systematic_parts.begin(), c.systematic_parts.end(),
                    [](const SystematicPart& p) { return p.name == "jump of the readings"; });
   ASSERT_NE(part, c.systematic_parts.end());
-  // With the frames before the jump moved zf moves by part of it: most frames see none.
+  // Moving the frames before the jump moves zf by a part of the jump only, because most frames are
+  // not affected.
   EXPECT_GT(part->focus_depth_mm.y(), 0.2 * kJumpMm);
   EXPECT_LT(part->focus_depth_mm.y(), 1.2 * kJumpMm);
 }
@@ -48,7 +49,7 @@ TEST(SlippedReadings, AGoodSweepHasNoJump) {
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("jump"))));
 }
 
-// The others would refer to the most blurred frame, or to no depth at all.
+// Otherwise the frames would refer to the most blurred frame, or to no depth at all.
 TEST(WrongReference, TheNextSharpestTakesItsPlace) {
   SimulatedSweep s = Sweep();
   const Calibration clean = CalibrateWithoutMap(s);

@@ -53,7 +53,7 @@ TEST(StarSweep, StrongDefocusCalibratesToo) {
   ExpectRight(CalibrateWithoutMap(ii), ii.truth, 1);
 }
 
-// No scale says so, but the blur does.
+// No scale reveals the wrong reading, but the blur does.
 TEST(StarSweep, AWrongReadingIsNamedByItsBlur) {
   for (const double error_mm : {12.0, -25.0}) {
     SimulatedSweep s = StarSweep("iii", 3);
@@ -67,7 +67,8 @@ TEST(StarSweep, AWrongReadingIsNamedByItsBlur) {
   }
 }
 
-// All others are compared with the sharpest frame. If that one is wrong, another takes its place.
+// All frames are compared with the sharpest one. If the reading of that frame is wrong, another
+// frame replaces it.
 TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
   SimulatedSweep s = StarSweep("iii", 3);
   const Calibration clean = CalibrateWithoutMap(s);
@@ -82,7 +83,7 @@ TEST(StarSweep, TheSharpestFrameMayHaveTheWrongReading) {
   ExpectRight(c, s.truth, 4);
   EXPECT_THAT(c.frames[sharpest].rejection, HasSubstr("reading off by"));
   EXPECT_FALSE(c.frames[sharpest].in_blur_fit);
-  // Bands and shapes could be compared, which needs a reference.
+  // The comparison of bands and shapes was possible, although it needs a reference.
   EXPECT_EQ(clean.systematic_parts.size(), c.systematic_parts.size());
   EXPECT_TRUE(c.blur.disc_misfit);
 }

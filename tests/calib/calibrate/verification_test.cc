@@ -1,5 +1,5 @@
-// Whether a stored calibration holds: the statistics, with numbers that can be worked out by hand.
-// With simulated sweeps: tests/tools/commands/camera_verify_test.cc.
+// Statistics that decide whether a stored calibration is still valid, tested with numbers that can
+// be computed by hand. Simulated sweeps are tested in tests/tools/commands/camera_verify_test.cc.
 #include "thicklens/calib/verification.h"
 
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ using thicklens::testing::WithMethod;
 
 constexpr double kD1Mm = 60, kRatio = 0.45;
 
-// 50 mm at f/2.8, d1 = 60 mm.
+// A lens of 50 mm at f/2.8 with d1 = 60 mm.
 model::Camera StoredCamera(double d1_sigma, double ratio_sigma) {
   return WithMethod(TestCamera("stored", ThinLens(50, 50 / (2 * 2.8)),
                                CentredSensor(512, 512, 0.0045, model::TransferCurve::Linear()),
@@ -57,7 +57,7 @@ const ComparedParameter& Named(const Verification& verification, const std::stri
   return none;
 }
 
-// Tables of the chi-square distribution.
+// The quantiles are from published tables of the chi-square distribution.
 TEST(ChiSquare, AgreesWithPublishedQuantiles) {
   EXPECT_NEAR(ChiSquareTail(3.841459, 1), 0.05, 1e-7);
   EXPECT_NEAR(ChiSquareTail(5.991465, 2), 0.05, 1e-7);
@@ -70,7 +70,8 @@ TEST(ChiSquare, AgreesWithPublishedQuantiles) {
 }
 
 TEST(VerifyCalibration, AddsTheVariancesOfBoth) {
-  // 0.004 mm with 0.003 and 0.004 mm of sigma, 0.001 with none but 0.001.
+  // The change is 0.004 mm, with sigmas of 0.003 and 0.004 mm, or 0.001 mm with a sigma of 0.001 mm
+  // only.
   const Verification result =
       VerifyCalibration(StoredCamera(0.003, 0), {},
                         FoundCalibration(kD1Mm + 0.004, 0.004, kRatio + 0.001, 0.001), {});
@@ -81,7 +82,7 @@ TEST(VerifyCalibration, AddsTheVariancesOfBoth) {
   EXPECT_NEAR(result.chi_square, 0.64 + 1, 1e-8);
   EXPECT_NEAR(result.p_value, std::exp(-0.82), 1e-8);
   EXPECT_FALSE(Named(result, "focus_depth_mm").counted);
-  // zf moves against d1, by as many sigmas but for the curvature of [S13].
+  // zf moves in the opposite direction to d1, by as many sigmas except for the curvature of [S13].
   EXPECT_NEAR(Named(result, "focus_depth_mm").deviation(), -0.8, 0.01);
   ASSERT_THAT(result.warnings, SizeIs(1));
   EXPECT_THAT(result.warnings[0], HasSubstr("blur_ratio: taken as exact"));
@@ -96,8 +97,8 @@ TEST(VerifyCalibration, AChangeOfFiveSigmaIsFound) {
   EXPECT_THAT(result.reason, HasSubstr("image_distance_mm 60.025, stored 60 (+5.0 sigma)"));
 }
 
-// Both matrices are correlated: along the direction that both know badly a difference is no news,
-// across it is.
+// Both matrices are correlated. A difference along the direction in which both are uncertain is not
+// significant; a difference across it is.
 TEST(VerifyCalibration, UsesTheCorrelationOfBothMatrices) {
   model::Camera stored = StoredCamera(0.01, 0.01);
   stored.calibration->covariance_order = {"blur_ratio", "image_distance_mm"};  // another order
@@ -114,8 +115,8 @@ TEST(VerifyCalibration, UsesTheCorrelationOfBothMatrices) {
   EXPECT_EQ(other.verdict, Verdict::kDoesNotHold);
 }
 
-// An unknown bench zero leaves d1 open; where the camera has not moved on the bench, what is known
-// of both together counts.
+// An unknown bench zero leaves d1 undetermined. If the camera has not moved on the bench, the joint
+// information about both counts.
 TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
   model::Camera stored = StoredCamera(0.01, 0.001);
   stored.calibration->bench_offset_mm = model::Estimate{100, 1};
@@ -124,7 +125,7 @@ TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
   Eigen::Matrix3d matrix = Eigen::Vector3d(1e-4, 1e-6, 1).asDiagonal();
   matrix(0, 2) = matrix(2, 0) = covariance;
   stored.calibration->covariance = matrix;
-  // d1 alone is off by one sigma, with the bench zero where it was.
+  // Only d1 is off, by one sigma, and the bench zero is the same.
   Calibration found = FoundCalibration(kD1Mm + std::sqrt(2.0) * 0.01, 0.01, kRatio, 0.001);
   found.bench_offset_mm = Result{100, 1, std::nullopt};
   found.covariance_order = stored.calibration->covariance_order;
@@ -136,10 +137,10 @@ TEST(VerifyCalibration, TheBenchZeroIsComparedWhereTheCameraHasNotMoved) {
   options.same_bench = true;
   const Verification same = VerifyCalibration(stored, {}, found, options);
   EXPECT_EQ(same.degrees_of_freedom, 3);
-  // Of the correlation matrix [1 -.999; -.999 1], 1/(1 - .999^2).
+  // The correlation matrix [1 -0.999; -0.999 1] gives 1/(1 - 0.999^2).
   EXPECT_NEAR(same.chi_square, 1 / (1 - 0.999 * 0.999), 1e-4);
   EXPECT_EQ(same.verdict, Verdict::kDoesNotHold);
-  // What the sweep states it does not measure.
+  // Values that are stated for the sweep are not measured by it.
   FocusSweep stated;
   stated.offset_mm = model::Estimate{100, 0.1};
   EXPECT_EQ(VerifyCalibration(stored, stated, found, options).degrees_of_freedom, 2);
@@ -162,7 +163,7 @@ TEST(VerifyCalibration, SystematicPartsOfTheNewSweepWidenWhatTheCameraFileDoesNo
             Verdict::kDoesNotHold);
 }
 
-// A change that is stated as the smallest detectable one is found in at least 95 % of the cases,
+// A change as large as the stated smallest detectable one is found in at least 95 % of the cases,
 // and not in many more.
 TEST(VerifyCalibration, TheSmallestDetectableChangeIsFoundAsOftenAsItSays) {
   const model::Camera stored = StoredCamera(0.003, 0.001);
@@ -188,7 +189,7 @@ TEST(VerifyCalibration, TheSmallestDetectableChangeIsFoundAsOftenAsItSays) {
 }
 
 TEST(VerifyCalibration, WhatWouldNotShowAChangeCannotTell) {
-  // Of this lens: kappa r (1 - f1/zf)/(f2 p) px a mm of d1.
+  // For this lens the change is kappa r (1 - f1/zf)/(f2 p) px per mm of d1.
   const Verification coarse = VerifyCalibration(StoredCamera(0.001, 0.001), {},
                                                 FoundCalibration(kD1Mm, 0.05, kRatio, 0.001), {});
   EXPECT_EQ(coarse.verdict, Verdict::kCannotTell);

@@ -1,5 +1,6 @@
-// The pupil of a wide lens shares the light of a point by a law that nobody knows. Kappa is the
-// second moment of the blur under any of them; what else depends on the law is in the intervals.
+// The pupil of a wide lens distributes the light of a point by an unknown law. Under any law, kappa
+// is defined by the second moment of the blur. Everything else that depends on the law is included
+// in the intervals.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,10 +23,10 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using namespace thicklens::testing;
 
-constexpr double kRatio = 0.55;  // not the one that a calibration starts with
+constexpr double kRatio = 0.55;  // differs from the value with which a calibration starts
 
-// Case iii, f/1.4: fall-off makes the blur of a Gaussian aperture 3.1 % narrower than the aperture,
-// and moves the bench zero by 0.9 mm.
+// Case iii at f/1.4. The fall-off makes the blur of a Gaussian aperture 3.1 % narrower than the
+// aperture and moves the bench zero by 0.9 mm.
 SimulatedSweep Wide(model::Psf psf, model::PupilLaw law, std::uint64_t seed) {
   model::SweepSimulationOptions options = SweepCase("iii", 160, seed);
   options.camera.psf = psf;
@@ -36,7 +37,7 @@ SimulatedSweep Wide(model::Psf psf, model::PupilLaw law, std::uint64_t seed) {
   return s;
 }
 
-// How far the truth lies beyond the interval, in sigmas.
+// Returns by how many sigmas the truth lies outside the interval.
 double Beyond(const std::optional<Result>& result, double truth) {
   if (!result || !result->systematic) return std::nan("");
   return std::max({0.0, (result->systematic->x() - truth) / result->sigma,
@@ -55,7 +56,8 @@ TEST(WideLens, KappaIsThatOfTheBlurUnderAnyPupilLaw) {
       EXPECT_LT(c.blur_ratio->sigma, 0.005 * kRatio);
       EXPECT_LT(Beyond(c.blur_ratio, kRatio), 2);
       EXPECT_LT(Beyond(c.focus_depth_mm, s.truth.focus_depth_mm), 2);
-      // The tails of the sine condition show in the frames, and widen the interval there alone.
+      // The tails of the sine condition are visible in the frames, and widen the interval only for
+      // that law.
       const bool has_tails = law == model::PupilLaw::kSineCondition;
       EXPECT_LT(c.blur_ratio->systematic->y() - c.blur_ratio->systematic->x(),
                 (has_tails ? 0.08 : 0.015) * kRatio);
@@ -63,12 +65,12 @@ TEST(WideLens, KappaIsThatOfTheBlurUnderAnyPupilLaw) {
       EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("bench zero"))));
       if (!has_tails) pulls += (c.blur_ratio->value - kRatio) / kRatio;
     }
-    // 1 to 2.4 % when a law is built into the definition.
+    // It would be 1 to 2.4 % if a law were part of the definition.
     EXPECT_LT(std::abs(pulls / 3), 0.004);
   }
 }
 
-// A bench zero from the image scale depends on the law, and its interval says so.
+// A bench zero from the image scale depends on the law, and its interval includes that.
 TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
   for (const model::PupilLaw law : model::AllPupilLaws()) {
     SCOPED_TRACE(PupilLawName(law));
@@ -82,7 +84,7 @@ TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
     EXPECT_LT(Beyond(c.image_distance_mm, s.truth.image_distance_mm), 2);
     EXPECT_LT(Beyond(c.blur_ratio, kRatio), 2);
     const Eigen::Vector2d& zero_mm = *c.bench_offset_mm->systematic;
-    // 6 (sigma/d1)^2 K between the sine condition and cos^4.
+    // The difference between the sine condition and cos^4 is 6 (sigma/d1)^2 K.
     const double sigma_mm = kRatio * s.sweep.camera.lens.aperture_radius_mm;
     const double k_mm = model::DefocusScaleMm(s.sweep.camera.lens, s.truth.image_distance_mm);
     const double expected_mm = 6 * std::pow(sigma_mm / s.truth.image_distance_mm, 2) * k_mm;
@@ -90,7 +92,7 @@ TEST(WideLens, AnUnknownZeroHasThePupilLawInItsInterval) {
   }
 }
 
-// A zero that was measured has no part of the pupil law.
+// A measured zero has no systematic part from the pupil law.
 TEST(WideLens, AGivenZeroHasNone) {
   const Calibration c =
       CalibrateWithoutMap(Wide(model::Psf::kGaussian, model::PupilLaw::kUniform, 73));

@@ -9,12 +9,12 @@
 
 namespace thicklens::testing {
 
-// Any scene through a Gaussian that may differ along x and y, or a disc, drawn with many samples
-// per pixel and averaged over each. The second moments come out exact: what the samples' own size
-// adds is what averaging so many of them lacks of the pixel's 1/12 px^2.
+// Any scene blurred by a Gaussian, which may differ along x and y, or by a disc. It is drawn with
+// many samples per pixel and averaged over each pixel. The second moments are exact: the size of
+// the samples adds as much as the average of so many samples lacks of the pixel's 1/12 px^2.
 struct DrawnBlur {
   double sigma_x_px = 0, sigma_y_px = 0;  // Gaussian, not 0
-  double disc_sigma_px = 0;               // of a disc of twice that radius before it
+  double disc_sigma_px = 0;  // sigma of a disc of twice that radius, which is applied first
 };
 
 inline cv::Mat DiscKernel(double radius) {
@@ -35,17 +35,17 @@ inline cv::Mat DiscKernel(double radius) {
   return kernel / cv::sum(kernel)[0];
 }
 
-// `scene(x, y)` is the light at a place, px.
+// `scene(x, y)` is the light at a position, px.
 inline cv::Mat DrawnScene(int size_px, const DrawnBlur& blur,
                           const std::function<double(double, double)>& scene) {
-  // A sampled Gaussian has its variance from a sigma of 3 samples on.
+  // The variance of a sampled Gaussian is accurate for a sigma of at least 3 samples.
   const double narrowest = std::min(blur.sigma_x_px, blur.sigma_y_px);
   const int samples_per_px = std::max(2, static_cast<int>(std::ceil(3 / narrowest)));
   const double widest = std::max({blur.sigma_x_px, blur.sigma_y_px, blur.disc_sigma_px});
   const int margin_px = static_cast<int>(std::ceil(5 * widest)) + 2;
   const int side = (size_px + 2 * margin_px) * samples_per_px;
   const bool has_disc = blur.disc_sigma_px > 0;
-  const int parts = has_disc ? 1 : 3;  // the disc's kernel has the samples' size already
+  const int parts = has_disc ? 1 : 3;  // the kernel of the disc includes the size of the samples
   cv::Mat fine(side, side, CV_32F);
   for (int y = 0; y < side; ++y) {
     for (int x = 0; x < side; ++x) {

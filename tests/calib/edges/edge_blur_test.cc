@@ -10,7 +10,7 @@ namespace {
 using thicklens::testing::DrawnEdge;
 
 TEST(MeasureSourceEdgeBlur, IsNearlyFlatBelowSevenTenthsOfAPixel) {
-  // What a study of the source's meter found on slanted edges.
+  // The numbers are from a study of the paper's blur estimator on slanted edges.
   const auto measure = [](double sigma_px) {
     const auto blur = MeasureSourceEdgeBlur(DrawnEdge(128, 5, sigma_px, 0.2, 0.8));
     return blur ? blur->sigma_px : -1;
@@ -19,14 +19,14 @@ TEST(MeasureSourceEdgeBlur, IsNearlyFlatBelowSevenTenthsOfAPixel) {
   EXPECT_NEAR(measure(0.7), 0.99, 0.06);
   EXPECT_NEAR(measure(1), 1.21, 0.06);
   EXPECT_NEAR(measure(2), 2.10, 0.06);
-  // Of .4 px of change it shows less than half.
+  // The estimator shows less than half of a change of 0.4 px.
   EXPECT_LT(measure(0.7) - measure(0.3), 0.2);
 }
 
 TEST(MeasureSourceEdgeBlur, CountsItsEdgesAndSaysNothingWithoutAny) {
   const auto blur = MeasureSourceEdgeBlur(DrawnEdge(128, 0, 1, 0.2, 0.8));
   ASSERT_TRUE(blur);
-  EXPECT_GE(blur->edge_count, 100);  // one a row, less the margins
+  EXPECT_GE(blur->edge_count, 100);  // one per row, except in the margins
   EXPECT_LE(blur->edge_count, 2 * 128);
   EXPECT_FALSE(MeasureSourceEdgeBlur(cv::Mat(64, 64, CV_32F, cv::Scalar(0.4))));
 }

@@ -10,8 +10,9 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// The step seen through a Gaussian, averaged over the pixel's box and over the disc, by plain sums
-// of midpoints. The disc's places projected on the normal are distributed as the semicircle.
+// The step blurred by a Gaussian and averaged over the box of the pixel and over the disc, computed
+// as plain midpoint sums. The positions in the disc, projected on the normal, have a semicircle
+// distribution.
 double PlainLevel(double distance_px, double angle_rad, double gaussian_sigma_px,
                   double radius_px) {
   constexpr int kBox = 24, kDisc = 200;

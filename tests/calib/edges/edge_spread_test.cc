@@ -30,10 +30,10 @@ constexpr double kDegree = CV_PI / 180;
 double Sine(double degrees) { return std::sin(degrees * kDegree); }
 double Cosine(double degrees) { return std::cos(degrees * kDegree); }
 
-// With the noise of 8-bit rounding and one grey value more.
+// Adds the noise of 8-bit rounding and of one more grey value.
 cv::Mat EightBit(const cv::Mat& grey, unsigned seed) { return Stored(grey, 1, 256, seed); }
 
-// A checkerboard whose normals stand at `angle_deg` and `angle_deg + 90 + skew_deg`.
+// A checkerboard whose normals are at `angle_deg` and `angle_deg + 90 + skew_deg`.
 auto Checkerboard(double angle_deg, double skew_deg, double side_px) {
   return [=](double x, double y) {
     const double u = x * Cosine(angle_deg) + y * Sine(angle_deg);
@@ -126,7 +126,7 @@ TEST(MeasureEdgeSpread, XAndYAreDistinguished) {
   const auto x = MeasureEdgeSpread(EightBit(DrawnScene(128, blur, Step(4, 63.5, 0.2, 0.8)), 3),
                                    Psf::kGaussian, 0);
   ASSERT_TRUE(x && x->across_x);
-  // Along a normal at the angle a: sigma_x^2 cos^2 a + sigma_y^2 sin^2 a.
+  // The variance along a normal at the angle a is sigma_x^2 cos^2 a + sigma_y^2 sin^2 a.
   EXPECT_NEAR(x->across_x->sigma_px, std::hypot(1.4 * Cosine(4), 2.1 * Sine(4)), kAllowedPx);
   EXPECT_FALSE(x->across_y);
   const auto y = MeasureEdgeSpread(EightBit(DrawnScene(128, blur, Step(94, 63.5, 0.2, 0.8)), 4),
@@ -158,8 +158,8 @@ TEST(MeasureEdgeSpread, HoldsUnderALampsSlope) {
 }
 
 // An edge through a field that lenses darken towards its corners: by cos^4, three times as much, or
-// late and steeply. With levels that are planes, the first makes sigma .3 to .5 % too large, and
-// the others an edge that is none.
+// late and steeply. With levels that are planes, the first darkening makes sigma 0.3 to 0.5 % too
+// large, and with the others the edge is not accepted.
 TEST(MeasureEdgeSpread, DoesNotTakeADarkeningLensForBlur) {
   constexpr int kSizePx = 320;
   const std::vector<std::function<double(double)>> darkenings = {
@@ -230,10 +230,10 @@ TEST(MeasureEdgeSpread, MeasuresCheckerboardsThroughADisc) {
   EXPECT_NEAR(spread->across_y->sigma_px, std::hypot(2, 0.5), kAllowedPx);
 }
 
-// Two edges with Gaussian blur along the axes: in closed form, one factor per axis.
+// Two edges with Gaussian blur along the axes, in closed form as one factor per axis.
 cv::Mat AxisCorner(int size_px, double x_px, double y_px, double sigma_px) {
-  // Mean over the pixel of sign(x) blurred: the difference of x erf(x/s) + s/sqrt(pi) exp(-x^2/s^2)
-  // with s = sqrt(2) sigma.
+  // The mean over the pixel of the blurred sign(x): the difference of x erf(x/s) + s/sqrt(pi)
+  // exp(-x^2/s^2) with s = sqrt(2) sigma.
   const auto factor = [sigma_px](double d) {
     const double s = std::sqrt(2) * sigma_px;
     const auto integral = [s](double x) {
@@ -295,7 +295,7 @@ TEST(FitEdgeSpread, FitsACornerOfSkewedEdges) {
   }
 }
 
-// The scatter of sigma over many frames against the error that each of them states.
+// The scatter of sigma over many frames is compared with the error that each of them states.
 struct Calibrated {
   double scatter_px = 0, stated_px = 0, mean_px = 0;
 };
@@ -369,7 +369,7 @@ TEST(FitEdgeSpread, GivesTheProfileOnRequest) {
     const double d = fit->distance_px[i];
     EXPECT_TRUE(i == 0 || d > fit->distance_px[i - 1]);
     EXPECT_NEAR(fit->level[i], fit->fitted[i], 0.01);
-    // The pixel's box has the variance 1/12 px^2.
+    // The box of the pixel has the variance 1/12 px^2.
     EXPECT_NEAR(fit->fitted[i], 0.5 * std::erfc(-d / std::sqrt(2 * (4 + 1.0 / 12))), 0.003);
   }
 }
@@ -380,7 +380,7 @@ TEST(FitEdgeSpread, FollowsAnEdgeThatDistortionBendsAndRefusesACurve) {
       return std::hypot(x - 48 - radius_px, y - 47) < radius_px ? 0.8 : 0.2;
     };
   };
-  // Sag of 0.8 px over 80.
+  // The sag is 0.8 px over 80 px.
   const cv::Mat bent = EightBit(DrawnScene(96, {1, 1, 0}, disc(1000)), 14);
   const auto spread = MeasureEdgeSpread(bent, Psf::kGaussian, 0);
   ASSERT_TRUE(spread);
@@ -389,7 +389,7 @@ TEST(FitEdgeSpread, FollowsAnEdgeThatDistortionBendsAndRefusesACurve) {
   EXPECT_FALSE(FitEdgeSpread(curved, MiddleEdge(96, 0), Psf::kGaussian, 0, false));
 }
 
-// A patch with one edge, dark left and bright right, amid leaves.
+// A patch with one edge, dark on the left and bright on the right, in the middle of leaves.
 cv::Mat PatchInTexture(double sigma_px, double patch_px) {
   model::SweepSimulationOptions options = thicklens::testing::SweepCase("i", 192, 21);
   const model::SweepSimulator simulator(options, {});
@@ -480,7 +480,7 @@ TEST(FitEdgeSpread, RefusesWhatIsNoSuchFeature) {
   EXPECT_FALSE(FitEdgeSpread(edge, corner, Psf::kGaussian, 0, false));
   const cv::Mat board = DrawnScene(128, {1, 1, 0}, Checkerboard(0, 0, 24));
   EXPECT_FALSE(FitEdgeSpread(EightBit(board, 1), MiddleEdge(128, 0), Psf::kGaussian, 0, false));
-  // Too blurred for its plateaus.
+  // The edge is too blurred for its plateaus.
   EdgeFeature narrow = MiddleEdge(128, 5);
   narrow.half_width_px = 8;
   const cv::Mat soft = EightBit(DrawnEdge(128, 5, 5, 0.2, 0.8), 20);
@@ -550,7 +550,7 @@ TEST(UndisturbedStep, BringsALineOntoItsEdge) {
 }
 
 TEST(FindEdges, GivesTheStrongestFirstAndNoMoreThanAsked) {
-  // A strong edge on the left, a weak one on the right.
+  // A strong edge on the left and a weak one on the right.
   const auto scene = [](double x, double y) {
     return 0.2 + (x - 40 > 0.1 * (y - 64) ? 0.5 : 0) + (x - 95 > 0.1 * (y - 64) ? 0.1 : 0);
   };
