@@ -1,4 +1,4 @@
-// How soon computations end that are cancelled, and that nothing takes the end for an error.
+// Computations that are cancelled end soon, and the cancellation is not mistaken for an error.
 #include "thicklens/base/cancel.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@
 namespace thicklens::estimator {
 namespace {
 
-// Of this thread: how busy the machine is does not matter then.
+// CPU time of this thread, which does not depend on how busy the machine is.
 double CpuNow() {
   timespec time{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -98,7 +98,7 @@ void ExpectCancelledAtEachStep(
   int steps = 0;
   estimate([&](int, int) { ++steps; });
   ASSERT_GT(steps, 3);
-  // Not at the last: then the work is done.
+  // The last step is left out, because the work is done then.
   for (int at = 1; at < steps - 1; at += 1 + steps / 20) {
     CancelToken token;
     const CancelScope scope(&token);
@@ -151,8 +151,8 @@ TEST(CancelledEstimate, TheFunctionalAndTheGridSolverStop) {
   }
 }
 
-// What is said about a view that cannot be compared has its place in front: the end of the work
-// must not become such an error.
+// A message about a view that cannot be compared begins with its position. A cancellation must not
+// become such an error.
 TEST(CancelledComparison, EndsByInterruptedToo) {
   const EstimateInput input = RandomInput(40, 36, 0.5F, 1.5F);
   const model::LightField light_field = WarpedLightField(input, false, 1);

@@ -85,7 +85,7 @@ TEST(ManyChannels, WarpingTakesEachBandAlone) {
   ExpectBandByBand([](const EstimateInput& input) { return WarpedLightField(input, true, 2); }, 0);
 }
 
-// With equal weights of all pixels, and a prior that does not tie the bands together.
+// All pixels have equal weights, and the prior does not couple the bands.
 TEST(ManyChannels, TheSceneSolverTakesEachBandAlone) {
   ExpectBandByBand(
       [](const EstimateInput& input) {

@@ -7,7 +7,7 @@ namespace thicklens::estimator::testing {
 
 namespace {
 
-// What the sample i reads by a way to a source.
+// The pixels and weights that the sample i reads from a source.
 Eigen::RowVectorXd Taps(const DisparityMap& map, int i, const kernels::HiddenSample& from) {
   const double tolerance = 0.3 / map.step.cwiseAbs().maxCoeff();
   const int pixels = map.width_px * map.height_px;

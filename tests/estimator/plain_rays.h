@@ -8,11 +8,12 @@
 
 namespace thicklens::estimator::testing {
 
-// What the view (a, b) shows of a picture, as a matrix: bilinear at each sample's source, of the
-// pixels within .3 px per view step of its disparity, else the closest of these.
+// The matrix that maps a picture to the view (a, b): bilinear at each sample's source, from the
+// pixels within 0.3 px per view step of its disparity, or otherwise from the closest of these.
 Eigen::MatrixXd ViewMatrix(const DisparityMap& map, double a, double b);
 
-// From planes R(., k), one after the other, to the photograph: ViewMatrix of each, weighted.
+// Maps planes R(., k), one after the other, to the photograph: the weighted ViewMatrix of each
+// plane.
 Eigen::MatrixXd PhotographMatrix(const DisparityMap& map, const Eigen::ArrayXXd& weights);
 
 }  // namespace thicklens::estimator::testing

@@ -1,6 +1,6 @@
-// Every solver against one closed form, and against itself on other numbers of threads. Where the
-// whole scene has one disparity of whole pixels, each step is a product in the Fourier domain; the
-// picture is even at its borders, whose effect dies out before it reaches what is not.
+// Every solver is compared with one closed form, and with itself on other numbers of threads. If
+// the whole scene has one disparity of whole pixels, each step is a product in the Fourier domain.
+// The picture is even at its borders, whose effect decays before it reaches the other parts.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -32,7 +32,7 @@ constexpr int kAcross = 66, kDown = 60, kViews = 3, kDisparity = 1;
 constexpr double kGamma = 0.7, kRidge = 0.1 / (kViews * kViews);
 constexpr double kPi = 3.14159265358979323846;
 
-// What is stored in float, values up to 1, by solvers that agree to 1e-8.
+// Rounding of values up to 1 in float. The solvers agree to 1e-8.
 constexpr double kStored = 1.3e-7;
 constexpr double kFloat = 1e-4;
 
@@ -48,7 +48,7 @@ EstimateInput EvenAtTheBorders() {
     }
   }
   input.disparity = {kAcross, kDown, std::vector<float>(kAcross * kDown, kDisparity), {1, 1}};
-  // Of different sides; no wave is lost to the blur, whose transfer is nowhere below .2 on an axis.
+  // The two axes differ. No wave is lost to the blur, whose transfer is at least 0.2 on each axis.
   Eigen::Array3d across(0.15, 0.6, 0.25), down(0.22, 0.6, 0.18);
   input.weights = (down.matrix() * across.matrix().transpose()).array();
   return input;
@@ -89,9 +89,9 @@ Eigen::MatrixXd Smoothness() {
 
 using RaysOfWave = std::function<Eigen::VectorXcd(const Eigen::VectorXcd& h)>;
 
-// The views of a solver that makes of a wave of amplitude 1 in the photograph the rays
-// `rays_of_wave` of the scene's points, h the photograph's share of each: view (k, l) shows at x
-// what the points x + a disparity send to it.
+// Views of a solver that maps a wave of amplitude 1 in the photograph to the rays `rays_of_wave` of
+// the scene's points; h is the share of each in the photograph. View (k, l) shows at x the points x
+// + a disparity.
 std::vector<Eigen::MatrixXd> ExactViewsByWaves(const EstimateInput& input,
                                                const RaysOfWave& rays_of_wave) {
   const Eigen::MatrixXcd across = Waves(kAcross), down = Waves(kDown);

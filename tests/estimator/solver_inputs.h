@@ -22,7 +22,7 @@ EstimateInput NoiseInput(int width_px, int height_px, int channels, const Eigen:
                          const std::function<double(int x, int y)>& disparity, unsigned seed = 1);
 
 // The same input seen by testing::SolverCamera, with a grid on these planes and the depth of each
-// column. Where the ST plane is not the plane of focus, rays land between the pixels.
+// column. If the ST plane is not the plane of focus, rays land between the pixels.
 EstimateInput WithSolverCamera(EstimateInput input, const model::LightFieldPlanes& planes,
                                const std::function<double(int x)>& depth_mm);
 

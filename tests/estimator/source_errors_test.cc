@@ -1,5 +1,5 @@
-// Statements of the source about the smoothness operator G that do not hold, each shown on a light
-// field small enough to look at in full.
+// Statements of the paper about the smoothness operator G that do not hold, each shown on a light
+// field small enough to be examined completely.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -97,8 +97,9 @@ TEST(SourceErrors, GIsNeitherOfRankSixNorRegular) {
   EXPECT_LT(RankOf(six), six.rows());
 }
 
-// A stencil that reads zero outside of the grid is regular, as the source has it, but pulls the
-// borders to black: here the same masks, cut out of a grid that goes on beyond the borders.
+// A stencil that reads zero outside of the grid is regular, as the paper claims, but darkens the
+// borders. The test compares it with the same masks, cut out of a grid that continues beyond the
+// borders.
 TEST(SourceErrors, AStencilThatReadsZeroOutsideDarkensTheBorders) {
   const BlockGeometry block = Block(6, 6, 3, 3);
   const BlockGeometry large = Block(8, 8, 5, 5);
@@ -133,8 +134,8 @@ TEST(SourceErrors, AStencilThatReadsZeroOutsideDarkensTheBorders) {
   EXPECT_NEAR(white.minCoeff(), 1, 1e-9);
 }
 
-// Where the depth differs from ray to ray, six explicit differences are no symmetric operator, so
-// not the gradient of any energy; D^T D is, and has none below zero.
+// If the depth differs from ray to ray, six explicit differences form no symmetric operator and so
+// are not the gradient of any energy. D^T D is symmetric and has no negative eigenvalue.
 TEST(SourceErrors, ExplicitDifferencesAreNotSymmetricWhereTheDepthVaries) {
   const BlockGeometry block = Block(6, 5, 3, 3);
   const Eigen::MatrixXd flat = SixTerms(block, Constant(block, 0.5));

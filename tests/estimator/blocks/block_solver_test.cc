@@ -79,7 +79,7 @@ int RayOf(const EstimateInput& input, int i, int j, int k, int l) {
          i;
 }
 
-// Where ray (i, j, k, l) lands, by [S16] and the picture's orientation.
+// The point where ray (i, j, k, l) lands, from [S16] and the orientation of the picture.
 Eigen::Vector2d LandingPx(const EstimateInput& input, int i, int j, int k, int l) {
   if (!input.grid) return {i, j};
   return model::PicturePositionPx(
@@ -366,8 +366,8 @@ TEST(BlockSolver, DeviceAndTwinAgree) {
   }
 }
 
-// What a rank and a residual hide: without a ridge UMFPACK solves the system to a perfect residual
-// and the photograph comes out perfectly, while the light field is noise.
+// A rank and a residual do not show this fault: without a ridge UMFPACK solves the system to a
+// perfect residual and reproduces the photograph, while the light field is noise.
 TEST(BlockSolver, WithoutARidgeTheResidualIsPerfectAndTheLightFieldIsNot) {
   if (!IsBuiltIn(BlockSolver::kUmfpack)) GTEST_SKIP() << "built without UMFPACK";
   EstimateInput input = MakeInput({16, 16, 1, 3, 3, 1.6, 1.6, 0, 2});
@@ -612,7 +612,7 @@ TEST(BlockSolver, BlocksOfAStoreThatCannotBeAreSolvedAgain) {
   }
 }
 
-// Whatever changes the blocks changes what a store is told of the run.
+// Every setting that changes the blocks also changes the description of the run that a store gets.
 TEST(BlockSolver, AStoreGetsEverythingThatBlocksDependOn) {
   MadeUp made_up;
   made_up.width_px = made_up.height_px = 8;

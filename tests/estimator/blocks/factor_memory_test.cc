@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kPiece = 4 * FactorMemory::kSmallest;
 
-// What SuiteSparse's libraries call themselves.
+// The names that SuiteSparse's libraries use.
 std::uint8_t* Take(std::size_t bytes) {
   return static_cast<std::uint8_t*>(SuiteSparse_malloc(bytes, 1));
 }
@@ -76,7 +76,7 @@ TEST(FactorMemory, KeepsWhatIsWrittenThroughEachChangeOfSize) {
   std::size_t filled = 1000;
   std::uint8_t* piece = Take(filled);
   std::generate_n(piece, filled, [&, i = std::size_t{0}]() mutable { return byte(i++); });
-  // Below and above what is kept, up and down, by little and by much.
+  // Sizes below and above the limit of what is kept grow and shrink, by little and by much.
   for (const std::size_t bytes : {2000 * std::size_t{1}, kPiece, 3 * kPiece, 2 * kPiece,
                                   30 * kPiece, kPiece, std::size_t{1500}, 2 * kPiece}) {
     int done = 0;
@@ -155,7 +155,7 @@ long PageFaults() {
 
 TEST(FactorMemory, UmfpackTakesFewNewPagesForTheNextMatrix) {
   if (testing::kIsSanitized) GTEST_SKIP() << "the sanitizer has memory of its own";
-  // As where pieces are larger than what the system's allocator keeps by itself.
+  // The pieces are larger than what the system's allocator keeps by itself.
   ASSERT_EQ(mallopt(M_MMAP_THRESHOLD, 64 * 1024), 1);
   ASSERT_EQ(mallopt(M_TRIM_THRESHOLD, 64 * 1024), 1);
   kernels::CsrMatrix<double> band;

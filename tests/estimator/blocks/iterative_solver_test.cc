@@ -28,7 +28,7 @@ CsrMatrix<double> Diagonal(const std::vector<double>& values) {
   return matrix;
 }
 
-// Answers with what `answer` makes of the solution, and always believes to be done.
+// Returns what `answer` makes of the solution, and always claims to be done.
 class Believer : public IterativeMethod {
  public:
   explicit Believer(std::function<double(double solution, double tolerance)> answer)
@@ -125,7 +125,8 @@ TEST(IterativeSolverTest, StartsFromWhatIsNearAndNeverLeavesItForWorse) {
     EXPECT_EQ(solver->iterations(), 0);
     const std::vector<double> found = solver->SolveFrom({7, 7, 7, 7}, b);
     for (std::size_t i = 0; i < b.size(); ++i) EXPECT_NEAR(found[i], answer[i], 1e-10);
-    // From nothing to nothing: the tolerance is of |b|, and not of the start's residual.
+    // The start and the solution are 0: the tolerance is relative to |b|, not to the residual of
+    // the start.
     const auto one_pass = make({1e-12, 1});
     one_pass->Factorize(matrix);
     const std::vector<double> near = {1, 2, 3, 4.001};

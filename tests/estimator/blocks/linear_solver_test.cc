@@ -27,7 +27,7 @@ std::vector<BlockSolver> DirectSolvers() {
   return solvers;
 }
 
-// Iterations to the end of what double holds.
+// Iterates to the precision of double.
 constexpr LinearSolverLimits kTight{1e-13, 1000};
 
 CsrMatrix<double> ToCsr(const Eigen::MatrixXd& dense) {
@@ -75,7 +75,7 @@ Eigen::VectorXd ToEigen(const std::vector<double>& x) {
 TEST(LinearSolver, AgreesWithADenseSolutionOfASymmetricMatrix) {
   for (const BlockSolver kind : BuiltInBlockSolvers()) {
     for (const int n : {1, 2, 7, 40}) {
-      // Where half a step ends at the solution, ViennaCL divides 0 by 0.
+      // If half a step reaches the solution, ViennaCL divides 0 by 0.
       if (kind == BlockSolver::kViennaCl && n < 7) continue;
       SCOPED_TRACE(BlockSolverName(kind) + " n " + std::to_string(n));
       const Eigen::MatrixXd r = RandomSparse(n, 5);
@@ -214,7 +214,7 @@ TEST(LinearSolver, LetsADeviceBeOpenedAfterViennaCl) {
   const auto solver = NewLinearSolver(BlockSolver::kViennaCl, true);
   solver->Factorize(ToCsr(RandomSparse(23, 9)));
   solver->Solve(RandomVector(23, 3));
-  // What went wrong here took a minute, and was told as a driver that does not end.
+  // The earlier failure took a minute and was reported as a driver that does not end.
   EXPECT_NO_THROW(kernels::OpenBackend(kernels::ParseDeviceRequest("opencl"), nullptr));
 }
 

@@ -62,8 +62,8 @@ TEST(CheckSteps, CountsWhatMovesTooFar) {
   StepCheck check = CheckSteps(map, {0, 0});
   EXPECT_DOUBLE_EQ(check.largest_px, 4.5);
   EXPECT_DOUBLE_EQ(check.share, 0.4);
-  // With ST elsewhere, rays of the next view land 1 px to the right of their sample: -4.5 .. 4.5 px
-  // remain along x, along y it is -3.5 .. 5.5 px.
+  // With ST off the plane of focus, rays of the next view land 1 px to the right of their sample:
+  // -4.5 .. 4.5 px remain along x, and -3.5 .. 5.5 px along y.
   map = MapOf(10, 4, [](int x, int) { return x - 3.5; });
   check = CheckSteps(map, {1, 0});
   EXPECT_DOUBLE_EQ(check.largest_px, 5.5);
@@ -104,7 +104,7 @@ TEST(DepthNoise, IsInPixelsOfAViewStep) {
 TEST(DepthNoise, IsNoneOnSurfacesAndAtEdges) {
   EXPECT_LT(*DepthNoisePx(MapOf(100, 90, Slant)), 1e-5);
   EXPECT_LT(*DepthNoisePx(MapOf(100, 90, WithEdges)), 1e-5);
-  // Every sixth column an edge of 5 px.
+  // Every sixth column has an edge of 5 px.
   EXPECT_LT(*DepthNoisePx(MapOf(100, 90, [](int x, int) { return x / 6 % 2 == 0 ? 5 : 0; })), 1e-5);
   // A ball of 40 px radius, 2 px of disparity high.
   const auto ball = [](int x, int y) {
@@ -210,7 +210,7 @@ TEST_F(ResidualPatchesTest, DoNotCountWhatIsHidden) {
 TEST_F(ResidualPatchesTest, UnexplainedShareCountsBlocksAboveTheNoise) {
   // 7 x 4 blocks, one of them at the right border and four at the lower one.
   EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 0);
-  // What every block has is no patch, but it is not explained.
+  // If every block has the residual, it is not a patch, but it is unexplained.
   for (float& value : residual_) value *= 2.5F;
   EXPECT_EQ(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 1);
   EXPECT_THAT(Patches(), IsEmpty());
@@ -226,7 +226,7 @@ TEST_F(ResidualPatchesTest, UnexplainedShareLeavesOutWhatIsHidden) {
   EXPECT_DOUBLE_EQ(*UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise), 3.0 / 25);
   hidden_share_.assign(kPixels, 1.0F);
   EXPECT_FALSE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
-  // Few say nothing of all: less than a tenth of 28 are two.
+  // A tenth of the 28 pixels would be three, so two say nothing about the whole.
   Fill(&hidden_share_, 0, 0, 64, 32, 0);
   EXPECT_FALSE(UnexplainedShare(residual_, hidden_share_, kW, kH, kNoise).has_value());
   Fill(&hidden_share_, 64, 0, 32, 32, 0);

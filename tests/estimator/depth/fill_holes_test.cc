@@ -119,8 +119,8 @@ TEST(FillHoles, LeavesWhatIsKnownAndCountsTheRest) {
   EXPECT_GT(holes, 200U);
 }
 
-// A bowl: what the plane does not explain is spread between the rims without a seam. The solution
-// of the membrane equation, found by plain repeated averaging.
+// In a bowl, the difference from the plane is spread between the rims without a seam. The solution
+// of the membrane equation is found by plain repeated averaging.
 TEST(FillHoles, BendsTheSurfaceToItsRims) {
   const Case bowl{40, 40, [](int x, int y) { return 2e-4 * (x * x + x * y) + 0.01 * y; },
                   [](int x, int y) { return IsInside(x, y, 12, 10, 28, 30); }};
@@ -169,7 +169,7 @@ double Near(int x, int y) { return 1.5 + 0.004 * x + 0.002 * y; }
 double Far(int x, int y) { return -0.4 - 0.003 * x + 0.005 * y; }
 double Step(int x, int y, int edge) { return x < edge ? Near(x, y) : Far(x, y); }
 
-// How many of the pixels are not of the side that they should be on, nor of any.
+// Number of pixels that are on the wrong side, and of those on neither side.
 struct Sides {
   int wrong = 0, between = 0;
 };
@@ -236,8 +236,8 @@ TEST(FillHoles, KeepsSpeckleOnItsSurfaceBesideAShadow) {
   EXPECT_EQ(sides.wrong, 0);
 }
 
-// The near surface between two parts of the far one, in front of a picture that shows it; a lone
-// wrong value beside the hole is not believed.
+// The near surface lies between two parts of the far one, as the picture shows. A single wrong
+// value beside the hole is ignored.
 TEST(FillHoles, KeepsAPoleAndIgnoresALoneValue) {
   const auto is_pole = [](int x) { return x >= 36 && x < 41; };
   const Surface truth = [&](int x, int y) { return is_pole(x) ? Near(x, y) : Far(x, y); };
@@ -292,13 +292,14 @@ TEST(FillHoles, DoesNotDependOnTheUnit) {
   }
 }
 
-// Known pixels one wide part two holes: what borders on one of them is not the other's.
+// A wall that is one pixel wide separates two holes: the neighbours of one hole are not neighbours
+// of the other.
 TEST(FillHoles, AHoleBehindAThinWallIsNotReachedThroughIt) {
   const auto near_then_far = [](int x, int) { return x <= 10 ? 3.0 : 0.0; };
   Case c{24, 40, near_then_far,
          [](int x, int y) { return y >= 3 && y < 37 && x >= 5 && x < 16 && x != 10; }};
-  // The wall's edge is stronger than that at the far end of its hole, which is too high for what is
-  // known above and below it to decide.
+  // The edge of the wall is stronger than that at the far end of its hole, which is too high to be
+  // decided by the known pixels above and below it.
   c.light = [](int x, int) { return x <= 10 ? 0.2 : x < 16 ? 0.6 : 0.5; };
   const DisparityMap full = c.Filled();
   c.ForAll([&](int x, int y) {
@@ -317,7 +318,7 @@ TEST(FillHoles, NothingIsBeyondInfinity) {
         << x << " " << y;
     EXPECT_GE(full.disparity[c.At(x, y)], static_cast<float>(kAtInfinity));
   });
-  // Where nobody says what infinity is, the plane goes on.
+  // If no disparity of infinity is given, the plane continues.
   EXPECT_LT(c.Filled().disparity[c.At(20, 0)], kAtInfinity - 0.1);
 }
 

@@ -77,13 +77,13 @@ Eigen::VectorXd DenseRays(const Eigen::MatrixXd& h, const Eigen::VectorXd& photo
 
 FunctionalOptions Precise() {
   FunctionalOptions options;
-  options.tolerance = 1e-5;  // what float is sure to reach
+  options.tolerance = 1e-5;  // float reaches this tolerance reliably
   options.threads = 1;
   return options;
 }
 
-// `photograph_disparity`: of the rays that meet on the photograph's pixels; `radiance`: what their
-// mean is.
+// `photograph_disparity` is the disparity of the rays that meet on the photograph's pixels;
+// `radiance` is their mean.
 void ExpectDenseSolution(const EstimateInput& input, const DisparityMap& photograph_disparity,
                          const model::LinearPicture& radiance, const FunctionalOptions& options,
                          double accuracy = 2e-4) {
@@ -121,7 +121,7 @@ TEST(FunctionalSolver, MinimisesTheFunctional) {
   ExpectDenseSolution(input, input.disparity, input.picture, Precise());
 }
 
-// To the rounding of a light field, which is stored in float.
+// The result is exact to the rounding of a light field, which is stored in float.
 TEST(FunctionalSolver, MinimisesItInDouble) {
   FunctionalOptions options = Precise();
   options.double_precision = true;
@@ -321,7 +321,7 @@ TEST(FunctionalSolver, MissingConvergenceIsReported) {
   EXPECT_EQ(summary.iterations, 2);
   EXPECT_GT(summary.relative_residual, 1e-4);
   EXPECT_THAT(summary.message, HasSubstr("above the tolerance"));
-  // More than float can do: it ends, and says so.
+  // Float cannot reach this tolerance, so the solver stops and reports that.
   options.max_iterations = 100000;
   options.tolerance = 1e-12;
   EstimateFunctional(input, options, &summary);

@@ -111,7 +111,7 @@ class Operators {
   }
 
   std::size_t samples() const { return light_field_.view_size() * Index(block_.views()); }
-  // To the numbering of blocks, and back (0 for rays that are in no block).
+  // Converts to the numbering of blocks and back (0 for rays that are in no block).
   std::vector<double> ToBlock(const std::vector<double>& samples) const {
     std::vector<double> rays(Index(block_.rays()));
     ForRays([&](std::size_t ray, std::size_t sample) { rays[ray] = samples[sample]; });
@@ -162,7 +162,7 @@ TEST(GridPhotograph, IsTheMatrixOfTheKernels) {
   }
 }
 
-// Else the inputs would not try what they are for.
+// Otherwise the inputs would not test what they are made for.
 TEST(GridPhotograph, SomeRaysLandNearerToAnotherPixel) {
   const auto step_px = [](double st_depth_mm) {
     return WarpedLightField(WithCamera(17, 12, st_depth_mm), true, 1).landing_step_px.x();
@@ -282,7 +282,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
   Eigen::MatrixXd h = Eigen::MatrixXd::Zero(kPixels, kRays);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(kRays, kRays) * kRidge;
   const auto add_difference = [&](int here, int near, int far) {
-    // m = -.4: near is at the ray's own place less one, of weight .4.
+    // With m = -0.4, the near sample is at the ray's own position less one and has the weight 0.4.
     Eigen::VectorXd row = Eigen::VectorXd::Zero(kRays);
     const double w = static_cast<float>(kDisparity);
     row[here] = -1;
@@ -319,7 +319,7 @@ TEST(GridSolver, MinimisesTheFunctional) {
   EXPECT_TRUE(summary.converged);
   for (int i = 0; i < kRays; ++i) ASSERT_NEAR(found.values[Index(i)], expected[i], 1e-6) << i;
 
-  // Stopped early, the residual that is told is that of the answer in this system.
+  // If the solver stops early, the reported residual is that of the answer in this system.
   options.max_iterations = 7;
   options.double_precision = false;
   const model::LightField early = EstimateOnGrid(input, options, &summary);

@@ -1,5 +1,5 @@
-// How well the systems can be solved: eigenvalues against closed forms and bounds, and what float
-// can and cannot do.
+// Conditioning of the systems: eigenvalues are compared with closed forms and bounds, and the
+// limits of float are tested.
 #include "thicklens/estimator/conditioning.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ EstimateInput Plane(int size_px, int views, double disparity_px, double slope = 
   return input;
 }
 
-// In focus every pixel is on its own: w w^T + gamma D^T D + mu of its rays, by hand.
+// In focus the pixels are independent: w w^T + gamma D^T D + mu of the rays of one pixel, by hand.
 TEST(Conditioning, OfAPlaneInFocusIsThatOfOnePixel) {
   for (const int views : {2, 3, 4}) {
     const int rays = views * views;
@@ -104,7 +104,7 @@ TEST(Conditioning, GrowsWithGammaAndWithoutARidgeIsInfinite) {
     last = now;
   }
   EXPECT_GT(condition(1, 1e-8).condition(), 1e5 * condition(1, 1e-2).condition());
-  // To the last bits.
+  // The matrix is singular up to the last bits.
   const Conditioning singular = condition(1, 0);
   EXPECT_LT(std::abs(singular.smallest), 1e-12 * singular.largest);
 }

@@ -1,4 +1,4 @@
-// The samples of an aperture carry the calibrated blur, whatever weighs their rays.
+// The samples of an aperture carry the calibrated blur, whatever the weights of their rays are.
 #include "thicklens/estimator/aperture_blur.h"
 
 #include <gtest/gtest.h>
@@ -24,8 +24,8 @@ model::Camera WideCamera() {
                              {0.47, 0});
 }
 
-// The moments of the rays of the point on the axis in focus, written out once more: the weights
-// that H has, about their centroid.
+// The moments about the centroid of the rays of the point on the axis in focus, computed
+// independently from the weights in H.
 Eigen::Vector2d SigmaOnAxis(const model::LightFieldGrid& grid, const model::Camera& camera,
                             const Eigen::ArrayXXd& weights) {
   const double zf_mm = camera.focus_depth_mm();
@@ -74,8 +74,8 @@ TEST(ApertureBlur, OnTheAxisIsTheCalibratedOne) {
   }
 }
 
-// What the fall-off of a pixel's rays really is: at the principal point nothing is added to the
-// weights, elsewhere [S12] changes them.
+// The fall-off of a pixel's rays does not change the weights at the principal point; elsewhere
+// [S12] changes them.
 TEST(ApertureBlur, FallOffLeavesTheAxisAlone) {
   const model::Camera camera = WideCamera();
   const Eigen::ArrayXXd weights = model::ApertureWeights(ApertureShape::kGaussian, 5, 5);
@@ -93,8 +93,8 @@ TEST(ApertureBlur, FallOffLeavesTheAxisAlone) {
   EXPECT_LT(corner, 0.95);
 }
 
-// Off the axis the far side of the aperture loses more. The reported change is that of the rays at
-// the corner sample, summed once more.
+// Off the axis, the far side of the aperture loses more light. The reported change is compared with
+// an independent sum over the rays at the corner sample.
 TEST(ApertureBlur, InTheCornersIsReported) {
   const model::Camera camera = WideCamera();
   const Eigen::ArrayXXd weights = model::ApertureWeights(ApertureShape::kGaussian, 7, 7);
@@ -103,7 +103,8 @@ TEST(ApertureBlur, InTheCornersIsReported) {
       model::SampleAperture(weights, camera.blur_ratio(), camera.lens.aperture_radius_mm));
   EXPECT_TRUE(MeasureApertureBlur(grid, camera, weights, nullptr).corner_change.isZero(1e-12));
   const ApertureBlur blur = MeasureApertureBlur(grid, camera, weights, &camera);
-  // The same from the rays' own irradiance at the corner sample, ST in the plane of focus.
+  // The same sum, computed from the irradiance of the rays at the corner sample with ST in the
+  // plane of focus.
   double sum = 0, first = 0, second = 0;
   for (int l = 0; l < 7; ++l) {
     for (int k = 0; k < 7; ++k) {

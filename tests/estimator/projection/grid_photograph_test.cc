@@ -34,7 +34,7 @@ std::ostream& operator<<(std::ostream& out, const Case& of) {
              << (of.has_irradiance ? ", irradiance" : "");
 }
 
-// One view of all has no weight.
+// One of the views has no weight.
 kernels::BlockGeometry GeometryOf(const Case& of) {
   kernels::BlockGeometry picture;
   picture.width_px = of.width;
@@ -64,7 +64,8 @@ const std::vector<Landing> kFar{{-9, 0.49}, {-2, -0.5}, {3, 0}, {12, 0.2}, {400,
 
 std::vector<Case> Cases() {
   std::vector<Case> cases;
-  // Strips of 64 floats or 32 doubles, vectors of 8 or 4, and what is left of both.
+  // The widths are around strips of 64 floats or 32 doubles and vectors of 8 or 4, with remainders
+  // of both.
   for (const int width : {1, 2, 3, 7, 8, 9, 15, 31, 33, 63, 64, 65, 66, 71, 72, 127, 130, 200}) {
     for (const auto& columns : {kOnPixels, kToBothSides, kFar}) {
       cases.push_back({width, 5, width, 5, columns, kToBothSides});
@@ -101,7 +102,7 @@ class GridPhotographTest : public ::testing::Test {
     const std::size_t view_size = Index(of.s_count) * Index(of.t_count);
     const std::size_t views = Index(problem.picture.views());
     for (unsigned view = 0; of.has_irradiance && view < views; ++view) {
-      // Nobody makes that of a view without weight.
+      // The irradiance of a view without weight is not computed.
       problem.irradiance.push_back(view == 1 ? std::vector<float>()
                                              : RandomNumbers<float>(view_size, 0.2, view));
     }
@@ -177,7 +178,7 @@ TYPED_TEST(GridPhotographTest, IsTheSumOverRays) {
   }
 }
 
-// What lands beside the picture stays what it is to the last bit.
+// Values that land outside the picture stay the same to the last bit.
 TYPED_TEST(GridPhotographTest, AddsToTheRaysOfEachPixel) {
   for (const Case& of : Cases()) {
     const auto problem = this->ProblemOf(of);

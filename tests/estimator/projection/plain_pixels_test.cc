@@ -32,7 +32,7 @@ double Share(const std::vector<unsigned char>& flags) {
          static_cast<double>(flags.size());
 }
 
-// What is said by bounds against every ray.
+// Compares the result, which uses bounds, with every ray.
 PlainPixels Checked(const DisparityMap& map, int u_count, int v_count) {
   const PlainPixels plain = FindPlainPixels(map, u_count, v_count, kTolerancePx);
   const Eigen::ArrayXXd weights =

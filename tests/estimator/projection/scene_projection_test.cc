@@ -71,7 +71,8 @@ double Cubic(double t) {
   return t <= 1 ? 1.5 * t * t * t - 2.5 * t * t + 1 : -0.5 * t * t * t + 2.5 * t * t - 4 * t + 2;
 }
 
-// What the pixel i reads by a way to a source: cubic where that may be and can be.
+// The pixels and weights that the pixel i reads from a source: cubic if that is selected and
+// possible.
 struct Read {
   double value = 0;
   bool is_cubic = false;
@@ -151,7 +152,7 @@ Gathered PlainGather(const DisparityMap& map, const Eigen::ArrayXXd& weights,
   return gathered;
 }
 
-// What interpolation makes of a wave, `shift` beside the origin.
+// The transfer of a wave by interpolation at `shift` from a sample.
 std::complex<double> Transfer(double shift, double frequency, Between between) {
   std::complex<double> sum = 0;
   for (int n = static_cast<int>(std::floor(shift)) - 1; n <= std::floor(shift) + 2; ++n) {
@@ -201,9 +202,9 @@ TEST_P(SceneProjectionBetween, OfConstantDepthIsAProductInTheFourierDomain) {
   }
 }
 
-// Where rays are placed to a tolerance the sums differ by that times the slope of the picture; a
-// tolerance of next to nothing leaves rows of their own for all but flat surfaces. Rows are linear;
-// a product beside an edge may be cubic along one axis only.
+// If rays are placed to a tolerance, the sums differ by the tolerance times the slope of the
+// picture. With a tolerance near 0 all surfaces except flat ones get rows of their own. Rows are
+// linear; a product beside an edge may be cubic along one axis only.
 TEST_P(SceneProjectionBetween, EqualsTheRaysOneByOne) {
   const Between between = GetParam();
   const DisparityMap map = Occluded();
@@ -214,7 +215,8 @@ TEST_P(SceneProjectionBetween, EqualsTheRaysOneByOne) {
       const Eigen::ArrayXXd weights = Weights(shape, u, v);
       const Gathered linear = PlainGather(map, weights, x, Between::kLinear);
       const Gathered cubic = PlainGather(map, weights, x, Between::kCubic);
-      // Compares where the rays say what is right, and says at how many pixels that is.
+      // Compares the pixels at which the rays give the right value, and returns the number of these
+      // pixels.
       const auto compare = [&](const SceneProjection<double>& projection, double tolerance) {
         std::vector<bool> is_linear(x.size(), between == Between::kLinear);
         for (const std::int32_t pixel : projection.rows.pixel) is_linear[Index(pixel)] = true;
@@ -313,21 +315,22 @@ TEST(SceneProjection, SamplesHiddenFromTheCentreViewAreMarked) {
   const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kUniform, 5, 1);
   const DisparityMap map = MapOf(60, 20, [](int x, int) { return x >= 20 && x < 40 ? 2 : 0; });
   const auto projection = Make<float>(map, weights);
-  // Beside the near strip the background stands still; views move the strip by 2 px a step.
+  // Beside the near strip the background has disparity 0; views move the strip by 2 px a step.
   EXPECT_EQ(projection.hidden_share[Index(10 * 60 + 10)], 0);
   EXPECT_EQ(projection.hidden_share[Index(10 * 60 + 30)], 0);
   // x = 20 is uncovered by the two views in which the strip has gone right.
   EXPECT_NEAR(projection.hidden_share[Index(10 * 60 + 20)], 0.4, 1e-6);
 }
 
-// Half a pixel of a hidden sample is in front of what is hidden, and half a pixel of one that is
-// seen may be behind.
+// Half a pixel of a hidden sample may be in front of what is hidden, and half a pixel of a visible
+// one may be behind.
 TEST(SceneProjection, CountsWhatIsHiddenByTheShareOfItsPixel) {
   const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kUniform, 3, 1);
   const DisparityMap map = MapOf(60, 20, [](int x, int) { return x >= 20 && x < 40 ? 2.75 : 0; });
   const auto projection = Make<float>(map, weights);
-  // In the view where it goes 2.75 px to the right, the strip begins at 22.25, so that three
-  // quarters of the sample at 22 are hidden background; the other two show nothing hidden there.
+  // In the view where the strip moves 2.75 px to the right, it begins at 22.25, so that three
+  // quarters of the sample at 22 are hidden background. The other two views show nothing hidden
+  // there.
   const auto hidden = [&](int x) { return projection.hidden_share[Index(10 * 60 + x)]; };
   EXPECT_NEAR(hidden(20), 1.0 / 3, 1e-6);
   EXPECT_NEAR(hidden(21), 1.0 / 3, 1e-6);
@@ -339,8 +342,8 @@ TEST(SceneProjection, CountsWhatIsHiddenByTheShareOfItsPixel) {
   EXPECT_NEAR(hidden(38), 1.0 / 3, 1e-6);
 }
 
-// A near thing before a wall, both of one radiance each, photographed: what a pixel of the
-// photograph gets of the near one is the mean over the views of what it covers of the pixel.
+// A near object is photographed before a wall, each of one radiance. The near object's share of a
+// pixel of the photograph is the mean over the views of the area that it covers.
 TEST(SceneProjection, MixesSurfacesByTheAreaThatEachCovers) {
   const Eigen::ArrayXXd weights = Weights(model::ApertureShape::kUniform, 5, 3);
   constexpr double kNear = 1.3, kFar = -0.4;

@@ -148,7 +148,7 @@ TEST(SceneRays, PassItInDoubleToTheLastDigits) {
   }
 }
 
-// Where all rays of a point are equal, H is that of the scene.
+// If all rays of a point are equal, H is that of the scene.
 TEST(SceneRays, OfALambertianSceneAreItsProjection) {
   const Case made = Cases()[1];
   ProjectionOptions options;

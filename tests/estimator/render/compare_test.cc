@@ -49,7 +49,7 @@ double GreyAt(const model::StoredValues& picture, int x, int y) {
   return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2];
 }
 
-// SSIM as the paper defines it: window by window, weighted moments about the weighted means.
+// SSIM as its paper defines it: window by window, with weighted moments about the weighted means.
 double SlowSsim(const model::StoredValues& a, const model::StoredValues& b, int border_px) {
   const int margin = std::max(border_px, 5);
   double sum = 0;
@@ -157,10 +157,10 @@ TEST(DeltaE94, AgreesWithPublishedPairs) {
 
 TEST(DeltaE94, WeighsLightnessChromaAndHueApart) {
   EXPECT_DOUBLE_EQ(DeltaE94({40, 30, 40}, {47, 30, 40}), 7);
-  // Chroma 50 to 55: weight 1 + .045 * 50; the other way round, 1 + .045 * 55.
+  // Chroma from 50 to 55: the weight is 1 + 0.045 * 50, and in the other direction 1 + 0.045 * 55.
   EXPECT_NEAR(DeltaE94({40, 30, 40}, {40, 33, 44}), 5 / 3.25, 1e-12);
   EXPECT_NEAR(DeltaE94({40, 33, 44}, {40, 30, 40}), 5 / 3.475, 1e-12);
-  // The same chroma, another hue: weight 1 + .015 * 50, distance sqrt(10^2 + 10^2).
+  // The chroma is the same and the hue differs: weight 1 + 0.015 * 50, distance sqrt(10^2 + 10^2).
   EXPECT_NEAR(DeltaE94({40, 30, 40}, {40, 40, 30}), std::sqrt(200) / 1.75, 1e-12);
   EXPECT_NEAR(DeltaE94({40, 0, 0}, {40, 3, 4}), 5, 1e-12);  // from grey: weights 1
   EXPECT_EQ(DeltaE94({40, 30, 40}, {40, 30, 40}), 0);
@@ -178,7 +178,7 @@ TEST(LabOf, KnowsPrimariesAndGreys) {
   expect({1, 1, 1}, {100, 0, 0});
   expect({0.5, 0.5, 0.5}, {53.39, 0, 0});
   expect({0, 0, 0}, {0, 0, 0});
-  // Where both curves are straight: L* = (29/3)^3 Y.
+  // Both curves are linear here: L* = (29/3)^3 Y.
   const double grey = 1 / 255.0;
   expect({grey, grey, grey}, {24389 / 27.0 * grey / 12.92, 0, 0});
 }
@@ -218,7 +218,7 @@ TEST(MacadeStandin, IsTwoOverPiForRandomOrientation) {
   const auto standin =
       ComparePictures(Noise(300, 300, 1, 9), Noise(300, 300, 1, 10), 0).macade_standin;
   ASSERT_TRUE(standin);
-  // Some 30 000 edge pixels with a standard deviation of .308 each; neighbours are correlated.
+  // Some 30 000 edge pixels have a standard deviation of 0.308 each; neighbours are correlated.
   EXPECT_NEAR(*standin, 2 / kPi, 0.01);
 }
 
@@ -256,8 +256,8 @@ TEST(MacadeStandin, LooksAtEdgesOfTheReferenceOnly) {
   };
   EXPECT_FALSE(ComparePictures(ramp(1.9 / 255), ramp(0.02), 0).macade_standin);
   EXPECT_TRUE(ComparePictures(ramp(2.1 / 255), ramp(0.02), 0).macade_standin);
-  // A step of .8 in the middle (gradient .4 per px), and away from it a ramp of .1 per px, less
-  // than half of that, which is turned by a quarter: only the step counts.
+  // A step of 0.8 in the middle (gradient 0.4 per px), and away from it a ramp of 0.1 per px, less
+  // than half of that, which is turned by a quarter. Only the step counts.
   const auto step = [](bool turned) {
     return Drawn(60, 60, [turned](int x, int y) {
       const double level = x < 30 ? 0.1 : 0.9;
@@ -335,7 +335,7 @@ TEST(CompareLightFields, AveragesTheMiddleViewsOfEvenCounts) {
 }
 
 TEST(CompareLightFields, MeansOfScoresAreMeans) {
-  // With the centre view alone, all three are its scores, and those of ComparePictures.
+  // With only the centre view, all three scores are equal to those of ComparePictures.
   model::LightField reference = model::MakeLightField(24, 20, 1, 1, 3);
   model::LightField other = reference;
   const model::StoredValues a = Noise(24, 20, 3, 5);
@@ -388,7 +388,7 @@ TEST(CompareLightFields, TakesTheViewsThatBothHave) {
 constexpr int kWide = 40;
 constexpr int kHigh = 32;
 
-// What stands at x in the centre view stands at x - a d, y - b d in the view (a, b).
+// The point at x in the centre view is at x - a d, y - b d in the view (a, b).
 model::LightField ShiftedTexture(const model::StoredValues& texture, int disparity_px) {
   model::LightField light_field = model::MakeLightField(kWide, kHigh, 3, 3, 1);
   for (int l = 0; l < 3; ++l) {
@@ -430,15 +430,15 @@ TEST(CompareLightFields, WarpsThePhotographIntoEachView) {
   EXPECT_GT(wrong.dibr_centre->psnr_db, 100);  // needs no disparity
 }
 
-// Two means that stand beside each other are over the same views, although each has another view
-// without difference.
+// Two means that are printed together are over the same views, although each has another view
+// without a difference.
 TEST(CompareLightFields, MeansOfEstimateAndBaselineAreOverTheSameViews) {
   const model::StoredValues texture = Noise(kWide, kHigh, 1, 15);
   const model::LightField truth = ShiftedTexture(texture, 2);
   model::LightField other = ShiftedTexture(texture, 1);
   model::SetView(&other, 0, 0, model::ViewPicture(truth, 0, 0));
   model::SetView(&other, 1, 1, model::ViewPicture(other, 0, 0));
-  // By a disparity of 1 px, and not of 2, warping has no error in the middle alone.
+  // With a disparity of 1 px instead of 2, warping has no error in the middle only.
   const LightFieldScores scores = CompareLightFields(truth, other, 6, DibrOf(texture, 1), 1);
   double own = 0, warped = 0;
   int count = 0;

@@ -46,7 +46,7 @@ struct Scene {
   bool ShowsCard(double a, double b, int x, int y) const {
     return IsCard(x + a * card_px, y + b * card_px);
   }
-  // What is not seen from the centre though it is inside of its picture.
+  // True for a point that is not visible from the centre although it is inside of its picture.
   bool IsHidden(double a, double b, int x, int y) const {
     return !ShowsCard(a, b, x, y) && IsCard(x + a * background_px, y + b * background_px);
   }
@@ -121,7 +121,7 @@ TEST_P(InpaintTest, FillsWhatTheCardHides) {
   EXPECT_THAT(summary.message, HasSubstr("Telea"));
 }
 
-// What was filled in one view is what the others show of the same points.
+// Values that were filled in one view appear in the other views of the same points.
 TEST_P(InpaintTest, CarriesARadianceToAllThatShowThePoint) {
   const Scene scene{GetParam(), GetParam() + 2};
   model::LightField field = WithGarbage(scene, 1);
@@ -142,7 +142,7 @@ TEST_P(InpaintTest, CarriesARadianceToAllThatShowThePoint) {
   EXPECT_EQ(compared, 2);
 }
 
-// Where the garbage is beyond the border of the centre picture, the solver's stays.
+// Garbage that is beyond the border of the centre picture is not replaced.
 TEST(Inpaint, LeavesWhatIsBeyondTheBorder) {
   const Scene scene{2, 4};
   const auto is_beyond = [](double a, double b, int x, int y) {
@@ -169,12 +169,12 @@ TEST(Inpaint, LeavesWhatIsBeyondTheBorder) {
   EXPECT_GT(garbage, 100);
 }
 
-// Telea's method continues what is around a hole: a hole in a plane of radiance, away from
-// anything else, is filled to a few per cent of the radiance's range around it.
+// Telea's method continues the surroundings of a hole: a hole in a plane of radiance that is
+// isolated is filled with an error of a few per cent of the range of the radiance around it.
 TEST(Inpaint, ContinuesASmoothBackground) {
   const Scene scene{0, 2};
   model::LightField field = WithGarbage(scene, 1);
-  // The card itself has the background's radiance, so that nothing else is near.
+  // The card has the radiance of the background, so that no other radiance is near.
   for (int l = 0; l < kViews; ++l) {
     for (int k = 0; k < kViews; ++k) {
       for (int y = 0; y < kHeight; ++y) {
@@ -200,8 +200,8 @@ TEST(Inpaint, ContinuesASmoothBackground) {
 // A hole that reaches the border of the picture: nothing beyond may leak in.
 TEST(Inpaint, FillsHolesAtTheBorder) {
   const Scene scene{0, 2, -100, 100};  // from top to bottom
-  // In the middle row of views alone: above and below, the way to the background leaves the
-  // picture.
+  // This holds in the middle row of views only. In the rows above and below, the way to the
+  // background leaves the picture.
   model::LightField field = FieldOf(scene, 1, [&](double a, double b, int x, int y) {
     return b == 0 && scene.IsHidden(a, b, x, y);
   });

@@ -130,8 +130,9 @@ TEST(Photograph, IsTheWeightedMeanOfTheViews) {
   }
 }
 
-// Each ray shares its light between the pixels around its landing point; a pixel is the mean of
-// what reaches it. Rays that land nearest to a pixel outside of the picture are no part of it.
+// Each ray shares its light between the pixels around its landing point, and a pixel is the mean of
+// the light that reaches it. Rays that land nearest to a pixel outside of the picture are not
+// counted.
 TEST(Photograph, PutsEachRayWhereItLands) {
   model::LightField field = RandomField(15, 11, 5, 3, 1, 3);
   field.landing_step_px = {0.7, -1.35};
@@ -178,7 +179,7 @@ TEST(Photograph, OfAUniformRadianceIsUniform) {
   }
 }
 
-// By [S12]: the light of a pixel is the sum of its rays' radiance times cos(alpha) cos^3(beta).
+// By [S12], the light of a pixel is the sum of its rays' radiance times cos(alpha) cos^3(beta).
 TEST(Photograph, WeakensRaysByTheirIrradiance) {
   model::LightField field = RandomField(15, 11, 3, 3, 3, 6);
   AddCamera(&field, kInFocus);
@@ -210,7 +211,7 @@ TEST(Photograph, WeakensRaysByTheirIrradiance) {
     EXPECT_NEAR(picture.values[i], sum[i] / weight, 2e-6);
     weakest = std::min(weakest, sum[i] / weight);
   }
-  EXPECT_LT(weakest, 0.3);  // else this would not show
+  EXPECT_LT(weakest, 0.3);  // otherwise the effect would be invisible
 }
 
 TEST(Photograph, OfAUniformRadianceIsOneAtThePrincipalPointAndFallsOffAroundIt) {
@@ -475,7 +476,7 @@ TEST(WeightsForRadius, RefusesWhatIsNoRadius) {
 
 // --- Refocusing.
 
-// Views of a texture parallel to the picture: what the centre shows at x stands at x - a d.
+// Views of a texture parallel to the picture: the point at x in the centre view is at x - a d.
 model::LightField LayerField(int u_count, int v_count, double u_px, double v_px,
                              const std::function<double(double, double)>& texture) {
   return FieldOf(32, 26, u_count, v_count, 1, [&](int s, int t, int k, int l, int) {

@@ -1,5 +1,5 @@
-// Photographs of light fields whose UV plane lies off the aperture: the rays of a view cross the
-// aperture in different places, and the aperture weighs each of them.
+// Photographs of light fields whose UV plane is off the aperture. The rays of a view cross the
+// aperture in different places, so the aperture weights each of them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -104,7 +104,7 @@ TEST(Vignetting, MakesThePhotographThatOfTheScene) {
   }
 }
 
-// The sum over the samples by itself, from [S10] and the displacement c(z) a of what is out of
+// An independent sum over the samples, from [S10] and the displacement c(z) a of points out of
 // focus.
 TEST(Vignetting, IsTheSumOverTheRaysOfEachPixel) {
   const double depth_mm = 600, period_px = 14;
@@ -188,7 +188,7 @@ TEST(Vignetting, TakesFewViewsAsTheyAre) {
   }
 }
 
-// The captured aperture leaves the captured weights.
+// The captured aperture keeps the captured weights.
 TEST(Vignetting, OfTheWholeApertureIsThatOfNone) {
   for (const model::Psf psf : {model::Psf::kGaussian, model::Psf::kDisc}) {
     model::SceneSimulationOptions options = SineScene(psf, 600, 14);
@@ -202,7 +202,7 @@ TEST(Vignetting, OfTheWholeApertureIsThatOfNone) {
   }
 }
 
-// Where UV lies on the aperture there is none, and it costs nothing.
+// If UV is on the aperture there is no vignetting, and it costs no time.
 TEST(Vignetting, IsNothingOnTheAperture) {
   const model::SceneSimulationOptions options = SineScene(model::Psf::kGaussian, 600, 14);
   const model::LightField field =
@@ -212,7 +212,7 @@ TEST(Vignetting, IsNothingOnTheAperture) {
   EXPECT_EQ(PhotographOf(field, &vignetting).values, PhotographOf(field, nullptr).values);
 }
 
-// By every ray of a uniform field.
+// The result is compared with a sum over every ray of a uniform field.
 TEST(Vignetting, WeighsTheFallOffOfEachRay) {
   model::Camera camera = BenchCamera(model::Psf::kDisc);
   camera.sensor.pixel_pitch_mm = 0.1;
@@ -248,7 +248,7 @@ TEST(Vignetting, WeighsTheFallOffOfEachRay) {
   EXPECT_LT(found.at(0, 2, 0), 0.9F);
 }
 
-// What `explain` and auto go by: an edge between black and white, out of focus, at any place.
+// `explain` and auto use this bound: an edge between black and white, out of focus, at any place.
 TEST(Vignetting, ChangesNoMoreThanItsBound) {
   const model::Effect kVignetting = model::Effect::kVignetting;
   const model::EffectSet of_model = {model::Effect::kDefocus, model::Effect::kApertureShape,
@@ -270,7 +270,8 @@ TEST(Vignetting, ChangesNoMoreThanItsBound) {
                      [&](const model::EffectFinding& each) { return each.effect == kVignetting; });
     ASSERT_NE(finding, decision.findings.end());
     double largest = 0;
-    for (const double beside_px : {10.0, 25.0, 40.0}) {  // the edge, in the middle of what is seen
+    // The edge, in the middle of what is visible
+    for (const double beside_px : {10.0, 25.0, 40.0}) {
       options.camera.sensor.principal_point_px.x() = 47.5 - beside_px;
       const model::LightField field =
           model::SceneSimulator(options, {}).RenderLightField(7, 7, {1, {}});

@@ -54,9 +54,10 @@ class Texture {
 constexpr double kSlope = 2.0 / kW;
 double DisparityAt(double x) { return kSlope * (x - kW / 2.0); }
 
-// The photograph of that plane through an aperture of 15 x 15 samples with the second moment of
-// kViews x kViews of the same weight, by rays: what stands at p in the centre view stands at
-// p - d(p) a in the view a, so that the pixel x shows p = (x - kSlope kW/2 a)/(1 - kSlope a).
+// The photograph of that plane, computed from rays through an aperture of 15 x 15 samples that has
+// the second moment of kViews x kViews samples of the same weight. The point at p in the centre
+// view is at p - d(p) a in the view a, so that the pixel x shows p = (x - kSlope kW/2 a)/(1 -
+// kSlope a).
 EstimateInput PlaneInput() {
   constexpr int kFine = 15;
   const double step = std::sqrt((kViews * kViews - 1.0) / (kFine * kFine - 1.0));
@@ -139,7 +140,7 @@ TEST(BlurCheck, AnotherFocusIsProposedOnTheSideWhereItIs) {
   }
 }
 
-// Half as many px of disparity at twice the step is the same blur.
+// Half the disparity in px at twice the step gives the same blur.
 TEST(BlurCheck, OffsetsArePxWhateverTheUnitOfTheMap) {
   EstimateInput input = PlaneWith(1, 0.5);
   input.disparity.step = {-2, -2};
@@ -207,7 +208,7 @@ TEST(BlurCheck, AnInputInFocusOrWithoutTextureIsReported) {
 TEST(BlurCheck, KeepsToTheMemoryLimitInTheMiddle) {
   BlurCheckOptions options;
   options.threads = 1;
-  CheckBlur(Plane(), options);  // what it takes once is taken
+  CheckBlur(Plane(), options);  // the first call includes one-time costs
   options.memory_limit_mib = 1;
   EXPECT_THAT(ErrorOf([&] { CheckBlur(Plane(), options); }), HasSubstr("memory_limit_mib is 1"));
   if (testing::kIsSanitized) GTEST_SKIP() << "a sanitizer holds back what was freed";

@@ -117,7 +117,7 @@ double RmsError(const model::LinearPicture& radiance, const std::vector<float>& 
 }
 
 // With the same few steps, a picture just large enough for a start at half its size comes closer to
-// the scene than one just too small; and with many it ends at a solution like any other.
+// the scene than one just too small. With many steps, both end at the same solution.
 TEST(CoarseStart, SavesIterations) {
   SceneOptions options;
   options.max_iterations = 15;

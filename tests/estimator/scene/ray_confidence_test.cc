@@ -1,4 +1,4 @@
-// What is known of each ray, against counting by hand.
+// The confidence of each ray is compared with counts by hand.
 #include "thicklens/estimator/ray_confidence.h"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ constexpr int kW = 30, kH = 24;
 
 std::size_t At(int x, int y) { return static_cast<std::size_t>(y * kW + x); }
 
-// Seen through 3 x 3 views whose weights are not the same.
+// A scene seen through 3 x 3 views with different weights.
 EstimateInput Scene(float disparity) {
   EstimateInput input;
   input.weights = model::ApertureWeights(model::ApertureShape::kGaussian, 3, 3);
@@ -34,7 +34,8 @@ EstimateInput Scene(float disparity) {
 
 bool IsCard(int x, int y) { return x >= 10 && x < 18 && y >= 8 && y < 14; }
 
-// A card one px per step before a wall in focus: what a view shows of it has moved by whole pixels.
+// A card with a disparity of one px per step before a wall in focus, so that it moves by whole
+// pixels from view to view.
 EstimateInput Card() {
   EstimateInput input = Scene(0);
   for (int y = 0; y < kH; ++y) {
@@ -109,7 +110,7 @@ TEST(PointConfidence, GoesByTheDepthAlsoOnASlant) {
 
 TEST(PointConfidence, TooStrongABlurLowersTheConfidence) {
   EstimateInput input = Scene(0.1F);
-  // On 3 steps with these weights the standard deviation is less than .7 of a step.
+  // For 3 steps with these weights the standard deviation is less than 0.7 of a step.
   input.disparity.disparity.assign(input.disparity.disparity.size(), 6);
   std::vector<Confidence> confidence = PointConfidence(input, 1);
   EXPECT_EQ(confidence[At(15, 12)], 127);
@@ -136,7 +137,7 @@ TEST(RayConfidence, IsThatOfThePointAndNothingWhereThereIsNone) {
     EXPECT_EQ(rays[At(18, y)], of_points[At(18, y)]);
     EXPECT_EQ(rays[At(8, y)], of_points[At(8, y)]);
   }
-  // In the middle view all rays are of points.
+  // In the middle view every ray is that of a point.
   EXPECT_EQ(RayConfidence(of_points, DisparityRenderer(input.disparity).RenderCompact(0, 0)),
             of_points);
 }

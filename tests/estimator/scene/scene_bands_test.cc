@@ -26,7 +26,7 @@ using testing::ErrorOf;
 using ::testing::HasSubstr;
 
 // A near card before a slanted wall, textured, seen through 3 x 3 views, with noise. The card
-// stands across the borders of bands.
+// crosses the borders of bands.
 EstimateInput CardBeforeWall(int width, int height, int channels) {
   EstimateInput input;
   input.weights = model::ApertureWeights(model::ApertureShape::kUniform, 3, 3);
@@ -120,7 +120,7 @@ TEST(SceneBands, AreTheWholePictureForEveryPrior) {
       SCOPED_TRACE(PriorName(prior) + ", channels " + std::to_string(channels));
       SceneOptions options;
       options.prior = prior;
-      // What the usual tolerances leave is more than bands change.
+      // The error that the default tolerances leave is larger than the difference that bands make.
       options.tolerance = prior == Prior::kTotalVariation || prior == Prior::kPatches ? 5e-6 : 5e-5;
       options.max_iterations = 600;
       ExpectSame(SolvedIn(input, options, 4), SolvedIn(input, options, 1), 4);
@@ -191,7 +191,7 @@ TEST(SceneBands, CoverEachRowOnce) {
 
 TEST(SceneBands, ReachAsFarAsTheOutermostView) {
   DisparityMap map{2, 1, {-0.75F, 0.5F}, {1, 2}};
-  // Two views from the centre, each 1.5 px; and what is read between pixels.
+  // Two views from the centre, each 1.5 px, and the reach of interpolation between pixels.
   EXPECT_EQ(ReachPx(map, 0, 5), 3 + 2);
   EXPECT_EQ(ReachPx(map, -1, 5), 4 + 2);  // 1 + 1 px
   EXPECT_EQ(ReachPx(map, 0, 1), 2);
@@ -202,7 +202,7 @@ TEST(SceneBands, AreAsManyAsTheMemoryAsksFor) {
   const EstimateInput input = CardBeforeWall(320, 800, 3);
   SceneOptions options;
   options.prior = Prior::kRidge;
-  options.tolerance = 5e-5;  // what the usual one leaves is more than bands change
+  options.tolerance = 5e-5;  // the default tolerance leaves a larger error than bands make
   options.threads = 1;
   std::vector<float> middle;
   SceneViewSink sink;

@@ -1,4 +1,4 @@
-// What a photograph is turned into for the scene solver: weights, slopes, strengths.
+// The data of a photograph for the scene solver: weights, slopes, strengths.
 #include "estimator/scene/scene_data.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(SceneData, HiddenPixelsWeighLess) {
   EXPECT_EQ(DataWeights(squares, hidden, false), squares);
 }
 
-// Against the operator itself, in the middle of a picture with one depth.
+// The rows are compared with the operator itself, in the middle of a picture with one depth.
 TEST(SceneData, SquaredRowsAreThoseOfTheProjection) {
   for (const float disparity_px : {0.0F, 0.7F, -1.5F}) {
     const DisparityMap map{25, 25, std::vector<float>(625, disparity_px), {1, 0.8}};

@@ -1,4 +1,4 @@
-// The parts of the prior on patches; what it is good for is tested with the solver.
+// The parts of the prior on patches. Its effect on the results is tested with the solver.
 #include "estimator/scene/scene_patches.h"
 
 #include <gtest/gtest.h>
@@ -54,11 +54,11 @@ TEST(ScenePatches, NeedAllVariationWhereThePhotographIsNotExplained) {
   ASSERT_EQ(shares.size(), kPixels);
   EXPECT_EQ(shares[5 * kWidth + 5], 0.5);
   EXPECT_EQ(shares[35 * kWidth + 5], 1);
-  // At the border four rows of nine have it: (4/9 1.4^2/.7^2)^.75/2.
+  // At the border four rows of nine have it: (4/9 1.4^2/0.7^2)^0.75/2.
   EXPECT_NEAR(shares[19 * kWidth + 30], 0.5 * std::pow(4.0 / 9 * 4, 0.75), 1e-9);
 }
 
-// A wave in noise, in focus: what the photograph shows is about the scene, and its noise goes.
+// A wave with noise, in focus: the photograph is close to the scene, and its noise is removed.
 TEST(ScenePatches, TakeNoiseOutOfAWave) {
   const DataTerm<double> clean = SharpPhotograph<double>(0, 1);
   constexpr double kSigma = 4.0 / 255;

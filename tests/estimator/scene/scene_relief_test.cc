@@ -1,5 +1,5 @@
-// The shading of a scene's relief: closed forms of its parts, and what it is good for on a scene
-// that is simulated ray by ray.
+// The shading of a scene's relief: its parts are compared with closed forms, and its effect is
+// tested on a scene that is simulated ray by ray.
 #include "estimator/scene/scene_relief.h"
 
 #include <gtest/gtest.h>
@@ -39,10 +39,11 @@ DisparityMap MapOf(int width_px, int height_px, const std::function<double(int, 
 }
 
 TEST(Relief, HasTheSlopesOfARoofAndNoneOfAPlaneOrItsEdges) {
-  // Two planes of slope .05 either way, of 20 and 21 pixels: less their mean, .05 (1 - 1/41^2)^.5.
+  // Two planes of slope 0.05 in opposite directions, of 20 and 21 pixels. Without their mean this
+  // is 0.05 (1 - 1/41^2)^0.5.
   DisparityMap roof = MapOf(41, 30, [](int x, int) { return 0.05 * std::abs(x - 20); });
   EXPECT_NEAR(ReliefSlope(roof), 0.05 * std::sqrt(1 - 1 / (41.0 * 41)), 1e-6);
-  // px of a view step are what counts.
+  // The unit of the slopes is px of a view step.
   roof.step = {0.5, 0.5};
   EXPECT_NEAR(ReliefSlope(roof), 0.025 * std::sqrt(1 - 1 / (41.0 * 41)), 1e-6);
   const auto plane = [](int x, int y) { return 0.03 * x - 0.04 * y + (x >= 20 ? 5 : 0); };
@@ -114,7 +115,7 @@ double Rms(const std::vector<double>& numbers) {
   return std::sqrt(sum / static_cast<double>(numbers.size()));
 }
 
-// Two colours that are lit from different sides: what blur took comes back.
+// Two colours are lit from different sides, and the detail that was lost to blur is restored.
 TEST(FitShading, FindsTheLight) {
   const Shaded shaded;
   const double light[2][3] = {{0.2, -0.1, 0.15}, {-0.05, 0.1, 0.2}};
@@ -151,8 +152,8 @@ TEST(FitShading, LeavesPaintAlone) {
   EXPECT_LT(Rms(of_none.sharp), 1e-9);
 }
 
-// A depth with noise as large as its relief explains half of the variance: least squares halve the
-// coefficients, and the doubt takes .5/(.5 + 4 (1 - .5)) of that.
+// A depth whose noise is as large as its relief explains half of the variance: least squares halve
+// the coefficients, and the correction for doubt leaves 0.5/(0.5 + 4 (1 - 0.5)) of that.
 TEST(FitShading, DoubtsANoisyRelief) {
   Shaded shaded;
   const std::vector<double> truth = shaded.relief.normals, in_picture = shaded.estimated;
@@ -284,8 +285,8 @@ void AddDepthNoise(double sigma_px, EstimateInput* input) {
     disparity += static_cast<float>(normal(engine));
 }
 
-// What blur took of the shading comes back, by the depth; and another relief than that in the
-// picture does no harm, against none in the depth.
+// Shading that was lost to blur is restored from the depth. A relief that differs from that of the
+// picture does no harm, compared with no relief in the depth.
 TEST(ReliefShading, OfASceneComesBack) {
   const Bumps bumps(1), others(2);
   const Scene shaded = ShadedScene(bumps, bumps);

@@ -1,4 +1,4 @@
-// The scene solver as a whole: simulated scenes with known views, limits, and what it promises.
+// The whole scene solver: simulated scenes with known views, limits, and documented guarantees.
 #include "thicklens/estimator/scene_solver.h"
 
 #include <gmock/gmock.h>
@@ -78,7 +78,7 @@ Simulated Simulate(bool falloff) {
   return simulated;
 }
 
-// With fall-off, made once.
+// The scene with fall-off, simulated once.
 const Simulated& SimulatedScene() {
   static const Simulated simulated = Simulate(true);
   return simulated;
@@ -196,7 +196,7 @@ TEST(SceneSolver, ADeviceGivesTheSameLightField) {
         largest = std::max(largest, difference);
         squares += difference * difference;
       }
-      // Of values up to 1. A wave of a patch that is near the threshold may fall to either side.
+      // The values are up to 1. A wave of a patch that is near the threshold may be kept or not.
       EXPECT_LE(largest, prior == Prior::kPatches ? 1e-2 : 1e-4) << PriorName(prior);
       EXPECT_LE(std::sqrt(squares / static_cast<double>(expected.values.size())),
                 prior == Prior::kPatches ? 2e-4 : 5e-5)
@@ -221,7 +221,7 @@ TEST(SceneSolver, ADeviceFindsTheSameStrength) {
   EXPECT_NEAR(device.strength, native.strength, 0.02 * native.strength);
 }
 
-// A device that can do nothing but say so.
+// A device that can do nothing except report that.
 class FloatOnly : public kernels::Backend {
  public:
   bool is_opencl() const override { return true; }
@@ -291,7 +291,7 @@ TEST(SceneSolver, APictureWithoutBlurComesBack) {
     SceneSummary summary;
     const model::LightField found = EstimateScene(input, options, &summary, nullptr);
     EXPECT_EQ(summary.strength, 1e-6);
-    // What total variation starts with is not taken for its answer, however near.
+    // The start of total variation is not taken for its answer, however close it is.
     EXPECT_EQ(summary.reweightings > 0, prior == Prior::kTotalVariation);
     const model::LinearPicture view = model::ViewPicture(found, 2, 0);
     for (std::size_t i = 0; i < view.values.size(); ++i) {
@@ -364,8 +364,8 @@ TEST(SceneSolver, MapsTellBlurAndWhatIsHidden) {
   EXPECT_NEAR(std::sqrt(squares / (40 * 36)), summary.residual_rms, 1e-6);
 }
 
-// Whether or not the views that H was made of are shown again: those of a weight, of a photograph
-// on its own grid.
+// The views are the warped radiance, whether or not H was made of the same views: those with a
+// weight, of a photograph on its own grid.
 TEST(SceneSolver, ViewsAreTheRadianceWarped) {
   EstimateInput simulated = SimulatedScene().input;
   simulated.weights(0, 0) = 0;  // has no part in H

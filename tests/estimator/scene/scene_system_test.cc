@@ -1,5 +1,5 @@
-// The systems of a photograph against dense matrices that are written down from their formulas, and
-// the priors against the functionals that they stand for.
+// The systems of a photograph are compared with dense matrices that are computed from their
+// formulas, and the priors with the functionals that they approximate.
 #include "estimator/scene/scene_system.h"
 
 #include <gtest/gtest.h>
@@ -67,7 +67,7 @@ struct Made {
   MatrixXd photograph;  // a column a channel
 };
 
-// By default more rows than a band has.
+// By default the picture has more rows than a band.
 Made MakeCase(int width = 7, int height = 20) {
   Made made;
   made.width = width;

@@ -41,8 +41,8 @@ double Found(const model::LinearPicture& picture, const model::TransferCurve& tr
   return 255 * StoredNoiseSigma(model::ToLinear(stored, transfer), transfer).value_or(-1);
 }
 
-// Variances of noise and of rounding (1/12) add. Of what is left of the texture the estimate has
-// none where a quarter of the blocks is without edges.
+// The variances of noise and of rounding (1/12) add. If a quarter of the blocks is without edges,
+// the texture does not affect the estimate.
 TEST(StoredNoise, IsFoundInManyTextures) {
   for (const Texture texture :
        {Texture::kFlat, Texture::kSlope, Texture::kWaves, Texture::kSquares}) {

@@ -61,7 +61,7 @@ void ExpectNear(const char* what, const std::vector<float>& found,
   }
 }
 
-// By what devices agree with.
+// Warps with the reference implementation that devices are compared with.
 std::vector<float> DeviceTwinWarp(const model::LinearPicture& picture, const DisparityMap& map,
                                   const CompactView& view) {
   std::vector<float> values;
@@ -71,8 +71,8 @@ std::vector<float> DeviceTwinWarp(const model::LinearPicture& picture, const Dis
   return values;
 }
 
-// The share of a sample that another surface has, and of what disparity that is; a share of 0:
-// none.
+// The fraction of a sample that belongs to another surface, and its disparity. A fraction of 0
+// means none.
 kernels::MixedSample MixedAt(const ViewDisparity& view, std::size_t i) {
   for (const kernels::MixedSample& mixed : view.mixed) {
     if (static_cast<std::size_t>(mixed.index) == i) return mixed;
@@ -80,8 +80,8 @@ kernels::MixedSample MixedAt(const ViewDisparity& view, std::size_t i) {
   return {};
 }
 
-// Shares just below the least that counts are not told from those just above it, nor two surfaces
-// of the same share.
+// Fractions just below the smallest one that counts are treated like those just above it, and so
+// are two surfaces of the same fraction.
 void ExpectMixedAlike(const ViewDisparity& view, const ViewDisparity& plain, double tolerance) {
   constexpr double kRounding = 2e-5, kLeastShare = 0.01;
   int alike = 0;
@@ -101,7 +101,7 @@ void ExpectMixedAlike(const ViewDisparity& view, const ViewDisparity& plain, dou
   EXPECT_GE(alike, 0.95 * static_cast<double>(plain.mixed.size()));
 }
 
-// The same sources, each in the list.
+// The same sources as a list of all samples.
 CompactView ListOf(const ViewDisparity& view) {
   CompactView list;
   list.width_px = view.width_px;
@@ -183,7 +183,7 @@ const std::vector<TwinCase>& TwinCases() {
        0.05,
        [](int x, int y, double noise) { return 1e7 + Things(x, y, noise); },
        {{3, 0}, {-2, 2}}},
-      // Pixels, edges and diagonals of cells stand on samples.
+      // Pixels, edges and diagonals of cells are exactly on samples.
       {"OnSamples", 24, 19, {1, 1}, 0, [](int, int, double) { return 1.0; }, AllKinds()},
       {"OnHalfSamples", 24, 19, {1, 1}, 0, [](int, int, double) { return -0.5; }, AllKinds()},
       {"OnEdges",
@@ -218,7 +218,7 @@ TEST_P(TwinTest, RendersWhatThePlainTwinDoes) {
       ASSERT_EQ(view.seen[i], plain.seen[i])
           << i % static_cast<std::size_t>(width) << ", " << i / static_cast<std::size_t>(width);
     }
-    // Of the places that are told in float.
+    // The positions are in float, so that they are rounded.
     const double rounding = 1e-6 * std::max(std::abs(a), std::abs(b));
     const double tolerance = Magnitude(map.disparity) * rounding;
     ExpectNear("disparity", view.disparity, plain.disparity, width, tolerance);
@@ -282,7 +282,7 @@ TEST(PictureWarper, CutsSourcesAsThePlainTwinDoes) {
   }
 }
 
-// The outermost pixels stand beside a sample by the last digit of a float.
+// The outermost pixels are off a sample by the last digit of a float.
 TEST(DisparityRenderer, DoesNotLoseTheBorderToRounding) {
   for (const float disparity : {std::nextafter(1.0F, 2.0F), std::nextafter(3.0F, 2.0F)}) {
     const DisparityMap map{11, 9, std::vector<float>(99, disparity), {1, 1}};
@@ -303,7 +303,7 @@ TEST(DisparityRenderer, DoesNotLoseTheBorderToRounding) {
 
 TEST(DisparityRenderer, TakesAnyFiniteView) {
   DisparityMap map{9, 7, std::vector<float>(63, 0), {1, 1}};
-  // A plane in focus stands still.
+  // A plane in focus does not move.
   EXPECT_EQ(DisparityRenderer(map).Render(1e300, -1e300).seen, std::vector<Seen>(63, Seen::kSeen));
   map.disparity.assign(63, -1e-3F);
   const ViewDisparity view = DisparityRenderer(map).Render(1e300, 1e300);

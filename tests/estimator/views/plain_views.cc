@@ -26,7 +26,7 @@ double Edge(const Vertex& p, const Vertex& q, double x, double y) {
   return (p.x - x) * (q.y - y) - (q.x - x) * (p.y - y);
 }
 
-// Of every sample of a view the nearest surface; -infinity where there is none.
+// The nearest surface at every sample of a view; -infinity if there is none.
 struct Canvas {
   int width, height;
   std::vector<double> disparity;
@@ -115,7 +115,7 @@ std::vector<bool> Draw(const DisparityMap& map, const Eigen::Vector2d& shift, Ca
 
 using Sample = std::pair<int, int>;
 
-// For each sample the covered one that is fewest steps along rows and columns away.
+// For each sample, the covered one with the fewest steps along rows and columns.
 std::vector<Sample> Closest(const Canvas& canvas) {
   std::vector<Sample> closest(canvas.disparity.size(), Sample{-1, -1});
   std::queue<Sample> queue;
@@ -139,18 +139,19 @@ std::vector<Sample> Closest(const Canvas& canvas) {
   return closest;
 }
 
-// Of a sample that is not covered.
+// The background of a sample that is not covered.
 struct Behind {
   double source_x = 0, source_y = 0, disparity = 0;
 };
 
-// Where a step along the displacement leads to from a sample.
+// The sample to which a step along the displacement leads.
 Sample Stepped(const Eigen::Vector2d& step, int x, int y, double steps) {
   return {static_cast<int>(std::floor(x + steps * step.x() + 0.5)),
           static_cast<int>(std::floor(y + steps * step.y() + 0.5))};
 }
 
-// Whether two of the pixels around it are of its surface; one, where there is but a line of pixels.
+// True if two of the pixels around it are of its surface, or one, if the surface is a line of
+// pixels.
 bool IsOfASurface(const DisparityMap& map, int x, int y) {
   const double here = map.disparity[At(x, y, map.width_px)];
   const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
@@ -179,7 +180,7 @@ Sample LastPassed(const DisparityMap& map, const Eigen::Vector2d& shift, int x, 
   return last;
 }
 
-// What a sample that is not covered takes over.
+// The background that a sample that is not covered gets.
 Behind Background(const DisparityMap& map, const Canvas& canvas, const Eigen::Vector2d& shift,
                   const std::vector<Sample>& closest, int x, int y) {
   struct End {
@@ -221,8 +222,8 @@ Behind Background(const DisparityMap& map, const Canvas& canvas, const Eigen::Ve
   return {found.first + shift.x() * disparity, found.second + shift.y() * disparity, disparity};
 }
 
-// Of the square of a sample what the squares of a surface's pixels cover, which stand where its
-// disparity puts them. The border of the picture is repeated.
+// The fraction of a sample's square that the squares of a surface's pixels cover at the positions
+// that its disparity gives them. The border of the picture is repeated.
 double CoveredShare(const DisparityMap& map, int x, int y, const kernels::HiddenSample& from) {
   const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
   const double at_x = x + double{from.source_x}, at_y = y + double{from.source_y};
@@ -244,9 +245,9 @@ kernels::HiddenSample OnSurface(const Eigen::Vector2d& shift, std::int32_t index
           static_cast<float>(shift.y() * disparity), disparity};
 }
 
-// The surface beyond a disparity that a sample's neighbours show, those beside it before those at
-// its corners: one that is seen, and that the centre view shows at this sample as well; else one
-// that is seen, as it is shown at the neighbour; else one that is hidden.
+// The surface beyond a disparity among the neighbours of a sample, direct neighbours before
+// diagonal ones. A visible surface that the centre view shows at this sample as well is preferred,
+// then a visible one as shown at the neighbour, then a hidden one.
 bool FindBehind(const DisparityMap& map, const Eigen::Vector2d& shift, const ViewDisparity& view,
                 int x, int y, float disparity, kernels::HiddenSample* behind) {
   const double tolerance = static_cast<float>(0.3 / map.step.cwiseAbs().maxCoeff());
@@ -274,10 +275,10 @@ bool FindBehind(const DisparityMap& map, const Eigen::Vector2d& shift, const Vie
   return false;
 }
 
-// What could share the pixel of a sample.
+// Surfaces that could share the pixel of a sample.
 struct Sharers {
   std::vector<kernels::MixedSample> of_others;
-  // Of the surface that a hidden sample has, what is seen of it after all.
+  // Parts of the surface of a hidden sample that are visible nevertheless.
   std::vector<kernels::MixedSample> of_its_own;
 };
 Sharers SharersOf(const DisparityMap& map, const Eigen::Vector2d& shift, const ViewDisparity& view,

@@ -58,7 +58,7 @@ model::LinearPicture PictureOf(int width, int height, int channels,
   return picture;
 }
 
-// Where in the centre view a sample's source is.
+// Position of a sample's source in the centre view.
 Eigen::Vector2d SourceOf(const ViewDisparity& view, int x, int y) {
   const std::size_t i = At(x, y, view.width_px);
   return {x + double{view.source_x[i]}, y + double{view.source_y[i]}};
@@ -129,8 +129,8 @@ TEST(DisparityOnGrid, KeepsHolesAndRefusesDepthsThatAreNotBeyondTheUvPlane) {
               AllOf(HasSubstr("2 values"), HasSubstr("3x1")));
 }
 
-// By similar triangles a disparity is a straight line over 1/(depth beyond the UV plane): infinity
-// is where two depths lead.
+// By similar triangles a disparity is a straight line over 1/(depth beyond the UV plane), so two
+// depths determine that of infinity.
 TEST(DisparityOnGrid, TendsToThatOfInfinity) {
   const model::LightFieldGrid grid = model::GridOnPlanes(BenchCamera(), {120, 300}, 3, 3);
   const DisparityMap map = DisparityOnGrid(grid, {500, 1000, 1e7F}, 3, 1);
@@ -187,8 +187,8 @@ struct PlaneCase {
 
 class SlantedPlaneTest : public ::testing::TestWithParam<PlaneCase> {};
 
-// The plane d = d0 + g x is seen at x' = x - A d(x), A = (a step.x, b step.y), so that
-// x = (Id - A g^T)^-1 (x' + A d0).
+// The plane d = d0 + g x appears at x' = x - A d(x), A = (a step.x, b step.y), so that x = (Id - A
+// g^T)^-1 (x' + A d0).
 TEST_P(SlantedPlaneTest, HasItsClosedForm) {
   const PlaneCase& plane = GetParam();
   const int width = 40;
@@ -207,7 +207,7 @@ TEST_P(SlantedPlaneTest, HasItsClosedForm) {
     for (int x = 0; x < width; ++x) {
       const std::size_t i = At(x, y, width);
       const Eigen::Vector2d source = inverse * (Eigen::Vector2d(x, y) + shift * plane.at_origin);
-      // How far inside of the centre picture.
+      // Distance from the border of the centre picture, positive inside.
       const double inside =
           std::min({source.x(), width - 1 - source.x(), source.y(), height - 1 - source.y()});
       if (std::abs(inside) < 1e-3) continue;  // on its rim
@@ -238,7 +238,7 @@ INSTANTIATE_TEST_SUITE_P(
                       PlaneCase{"HalfSteps", -1.1, 0.05, 0.03, -1.5, 0.5, {1, 1}},
                       PlaneCase{"StepsInMm", -11, 0.5, 0.3, -1.5, 2.5, {0.11, 0.07}},
                       PlaneCase{"StepsOfOneAxis", -11, 0.5, 0.3, -1.5, 2.5, {0.11, 0}},
-                      // Everything exchanges left and right: its back is what is seen.
+                      // Left and right are exchanged, so the back of the plane is visible.
                       PlaneCase{"TurnedOver", -3.5, 0.18, 0, 9, 0, {1, 1}}),
     [](const auto& tested) { return tested.param.name; });
 
@@ -248,7 +248,7 @@ struct TwoLayers {
   int left = 17, right = 26, top = 12, bottom = 20;  // pixels of the rectangle, inclusive
   double near_px = 1.9, far_px = -0.6;
 
-  // Of the centre view, a pixel reaching half a pixel beyond its centre.
+  // A position of the centre view. A pixel extends half a pixel beyond its centre.
   bool IsNear(double x, double y) const {
     return x >= left - 0.5 && x <= right + 0.5 && y >= top - 0.5 && y <= bottom + 0.5;
   }
@@ -285,7 +285,7 @@ TEST(RenderDisparity, SeesTwoLayersInTheirClosedForm) {
         const bool is_seen = is_near || scene.FarCovers(x, y, a, b);
         ASSERT_EQ(view.seen[i], is_seen ? Seen::kSeen : Seen::kHidden)
             << x << ", " << y << " of view " << a << ", " << b;
-        // What is hidden is background, at the picture's border as well.
+        // Hidden samples show the background, also at the border of the picture.
         const double disparity = is_near ? scene.near_px : scene.far_px;
         ASSERT_NEAR(view.disparity[i], disparity, 1e-6) << x << ", " << y;
         if (is_seen) {
@@ -304,8 +304,9 @@ TEST(RenderDisparity, SeesTwoLayersInTheirClosedForm) {
   }
 }
 
-// In the view to the right the rectangle stands further left, and what comes out behind its right
-// edge is hidden from the centre; in the view to the left, its left edge.
+// In the view to the right the rectangle is farther left, and the background that appears behind
+// its right edge is hidden from the centre; in the view to the left it is that behind its left
+// edge.
 TEST(RenderDisparity, FillsFromTheBackgroundSide) {
   const TwoLayers scene;
   for (const int a : {3, -3}) {
@@ -348,7 +349,8 @@ TEST(RenderDisparity, FillsBordersFromTheOneSideAndCornersFromWhatIsClosest) {
   EXPECT_EQ(diagonal.source_y[At(0, 14, width)], -2 + 3);
 }
 
-// Where a bar has stood before a wall, the wall to the left and to the right is equally far.
+// A bar was removed from the front of a wall, and the wall to its left and to its right is equally
+// far.
 TEST(RenderDisparity, FillsFromTheCloserOfTwoEquallyFarSides) {
   const DisparityMap map = MapOf(40, 3, [](int x, int) { return x >= 20 && x <= 22 ? 2.0 : 0.0; });
   const ViewDisparity view = RenderDisparity(map, 3, 0);
@@ -375,8 +377,8 @@ TEST(RenderDisparity, TakesTheCentreViewWhereNothingAtAllIsCovered) {
   EXPECT_EQ(std::count(view.seen.begin(), view.seen.end(), Seen::kHidden), 30);
 }
 
-// Two surfaces pull apart, one surface is drawn out. Limit: .2 px per view step, the larger of the
-// two steps.
+// Two surfaces separate, while one surface is stretched. The limit is 0.2 px per view step, for the
+// larger of the two steps.
 TEST(RenderDisparity, JoinsNeighboursOfOneSurfaceOnly) {
   for (const double step : {1.0, 0.5}) {
     for (const double jump_px : {0.19, 0.21}) {
@@ -489,9 +491,9 @@ TEST(RenderDisparity, AgreesWithASlowTwin) {
   }
 }
 
-// A screen with a slit before a wall. The view to the right sees through the slit a part of the
-// wall that is hidden from the centre by the screen's left part, and nothing of what the centre
-// sees; on both sides of the hole stands the screen.
+// A screen with a slit before a wall. Through the slit, the view to the right shows a part of the
+// wall that the screen's left part hides from the centre, and nothing that the centre shows. The
+// screen is on both sides of the hole.
 TEST(RenderDisparity, SeesTheWallBehindASlitThatIsNarrowerThanTheHole) {
   constexpr int kWidth = 40, kFirst = 20, kLast = 21;
   const auto of = [](int x, int) { return x >= kFirst && x <= kLast ? -0.5 : 2.0; };
@@ -515,7 +517,8 @@ TEST(RenderDisparity, SeesTheWallBehindASlitThatIsNarrowerThanTheHole) {
   }
 }
 
-// Depth sensors err by far at single pixels. A ray that goes before such a pixel tells nothing.
+// Depth sensors have large errors at single pixels. A ray that passes before such a pixel does not
+// determine a surface.
 TEST(RenderDisparity, IsNotLedByASinglePixelThatIsFarTooFar) {
   constexpr int kFirst = 14, kLast = 25;
   DisparityMap map =
@@ -545,9 +548,9 @@ bool HasTwoOfItsSurface(const DisparityMap& map, int x, int y) {
   return found >= 2;
 }
 
-// Whatever is in the map: the ray of a hidden sample goes over the centre view, at n px along the
-// displacement at a disparity of n over the px per unit. Where it last is before a pixel, that
-// pixel's surface is what it disappears behind the edge of.
+// For any map, the ray of a hidden sample crosses the centre view: at n px along the displacement
+// its disparity is n over the px per unit. The last pixel before which it passes gives the surface
+// behind whose edge it disappears.
 TEST(RenderDisparity, ShowsTheSurfaceThatTheHiddenRayPassedLast) {
   std::mt19937 engine(12);
   std::uniform_real_distribution<double> uniform(-1.5, 1.5);
@@ -669,25 +672,26 @@ TEST(WarpPicture, MixesSurfacesByTheAreaThatEachCovers) {
   EXPECT_GT(mixed, 100);
 }
 
-// A hole may be behind: what is hidden at its sample stands there for it.
+// The surface behind may be a hole. Its hidden background is used then.
 TEST(RenderDisparity, MixesInTheHiddenBackgroundWhereNothingElseIsBehind) {
   const TwoLayers scene;
-  const double a = 2.2;  // what is near moves 4.18 px to the left, what is far 1.32 to the right
+  // The near surface moves 4.18 px to the left, the far one 1.32 px to the right
+  const double a = 2.2;
   const ViewDisparity view = RenderDisparity(scene.Map(), a, 0);
   int found = 0;
   for (const kernels::MixedSample& mixed : view.mixed) {
     const auto i = static_cast<std::size_t>(mixed.index);
     const int x = mixed.index % TwoLayers::kWidth;
-    if (x < 20) continue;  // the left edge, before background that is seen
+    if (x < 20) continue;  // the left edge, before visible background
     if (mixed.index / TwoLayers::kWidth != 15) continue;
     ++found;
-    // 26.5 - 4.18 = 22.32: the sample at 22 is covered but for .18 px.
+    // 26.5 - 4.18 = 22.32: the sample at 22 is covered except for 0.18 px.
     EXPECT_EQ(x, 22);
     EXPECT_NEAR(mixed.share, 0.18, 1e-5);
     EXPECT_NEAR(view.disparity[i], scene.near_px, 1e-6);
     EXPECT_EQ(view.seen[i + 1], Seen::kHidden);
     EXPECT_EQ(mixed.other.index, mixed.index + 1);
-    // There the rectangle is what the centre view shows, so that the neighbour's place is read.
+    // The centre view shows the rectangle there, so the position of the neighbour is read.
     EXPECT_EQ(mixed.other.source_x, view.source_x[i + 1] + 1);
     EXPECT_EQ(mixed.other.disparity, view.disparity[i + 1]);
   }
@@ -701,9 +705,9 @@ double SharedAt(const ViewDisparity& view, std::size_t i) {
   return 0;
 }
 
-// The texture of the wall is linear: taps of the wall on both sides give it exactly; where the
-// other tap shows the rectangle, the one that is left stands for it; hidden samples show what their
-// background shows.
+// The texture of the wall is linear, so taps of the wall on both sides give it exactly. If the
+// other tap shows the rectangle, the remaining one replaces it. Hidden samples show their
+// background.
 TEST(WarpPicture, UsesTheTapsOfTheSurfaceAlone) {
   const TwoLayers scene;
   const DisparityMap map = scene.Map();
@@ -737,7 +741,7 @@ TEST(WarpPicture, UsesTheTapsOfTheSurfaceAlone) {
   EXPECT_GT(hidden, 3);
 }
 
-// .3 px per view step is the limit between one surface and two, by the larger of the steps.
+// The limit between one surface and two is 0.3 px per view step, for the larger of the steps.
 TEST(WarpPicture, SurfacesAreSeparatedByTheLargerStep) {
   for (const double difference_px : {0.28, 0.32}) {
     const double step = 0.25;
