@@ -49,7 +49,7 @@ namespace {
 struct BenchAccuracyOptions {
   CommonOptions common;
   std::vector<std::string> scenes;  // empty: UsualScenes()
-  std::vector<int> views;           // empty: kUsualViews, and 3 and 7 of each solver by itself
+  std::vector<int> views;  // empty: kUsualViews, and 3 and 7 for each solver with its defaults
   std::optional<int> size_px;
   std::string device = "auto";
   int repeat = 5;
@@ -57,7 +57,7 @@ struct BenchAccuracyOptions {
   std::optional<std::uint64_t> seed;
   std::string report_folder;
   bool save_profile = false;
-  std::string profile_path;  // empty: the person's own
+  std::string profile_path;  // empty: the user's own
 };
 
 const std::vector<std::string>& UsualScenes() {
@@ -71,25 +71,25 @@ constexpr int kUsualViews = 5;
 constexpr int kUsualSizePx = 256;
 constexpr std::uint64_t kUsualSeed = 1;
 
-// Where plans are computed.
+// The backends that plans are computed on.
 struct Backends {
-  std::shared_ptr<kernels::Backend> processor, device;  // device: null where there is none
+  std::shared_ptr<kernels::Backend> processor, device;  // device: null if there is none
   int threads = 1;
 };
 
-// One of the bench's own, or a description with the pictures that it names.
+// A built-in scene of the bench, or a description with the pictures that it names.
 struct Scene {
   std::string name;
   std::optional<model::SceneSimulationOptions> description;
   std::vector<model::LayerPixels> pixels;
 };
 
-// All that can be wrong with them is told before anything is measured.
+// All errors in the list of scenes are reported before anything is measured.
 std::vector<Scene> ScenesOf(const BenchAccuracyOptions& options) {
   std::vector<Scene> scenes;
   for (const std::string& name : options.scenes.empty() ? UsualScenes() : options.scenes) {
     for (const Scene& other : scenes) {
-      if (other.name == name) throw UsageError(fmt::format("--scene: '{}' is named twice", name));
+      if (other.name == name) throw UsageError(fmt::format("--scene: '{}' is given twice", name));
     }
     Scene scene;
     scene.name = name;
@@ -102,7 +102,7 @@ std::vector<Scene> ScenesOf(const BenchAccuracyOptions& options) {
   }
   const auto is_file = [](const Scene& scene) { return scene.description.has_value(); };
   if (options.size_px && std::all_of(scenes.begin(), scenes.end(), is_file)) {
-    throw UsageError("--size-px is of the scenes slanted and cards; a file says its own size");
+    throw UsageError("--size-px is for the scenes slanted and cards; a file states its own size");
   }
   if (std::set<int>(options.views.begin(), options.views.end()).size() != options.views.size()) {
     throw UsageError("--views: a number is given twice");
@@ -110,8 +110,8 @@ std::vector<Scene> ScenesOf(const BenchAccuracyOptions& options) {
   return scenes;
 }
 
-// Of scenes of the bench's own the photograph is grey, so that all solvers go through one channel;
-// a file's are taken as they are.
+// The photographs of built-in scenes are grey, so that all solvers compute one channel; those of a
+// file are used as they are.
 BenchScene Simulate(const BenchAccuracyOptions& options, const Scene& scene, int views,
                     int threads) {
   ProgressLine progress("simulating", options.common.quiet);
@@ -152,7 +152,7 @@ void RunBlocks(const SampledPicture& picture, int threads, kernels::Backend* bac
   const PartsRun run = RunParts(picture, row->plan, threads, backend);
   row->setup_seconds.push_back(run.setup_seconds);
   row->solve_seconds.push_back(run.solve_seconds);
-  row->views_seconds.push_back(0);  // they are what is solved for
+  row->views_seconds.push_back(0);  // the solver computes the views directly
   row->seconds.push_back(run.seconds());
   if (!is_first) return;
   row->sample = picture.sample;
@@ -170,7 +170,7 @@ void RunWhole(const SampledPicture& picture, int threads, kernels::Backend* back
     return row->is_warping ? RunWarping(picture.whole.input, threads)
                            : RunPlan(row->plan, picture.whole.input, threads, backend);
   };
-  // A device compiles but once; on the processor a part is enough to be as warm as blocks are.
+  // A device compiles only once; on the processor one part warms up as well as the blocks do.
   if (is_first && row->plan.on_opencl) {
     run_once();
   } else if (is_first) {
@@ -189,7 +189,7 @@ void RunWhole(const SampledPicture& picture, int threads, kernels::Backend* back
   Score(picture, PartsOf(picture, run.light_field), threads, row);
 }
 
-// One row that fails says why, and does not end those beside it.
+// A row that fails states the reason, and the other rows go on.
 void RunRow(const SampledPicture& picture, const Backends& backends, PriceRow* row) {
   kernels::Backend* backend = (row->plan.on_opencl ? backends.device : backends.processor).get();
   try {
@@ -207,7 +207,7 @@ void RunRow(const SampledPicture& picture, const Backends& backends, PriceRow* r
 
 void Measure(const BenchAccuracyOptions& options, const SampledPicture& picture,
              const Backends& backends, std::vector<PriceRow>* rows) {
-  // Of what takes so long, fewer runs tell as much as more.
+  // For plans that take this long, fewer runs are sufficient.
   constexpr double kEnoughSeconds = 20;
   ProgressLine progress("measuring", options.common.quiet);
   std::vector<double> spent(rows->size());
@@ -265,7 +265,7 @@ std::string AboutText(const BenchAccuracyOptions& options, const Backends& backe
                       double triad_bytes_per_second) {
   return fmt::format(
       "{}, {} thread(s), {:.3g} GB/s (triad), BLAS: {}, OpenCL: {}; medians of {} runs, or of as "
-      "many as fill 20 s; thicklens {}, {}",
+      "many as fit into 20 s; thicklens {}, {}",
       ProcessorName(), backends.threads, 1e-9 * triad_bytes_per_second,
       estimator::BlasDescription(), backends.device ? backends.device->description() : "none",
       options.repeat, Version(), NowIso8601());
@@ -275,12 +275,12 @@ std::string ProfilePathOf(const BenchAccuracyOptions& options) {
   return options.profile_path.empty() ? UserProfilePath() : options.profile_path;
 }
 
-// Claims a file in a folder that may have to be made.
+// Claims a file in a folder that may not exist yet.
 OutputFile ClaimProfile(const BenchAccuracyOptions& options) {
   const std::string path = ProfilePathOf(options);
   if (path.empty()) {
     throw UsageError(
-        "--save-profile: neither XDG_CONFIG_HOME nor HOME is set; say which file is to be written");
+        "--save-profile: neither XDG_CONFIG_HOME nor HOME is set; name the file to write");
   }
   if (options.profile_path.empty()) {
     std::error_code failure;
@@ -306,11 +306,12 @@ CommandResult SaveProfile(const BenchAccuracyOptions& options) {
   }
   const nlohmann::json profile = ProfileJson(measured.profile);
   file.Commit(profile.dump(2) + "\n");
-  PrintResult(options.common,
-              fmt::format("{}\nthe profile is in {}: estimate --quality, --within and --psnr-loss "
-                          "choose by it{}\n",
-                          ProfileTable(measured), file.path(),
-                          options.profile_path.empty() ? "" : " where --profile names it"));
+  PrintResult(
+      options.common,
+      fmt::format(
+          "{}\nthe profile is in {}: estimate --quality, --within and --psnr-loss use it{}\n",
+          ProfileTable(measured), file.path(),
+          options.profile_path.empty() ? "" : " if --profile names it"));
   nlohmann::json loads = nlohmann::json::array();
   for (std::size_t i = 0; i < measured.loads.size(); ++i) {
     const estimator::PlanProfile& plan = measured.profile.plans[i];
@@ -351,7 +352,7 @@ CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
       kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
   if (!backends.device->is_opencl()) {
     backends.device = nullptr;
-    if (!notice.empty()) spdlog::warn("rows of OpenCL are left out: {}", notice);
+    if (!notice.empty()) spdlog::warn("rows with OpenCL are left out: {}", notice);
   }
   const double triad = TriadBytesPerSecond(backends.threads);
   const std::vector<PriceRow> rows = MeasureAll(options, scenes, backends);
@@ -361,15 +362,15 @@ CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
     figures.push_back(PriceFigure(group, fmt::format("prices-{}", figures.size() + 1)));
   }
   report.Commit(PricePage(rows, about), PriceCsv(rows), figures);
-  std::string text = about + "\n" + PriceTable(rows) +
-                     "\n> on the front: no other is both faster and better. Seconds of the solver: "
-                     "without reading and writing; where they differ by less than their spread, "
-                     "marks mean a tie.\nMiB: at most, beside what the program held "
-                     "before. photo: PSNR of the photograph formed again.\n";
+  std::string text =
+      about + "\n" + PriceTable(rows) +
+      "\n> on the Pareto front: no other plan is both faster and better. Seconds of the solver, "
+      "without reading and writing; differences below the spread are a tie.\nMiB: largest increase "
+      "of memory during the run. photo: PSNR of the photograph computed from the views.\n";
   if (std::any_of(rows.begin(), rows.end(), [](const PriceRow& row) { return row.sample; })) {
     text +=
-        "extrapol.: from four parts of 64 x 64 px, of which iterations, residual and rcond are the "
-        "worst;\non the front these seconds count as they are. --full runs all.\n";
+        "extrapol.: from four parts of 64 x 64 px, with the worst of their iterations, residuals "
+        "and rcond;\nthe front uses these seconds as they are. --full runs everything.\n";
   }
   PrintResult(options.common, text);
   nlohmann::json json_rows = nlohmann::json::array();
@@ -389,35 +390,39 @@ CommandResult BenchAccuracy(const BenchAccuracyOptions& options) {
 
 void AddBenchAccuracyCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
-      "accuracy", "What each way to a light field costs and gives, against true views");
+      "accuracy", "Run time and accuracy of each way to a light field, against true views");
   const auto options = std::make_shared<BenchAccuracyOptions>();
   command
       ->add_option("--scene", options->scenes,
-                   "slanted, cards (both), or a scene's file as of simulate picture")
+                   "slanted, cards (both), or the file of a scene, as for simulate picture")
       ->type_name("SCENE");
   command
       ->add_option("--views", options->views,
-                   "Across and down, all plans each (5, and with 3 and 7 each solver by itself)")
+                   "Views across and down, with all plans for each (default: 5, and 3 and 7 for "
+                   "each solver with its defaults)")
       ->check(CLI::Range(2, 31))
       ->type_name("N");
   command
-      ->add_option("--size-px", options->size_px,
-                   fmt::format("Side of the pictures of slanted and cards ({})", kUsualSizePx))
+      ->add_option(
+          "--size-px", options->size_px,
+          fmt::format("Side of the pictures of slanted and cards (default {})", kUsualSizePx))
       ->check(CLI::Range(64, 4096))
       ->type_name("PX");
   AddRepeatOption(command, &options->repeat);
   command->add_flag("--full", options->full,
-                    "Each choice with each other, and all blocks, not a sample: hours");
-  command->add_option("--seed", options->seed, "Of texture and noise (1, or the scene file's)")
+                    "Combine all choices, and solve all blocks, not a sample: takes hours");
+  command
+      ->add_option("--seed", options->seed,
+                   "Seed of texture and noise (default 1, or that of the scene file)")
       ->type_name("N");
   AddBenchReportOption(command, &options->report_folder);
   AddDeviceOption(command, &options->device);
   CLI::Option* profile =
       command
           ->add_option("--save-profile", options->profile_path,
-                       "Measure, in place of the list, what estimate --quality, --within and "
-                       "--psnr-loss choose from on this machine, and write it there; without a "
-                       "name where they look for it by themselves")
+                       "Measure the profile for estimate --quality, --within and --psnr-loss on "
+                       "this machine, instead of the list, and write it to this file; without a "
+                       "name, to the file that estimate reads by default")
           ->expected(0, 1)
           ->type_name("FILE");
   for (const char* of_list :

@@ -1,4 +1,4 @@
-// thicklens bench calibration: what accuracy costs in time, for calibrations.
+// thicklens bench calibration: accuracy of calibrations against run time.
 #include "tools/bench/bench_calibration.h"
 
 #include <fmt/format.h>
@@ -43,18 +43,18 @@ constexpr int kFewestFieldPx = 16;
 struct BenchCalibrationOptions {
   CommonOptions common;
   std::string sweep_path, report_folder;  // empty: none
-  std::string frames, fields;             // as given; empty: the usual ones
+  std::string frames, fields;             // as given; empty: the defaults
   std::optional<int> sweeps;
   bool full = false;
   std::int64_t seed = 1;
 };
 
-// What is measured: each of these fields with each of these numbers of frames.
+// The grid of measurements: each of these fields with each of these numbers of frames.
 struct Grid {
   std::vector<int> fields_px, frames;  // the largest first
 };
 
-// One call of the calibration and the rows that come out of it.
+// One call of the calibration, and the rows that it gives.
 struct Method {
   calib::CalibrationOptions options;
   struct Reading {
@@ -64,7 +64,7 @@ struct Method {
   std::vector<Reading> readings;
 };
 
-// CPU time of this thread: other sweeps, and other programs, take their share of the machine.
+// CPU time of this thread, because other sweeps and other programs use the machine as well.
 double ThreadSeconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -92,7 +92,8 @@ CalibrationTrial OfFit(const calib::Calibration& c, const BenchSweep& bench) {
   return trial;
 }
 
-// Of a part of the calibration: done, or refused with its own reason or that of the whole.
+// The trial of a part of the calibration: done, or refused with its own reason or that of the whole
+// calibration.
 CalibrationTrial OfPart(bool done, const std::string& message, const calib::Calibration& c) {
   CalibrationTrial trial;
   if (done) {
@@ -143,7 +144,7 @@ std::vector<Method> Methods() {
           {no_fit, {{"peak", OfPeak}, {"source", OfSource}}}};
 }
 
-// The trials of each reading of the method, in its order.
+// Returns the trials of each reading of the method, in its order.
 std::vector<CalibrationTrial> RunMethod(const Method& method, const calib::FocusSweep& sweep,
                                         const BenchSweep& bench) {
   std::vector<CalibrationTrial> trials;
@@ -153,7 +154,7 @@ std::vector<CalibrationTrial> RunMethod(const Method& method, const calib::Focus
     calibration = calib::Calibrate(sweep, method.options);
   } catch (const Interrupted&) {
     throw;
-  } catch (const Error& error) {  // one sweep, and not those beside it
+  } catch (const Error& error) {  // only this sweep fails, the others go on
     calibration.reason = error.what();
   }
   const double seconds = ThreadSeconds() - begin;
@@ -189,11 +190,11 @@ Grid GridOf(const BenchCalibrationOptions& options,
   const model::Sensor& sensor = description.camera.sensor;
   const int side_px = std::min(sensor.width_px, sensor.height_px);
   if (side_px < kFewestFieldPx) {
-    throw Error(fmt::format("{}: the sensor's shorter side is {} px, at least {} are needed",
+    throw Error(fmt::format("{}: the sensor's shorter side is {} px, at least {} px are needed",
                             options.sweep_path, side_px, kFewestFieldPx));
   }
   if (!options.frames.empty()) {
-    grid.frames = WithinOrThrow("--frames", options.frames, 1, count, "what the sweep has");
+    grid.frames = WithinOrThrow("--frames", options.frames, 1, count, "the frames of the sweep");
   } else {
     for (const int part : options.full ? std::vector<int>{2, 3, 4, 6, 8} : std::vector<int>{2, 4})
       grid.frames.push_back((count + part - 1) / part);
@@ -214,7 +215,7 @@ Grid GridOf(const BenchCalibrationOptions& options,
   return grid;
 }
 
-// The trials of every row, in each of them sweep by sweep.
+// The trials of every row, ordered by sweep.
 class TrialTable {
  public:
   TrialTable(const Grid& grid, const std::vector<Method>& methods, int sweeps) : grid_(grid) {
@@ -225,7 +226,8 @@ class TrialTable {
                    std::vector<CalibrationTrial>(static_cast<std::size_t>(sweeps)));
   }
 
-  // `reading` counts those of all methods, `field` and `frames` are indices into the grid.
+  // `reading` counts through the readings of all methods, `field` and `frames` are indices into the
+  // grid.
   std::vector<CalibrationTrial>& At(std::size_t reading, std::size_t field, std::size_t frames) {
     return trials_[(reading * grid_.fields_px.size() + field) * grid_.frames.size() + frames];
   }
@@ -250,7 +252,7 @@ class TrialTable {
   std::vector<std::vector<CalibrationTrial>> trials_;
 };
 
-// One simulated sweep in all ways.
+// Measures one simulated sweep with all methods.
 void MeasureSweep(const BenchSweep& bench, const Grid& grid, const std::vector<Method>& methods,
                   std::size_t sweep, const std::function<void()>& tell, TrialTable* table) {
   std::size_t first_reading = 0;
@@ -278,7 +280,7 @@ std::vector<CalibrationRow> Measure(const BenchCalibrationOptions& options,
   const int runs = static_cast<int>(methods.size() * grid.fields_px.size() * grid.frames.size());
   ProgressLine progress("calibrating", options.common.quiet);
   std::atomic<int> done{0};
-  cv::setNumThreads(1);  // else its threads' time is in nobody's CPU time
+  cv::setNumThreads(1);  // otherwise the CPU time of its threads is not counted
   ParallelFor(sweeps, options.common.threads, [&](int i) {
     const BenchSweep bench =
         MakeBenchSweep(description, target_picture, grid.fields_px.front(),
@@ -294,8 +296,8 @@ std::string AboutText(const BenchCalibrationOptions& options,
                       const model::SweepSimulationOptions& description, int sweeps,
                       const std::string& processor) {
   return fmt::format(
-      "{}: {} simulated sweeps of up to {} frames, {} mm apart, target {}, seeds from {}; {}, one "
-      "thread a calibration, its CPU time",
+      "{}: {} simulated sweeps of up to {} frames, {} mm apart, target {}, seeds from {}; {}, CPU "
+      "time with one thread per calibration",
       options.sweep_path.empty() ? "bench sweep" : options.sweep_path, sweeps,
       description.frame_count, std::abs(description.step_mm),
       model::TargetKindName(description.target.kind), options.seed, processor);
@@ -307,12 +309,11 @@ std::string TextOf(const std::string& about, int sweeps, const std::vector<Calib
   return about + "\n\n" + CalibrationRowsText(rows) +
          fmt::format(
              "\n* on the Pareto front: no other row has as small an error of d1 in as little "
-             "time.\n"
-             "Errors: medians of magnitudes over all sweeps. 68, 95: percent of\n"
-             "the intervals stated for that level that hold the truth; of all sweeps, chance "
-             "moves\n"
-             "them by {:.0f} and {:.0f}. peak and source come out of one run that ends before the\n"
-             "fit; peak's d1 is its zf by (13); source states no intervals.\n",
+             "time.\nErrors: medians of magnitudes over all sweeps. 68, 95: percentage of the "
+             "stated\nintervals of that level that contain the truth; over all sweeps, chance "
+             "changes\nthem by {:.0f} and {:.0f}. peak and source come from one run that ends "
+             "before the\nfit; d1 of peak is computed from its zf by (13); source states no "
+             "intervals.\n",
              percent_68, percent_95);
 }
 
@@ -354,16 +355,17 @@ CommandResult BenchCalibration(const BenchCalibrationOptions& options) {
 
 void AddBenchCalibrationCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
-      "calibration", "Methods of calibration by frames and field: errors, coverage, seconds");
+      "calibration",
+      "Calibration methods by number of frames and field: errors, coverage, seconds");
   const auto options = std::make_shared<BenchCalibrationOptions>();
   command
       ->add_option("--sweep", options->sweep_path,
-                   "What to simulate, as for `simulate sweep`; default: 50 mm at f/2.8 on 300 mm, "
+                   "Sweep to simulate, as for `simulate sweep`; default: 50 mm at f/2.8 on 300 mm, "
                    "31 frames of dead leaves")
       ->type_name("CONFIG");
   command
       ->add_option("--frames", options->frames,
-                   "How many of a sweep's frames are used, e.g. 31,16,8; default: all, a half, a "
+                   "Numbers of frames to use, e.g. 31,16,8; default: all, a half, a "
                    "quarter")
       ->type_name("N,...");
   command
@@ -372,12 +374,14 @@ void AddBenchCalibrationCommand(CLI::App* bench, CommandAction* action) {
       ->type_name("PX,...");
   command
       ->add_option("--sweeps", options->sweeps,
-                   fmt::format("How many are simulated; default {}, with --full {}", kUsualSweeps,
-                               kFullSweeps))
+                   fmt::format("Number of simulated sweeps; default {}, with --full {}",
+                               kUsualSweeps, kFullSweeps))
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
   command->add_flag("--full", options->full, "More fields, more numbers of frames, more sweeps");
-  command->add_option("--seed", options->seed, "Of the first sweep; each next has the next")
+  command
+      ->add_option("--seed", options->seed,
+                   "Seed of the first sweep; each further sweep uses the next number")
       ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max() / 2))
       ->capture_default_str()
       ->type_name("N");

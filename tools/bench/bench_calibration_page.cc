@@ -75,7 +75,7 @@ std::string TableHtml(const std::vector<CalibrationRow>& rows) {
   return html + "</tbody></table></div>\n";
 }
 
-// Errors of rows that some sweeps did not give.
+// The errors of rows for which some sweeps gave no result.
 std::string TableOfFewerHtml(const std::vector<CalibrationRow>& rows) {
   std::string body;
   for (const CalibrationRow& row : rows) {
@@ -91,8 +91,8 @@ std::string TableOfFewerHtml(const std::vector<CalibrationRow>& rows) {
   }
   if (body.empty()) return "";
   std::string html =
-      "<p>Of fewer sweeps than all, and not to be compared with the rows above: what a method "
-      "refuses is harder than what it does not.</p>\n<div class=\"wide\"><table>\n<thead><tr>"
+      "<p>These rows are from fewer sweeps and cannot be compared with the rows above: a method "
+      "refuses the harder sweeps.</p>\n<div class=\"wide\"><table>\n<thead><tr>"
       "<th></th><th class=\"number\">sweeps with zf, d1, kappa</th>";
   for (const char* name : kErrorNames) html += fmt::format("<th class=\"number\">{}</th>", name);
   return html + "</tr></thead>\n<tbody>\n" + body + "</tbody></table></div>\n";
@@ -133,7 +133,7 @@ Plot CalibrationPriceFigure(const std::vector<CalibrationRow>& rows) {
   for (const CalibrationRow* row : front) {
     seconds.push_back(Median(row->seconds));
     errors.push_back(row->image_distance_um.median_absolute);
-    constexpr double kRoom = 1.15;  // of errors: a line of text
+    constexpr double kRoom = 1.15;  // a ratio of errors: the height of a line of text
     if (!plot.notes.empty() && kRoom * errors.back() > plot.notes.back().y) continue;
     plot.notes.push_back({NameOf(*row), seconds.back(), errors.back()});
   }
@@ -143,19 +143,18 @@ Plot CalibrationPriceFigure(const std::vector<CalibrationRow>& rows) {
 
 std::string CalibrationPricePage(const std::vector<CalibrationRow>& rows,
                                  const std::string& about) {
-  constexpr char kTitle[] = "What an accurate calibration costs in time";
+  constexpr char kTitle[] = "Accuracy and run time of calibrations";
   std::string html = PageHead(kTitle, SvgPlotStyle() + LightFieldFigureStyle());
   html += fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", kTitle,
                       EscapeXml(PrintableUtf8(about)));
   html += Figure(SvgPlot(CalibrationPriceFigure(rows)), "Each method, by frames and field",
                  "Median over the sweeps of the error of d1; down and to the left is better. "
-                 "Pointed at, a mark tells its name.");
+                 "Pointing at a mark shows its name.");
   html += TableHtml(rows) + TableOfFewerHtml(rows);
   html +=
-      "<p class=\"soft\">Bold: on the front. Errors: medians of magnitudes over all sweeps. 68, "
-      "95: "
-      "percent of the intervals stated for that level that hold the truth. "
-      "peak and source come out of one run that ends before the fit.</p>\n";
+      "<p class=\"soft\">Bold: on the Pareto front. Errors: medians of magnitudes over all sweeps. "
+      "68, 95: percentage of the stated intervals of that level that contain the truth. peak and "
+      "source come from one run that ends before the fit.</p>\n";
   return html + "</main>\n</body>\n</html>\n";
 }
 

@@ -18,11 +18,11 @@ namespace {
 
 using nlohmann::json;
 
-// Sigmas that hold 95 % of a Gaussian; one holds 68.27 %.
+// The number of sigmas of an interval that contains 95 % of a Gaussian; one sigma contains 68.27 %.
 constexpr double kSigmas95 = 1.96;
 constexpr double kExpected68 = 0.6827, kExpected95 = 0.95;
 
-// Reasons with other numbers are the same reason.
+// Reasons that differ only in their numbers count as the same reason.
 std::string Countable(const std::string& reason) {
   constexpr char kDigits[] = "0123456789";
   std::string countable;
@@ -33,7 +33,7 @@ std::string Countable(const std::string& reason) {
     if (number == reason.size()) break;
     countable += '#';
     from = std::min(reason.find_first_not_of(kDigits, number), reason.size());
-    // What follows the point, unless it ends a sentence.
+    // Decimals after the point are removed, unless the point ends a sentence.
     if (from + 1 < reason.size() && reason[from] == '.' &&
         std::isdigit(static_cast<unsigned char>(reason[from + 1])) != 0) {
       from = std::min(reason.find_first_not_of(kDigits, from + 1), reason.size());
@@ -72,7 +72,7 @@ json ErrorsJson(const CalibrationErrors& errors) {
           {"covered_by_95_percent", covered_95}};
 }
 
-// Empty cells where nothing is known.
+// The cells are empty if nothing is known.
 std::string ErrorsCsv(const CalibrationErrors& errors) {
   std::string cells = fmt::format(",{}", errors.count);
   cells += errors.count == 0
@@ -111,7 +111,7 @@ std::string RowText(const CalibrationRow& row) {
       row.refused + row.partial == 0 ? "0" : fmt::format("{}, {}", row.refused, row.partial));
 }
 
-// Errors of rows that some sweeps did not give, in a table of their own.
+// The errors of rows for which some sweeps gave no result, in a table of their own.
 std::string TextOfFewerSweeps(const std::vector<CalibrationRow>& rows) {
   std::string text;
   for (const CalibrationRow& row : rows) {
@@ -124,8 +124,8 @@ std::string TextOfFewerSweeps(const std::vector<CalibrationRow>& rows) {
   }
   if (text.empty()) return "";
   return fmt::format(
-             "\nOf fewer sweeps than all, and not to be compared with the rows above: what a "
-             "method refuses\nis harder than what it does not\n  "
+             "\nThese rows are from fewer sweeps and cannot be compared with the rows above: a "
+             "method refuses\nthe harder sweeps\n  "
              "{:<13}{:>6}{:>7}{:>14}{:>9}{:>9}{:>9}{:>8}{:>8}\n",
              "method", "field", "frames", "sweeps", "zf mm", "d1 um", "kappa %", "zf", "kappa") +
          text;

@@ -1,4 +1,4 @@
-// thicklens bench conditioning: how well each discretisation's system can be solved.
+// thicklens bench conditioning: condition numbers of the system of each discretisation.
 #include "tools/bench/bench_conditioning.h"
 
 #include <fmt/format.h>
@@ -25,9 +25,9 @@ struct BenchConditioningOptions {
   int size_px = 8;
 };
 
-// One setting away from the usual ones.
+// A setting that differs in one value from the default.
 struct Setting {
-  std::string changed;  // for people: which, to what
+  std::string changed;  // for the output: the name and the value
   int views = 3;
   double gamma = 1;
   std::optional<double> ridge;  // absent: 0.01/(U V)
@@ -56,7 +56,7 @@ std::vector<Setting> Settings() {
 struct ConditioningRow {
   Setting setting;
   Conditioning warp, source;
-  std::optional<Conditioning> scene_rays;  // has no ridge of 0
+  std::optional<Conditioning> scene_rays;  // absent for a ridge of 0
 };
 
 estimator::EstimateInput InputOf(const Setting& setting, int size_px) {
@@ -114,12 +114,13 @@ json JsonOf(const std::optional<Conditioning>& conditioning) {
 CommandResult BenchConditioning(const BenchConditioningOptions& options) {
   const std::vector<Setting> settings = Settings();
   std::string text = fmt::format(
-      "condition of the systems of {0} x {0} px, and the relative errors that a dense solver makes "
-      "in float and\nin double; usual: 3 x 3 views, gamma 1, ridge .01/(U V), a slope of disparity "
-      "about .7 px\n\n{1:<18}{2:^28}{3:^28}{4:^28}\n{5:<18}{6:>10}{7:>9}{8:>9}{6:>10}{7:>9}{8:>9}"
-      "{6:>10}{7:>9}{8:>9}\n",
-      options.size_px, "", "rays, warp stencil", "rays, source's stencil", "scene points",
-      "changed", "condition", "float", "double");
+      "condition of the systems of {0} x {0} px, and the relative errors of a dense solver in "
+      "float and\nin double; default: 3 x 3 views, gamma 1, ridge 0.01/(U V), a slope of disparity "
+      "about\n0.7 "
+      "px\n\n{1:<18}{2:^28}{3:^28}{4:^28}\n{5:<18}{6:>10}{7:>9}{8:>9}{6:>10}{7:>9}{8:>9}{6:>10}{7:>"
+      "9}{8:>9}\n",
+      options.size_px, "", "rays, warp stencil", "rays, paper's stencil", "scene points", "changed",
+      "condition", "float", "double");
   json rows = json::array();
   {
     ProgressLine progress("measuring", options.common.quiet);
@@ -141,9 +142,9 @@ CommandResult BenchConditioning(const BenchConditioningOptions& options) {
     }
   }
   text +=
-      "\nrays: unknowns are all rays, as in blocks and grid; of the source's stencil, which is not "
-      "symmetric, singular\nvalues. scene points: Id + H A^-1 H^T of functional, at most about 1 + "
-      "1/(U V ridge). fails: no factor.\n";
+      "\nrays: unknowns are all rays, as in blocks and grid; for the paper's stencil, which is not "
+      "symmetric,\nsingular values are used. scene points: Id + H A^-1 H^T of functional, at most "
+      "about\n1 + 1/(U V ridge). fails: no factorisation.\n";
   PrintResult(options.common, text);
   return {BenchSummary({{"size_px", options.size_px}, {"rows", rows}}), ""};
 }
@@ -151,12 +152,12 @@ CommandResult BenchConditioning(const BenchConditioningOptions& options) {
 }  // namespace
 
 void AddBenchConditioningCommand(CLI::App* bench, CommandAction* action) {
-  CLI::App* command = bench->add_subcommand("conditioning",
-                                            "Condition numbers of each discretisation's system "
-                                            "against gamma, ridge, blur and views; where "
-                                            "float fails and double does not");
+  CLI::App* command =
+      bench->add_subcommand("conditioning",
+                            "Condition numbers of the system of each discretisation against gamma, "
+                            "ridge, blur and views, and where float fails and double does not");
   const auto options = std::make_shared<BenchConditioningOptions>();
-  command->add_option("--size", options->size_px, "Edge of the picture")
+  command->add_option("--size", options->size_px, "Edge of the picture, px")
       ->check(Between(3, 12, "pixels"))
       ->capture_default_str()
       ->type_name("PX");

@@ -1,4 +1,4 @@
-// thicklens bench gamma: the source's discussion of its multiplier gamma, by numbers.
+// thicklens bench gamma: measures the effects that the paper discusses for its multiplier gamma.
 #include "tools/bench/bench_gamma.h"
 
 #include <fmt/format.h>
@@ -42,7 +42,7 @@ struct BenchGammaOptions {
   std::uint64_t seed = 1;
 };
 
-// Toward 0, then by decades over the range that the source speaks of.
+// Toward 0, then in decades over the range that the paper discusses.
 std::vector<double> Gammas() {
   std::vector<double> gammas = {1e-12, 1e-9, 1e-6};
   for (int decade = -4; decade <= 4; ++decade) gammas.push_back(std::pow(10.0, decade));
@@ -51,9 +51,9 @@ std::vector<double> Gammas() {
 
 struct GammaRow {
   double gamma = 0;
-  std::optional<double> ridge;  // absent: this program's
+  std::optional<double> ridge;  // absent: the default of this program
   std::vector<double> seconds;
-  std::string failure;  // of the solver, where it could not go on; nothing below is known then
+  std::string failure;  // why the solver stopped; the values below are then unknown
   double rcond = 0, relative_residual = 0, psnr_true_views_db = 0, psnr_picture_db = 0;
   bool IsRefused() const { return !(rcond >= estimator::BlockOptions().rcond_min); }
 };
@@ -64,7 +64,7 @@ void Run(const BenchScene& scene, const BenchGammaOptions& options, kernels::Bac
   blocks.block_px = kSourceBlockPx;
   blocks.gamma = row->gamma;
   blocks.ridge = row->ridge;
-  blocks.rcond_min = 0;  // to see what the refusal spares
+  blocks.rcond_min = 0;  // shows the results that `estimate` would refuse
   blocks.threads = options.common.threads;
   blocks.progress = [](int, int) { ThrowIfCancelled(); };
   estimator::EstimateSummary summary;
@@ -145,7 +145,7 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
     });
   }
   std::string text = fmt::format(
-      "gamma of the source's functional, by blocks of 16 px ({}) of {} x {} px, {} x {} views, "
+      "gamma of the paper's functional, by blocks of 16 px ({}) of {} x {} px, {} x {} views, "
       "medians of {};\nwarping alone (DIBR): {:.2f} "
       "dB\n\n{:>7}{:>9}{:>10}{:>10}{:>11}{:>12}{:>11}\n",
       estimator::BlockSolverName(estimator::DefaultBlockSolver()), options.size_px, options.size_px,
@@ -157,9 +157,9 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
     json_rows.push_back(RowJson(row));
   }
   text +=
-      "\npicture: the photograph formed again, which is the equation solved; views: against the "
-      "true "
-      "ones.\nBelow an rcond of 1e-12 `estimate` ends with an error.\n";
+      "\npicture: PSNR of the photograph computed from the views, which is the equation that is "
+      "solved;\nviews: PSNR against the true views. Below an rcond of 1e-12 `estimate` ends with "
+      "an error.\n";
   PrintResult(options.common, text);
   return {
       BenchSummary({{"size", {options.size_px, options.size_px}},
@@ -177,7 +177,7 @@ CommandResult BenchGamma(const BenchGammaOptions& options) {
 
 void AddBenchGammaCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
-      "gamma", "What the source's multiplier gamma does to quality, conditioning and time");
+      "gamma", "Effect of the paper's multiplier gamma on quality, conditioning and time");
   const auto options = std::make_shared<BenchGammaOptions>();
   AddSizeOption(command, 64, &options->size_px);
   AddSquareViewsOption(command, &options->views);

@@ -40,13 +40,13 @@ struct BenchInpaintingOptions {
   std::uint64_t seed = 1;
 };
 
-// Samples of each view that are judged; none in the border.
+// The samples of each view that are judged, without those in the border.
 struct Regions {
-  std::vector<cv::Mat> hidden, band;  // of 0 or 255
+  std::vector<cv::Mat> hidden, band;  // masks of 0 or 255
 };
 
 constexpr int kBorderPx = 20;
-constexpr int kBandPx = 4;  // around what is hidden
+constexpr int kBandPx = 4;  // around the hidden samples
 constexpr int kWarmPx = 64;
 
 Regions RegionsOf(const BenchScene& scene) {
@@ -78,7 +78,7 @@ Regions RegionsOf(const BenchScene& scene) {
   return regions;
 }
 
-// Of stored values over the samples of all views together.
+// Returns the PSNR of stored values over the samples of all views together.
 double PsnrWithin(const std::vector<cv::Mat>& region, const model::LightField& truth,
                   const model::LightField& estimate) {
   double sum = 0, count = 0;
@@ -116,7 +116,7 @@ void Judge(const BenchScene& scene, const Regions& regions, const model::LightFi
   row->psnr_hidden_db = PsnrWithin(regions.hidden, scene.truth, estimate);
 }
 
-// One run of a solver, judged as it is and inpainted.
+// Runs a solver once, and judges its result as it is and with inpainting.
 void Run(const LightFieldSolver& solver, const BenchScene& scene, const Regions& regions,
          int threads, InpaintingRow* own, InpaintingRow* telea) {
   const Clock::time_point start = Clock::now();
@@ -182,10 +182,10 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
   }
   std::string text = fmt::format(
       "{0} x {0} px, {1} x {1} views, {2} thread(s), medians of {3}; PSNR against the true views, "
-      "of hidden\nrays alone and of a band of {4} px around them\n\n{5:<9}{6:<8}{7:>9}{8:>14}"
-      "{9:>9}{10:>9}{11:>9}\n",
+      "of hidden\nrays only and of a band of {4} px around "
+      "them\n\n{5:<9}{6:<8}{7:>9}{8:>14}{9:>9}{10:>9}{11:>9}\n",
       options.size_px, options.views, threads, options.repeat, kBandPx, "solver", "fill", "seconds",
-      "filling alone", "views", "band", "hidden");
+      "filling only", "views", "band", "hidden");
   json json_rows = json::array();
   for (const InpaintingRow& row : rows) {
     text += fmt::format(
@@ -207,7 +207,7 @@ CommandResult BenchInpainting(const BenchInpaintingOptions& options) {
 
 void AddBenchInpaintingCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
-      "inpainting", "The source's inpainting of hidden rays against the solvers' own filling");
+      "inpainting", "The paper's inpainting of hidden rays against the solvers' own filling");
   const auto options = std::make_shared<BenchInpaintingOptions>();
   AddSizeOption(command, 96, &options->size_px);
   AddSquareViewsOption(command, &options->views);

@@ -5,7 +5,7 @@
 namespace thicklens::tools {
 namespace {
 
-constexpr char kTableName[] = "prices.csv";  // the sign that the folder is one of ours
+constexpr char kTableName[] = "prices.csv";  // a folder with this file was written by this program
 constexpr char kPageName[] = "index.html";
 
 }  // namespace
@@ -37,7 +37,7 @@ void BenchReport::Commit(const std::string& page, const std::string& csv,
 
 PlotSeries FrontLine(const std::vector<double>& costs, const std::vector<double>& errors) {
   PlotSeries line;
-  line.label = "front: no other is both faster and better";
+  line.label = "Pareto front: no other is both faster and better";
   line.ink = Ink::kData;
   line.mark = Mark::kNone;
   line.stroke = Stroke::kSolid;

@@ -18,7 +18,7 @@ namespace {
 constexpr double kFocusDepthMm = 1000;
 constexpr double kNearMm = 750, kFarMm = 1500;
 
-// 1/z is linear in the picture: (1 - slope tan)/depth on a plane of that slope.
+// A plane of this slope is linear in 1/z over the picture: (1 - slope tan)/depth.
 model::PlaneOptions SlantedPlane(const model::Camera& camera) {
   const double left = 1 / kNearMm, right = 1 / kFarMm;
   const double half_width = (camera.sensor.width_px - 1) / 2.0 / camera.focal_scale_px();
@@ -125,7 +125,7 @@ BenchScene SimulateBenchScene(const model::SceneSimulationOptions& options,
                               const std::vector<model::LayerPixels>& pixels,
                               const model::SceneRun& run) {
   const model::SceneSimulator simulator(options, pixels, run.threads);
-  // The simulated camera: the truth of the scene's file is in it.
+  // The simulated camera contains the true values of the scene's file.
   const model::Camera& camera = simulator.camera();
   BenchScene scene;
   scene.truth = simulator.RenderLightField(options.u_count, options.v_count, run);

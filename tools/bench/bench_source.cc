@@ -37,7 +37,7 @@ namespace {
 struct BenchSourceOptions {
   CommonOptions common;
   std::vector<int> tables;         // empty: all
-  std::vector<int> views;          // empty: 3, 5 and 7, and of table 4 kViewsOfTable4
+  std::vector<int> views;          // empty: 3, 5 and 7, and kViewsOfTable4 for table 4
   std::vector<std::string> sizes;  // empty: K and L
   EstimateOptions given;           // picture, depth, camera
   std::string device = "auto";
@@ -46,11 +46,11 @@ struct BenchSourceOptions {
   std::optional<std::uint64_t> seed;
 };
 
-// The source does not say how many views its table 4 had.
+// The paper does not state the number of views of its table 4.
 constexpr int kViewsOfTable4 = 5;
 constexpr std::uint64_t kUsualSeed = 1;
 
-// The bench's lens with 3 mm of thickness and another rear focal length, focused where it was.
+// The bench's lens with a thickness of 3 mm and another rear focal length, with the same focus.
 model::Camera ThickBenchCamera(int width_px, int height_px) {
   model::Camera camera = BenchCamera(width_px, height_px);
   const double focus_depth_mm = camera.focus_depth_mm();
@@ -127,7 +127,7 @@ SourcePicture Given(const BenchSourceOptions& options, int views) {
   EstimateOptions given = options.given;
   given.common = options.common;
   given.views.text = fmt::format("{0}x{0}", views);
-  given.ignore_exif = true;  // times do not depend on it
+  given.ignore_exif = true;  // the times do not depend on it
   PreparedEstimate prepared = PrepareEstimate(given);
   SourcePicture picture;
   picture.name = std::filesystem::path(given.picture_path).stem().string();
@@ -161,7 +161,7 @@ std::set<int> TablesOf(const BenchSourceOptions& options) {
     if (!options.tables.empty() && tables.count(4) > 0) {
       throw UsageError("--table 4 compares lenses: with --image it needs --camera");
     }
-    if (tables.erase(4) > 0) spdlog::warn("table 4 needs --camera; it is left out");
+    if (tables.erase(4) > 0) spdlog::warn("table 4 needs --camera and is left out");
   }
   return tables;
 }
@@ -198,17 +198,18 @@ void CheckUsage(const BenchSourceOptions& options) {
   const auto needs = [](bool is_given, bool fits, const std::string& message) {
     if (is_given && !fits) throw UsageError(message);
   };
-  needs(has_picture != !given.depth_path.empty(), false, "--image and --depth belong together");
-  needs(!given.camera_path.empty(), has_picture, "--camera is that of --image, which is not given");
+  needs(has_picture != !given.depth_path.empty(), false,
+        "--image and --depth must be given together");
+  needs(!given.camera_path.empty(), has_picture, "--camera requires --image");
   const DepthOptions usual;
   needs(!given.depth.kind.empty() || !given.depth.unit.empty() ||
             given.depth.disparity_scale != usual.disparity_scale ||
             given.depth.disparity_offset_px != usual.disparity_offset_px,
-        has_picture, "--depth-kind and what belongs to it are of --depth, which is not given");
+        has_picture, "--depth-kind and its settings require --depth");
   needs(!options.sizes.empty(), !has_picture,
-        "--size is of simulated pictures, and --image gives one");
+        "--size is for simulated pictures and cannot be used with --image");
   needs(options.seed.has_value(), !has_picture,
-        "--seed is of simulated pictures, and --image gives one");
+        "--seed is for simulated pictures and cannot be used with --image");
 }
 
 CommandResult BenchSource(const BenchSourceOptions& options) {
@@ -222,15 +223,15 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
       kernels::OpenBackend(kernels::ParseDeviceRequest(options.device), &notice, ThrowIfCancelled);
   if (!bench.device->is_opencl()) {
     bench.device = nullptr;
-    spdlog::warn("rows of OpenCL are left out: {}",
+    spdlog::warn("rows with OpenCL are left out: {}",
                  notice.empty() ? "--device " + options.device : notice);
   }
   bench.triad_bytes_per_second = TriadBytesPerSecond(bench.threads);
   const std::vector<SourceRow> rows = MeasureAll(options, bench);
 
   std::string text = fmt::format(
-      "Medians of {} runs, or of as many as fill a minute. Machines differ: what compares are the\n"
-      "ratios inside a table. Published: means of the source's four pictures.\n{}\n",
+      "Medians of {} runs, or of as many as fit into a minute. Machines differ, so compare the "
+      "ratios\ninside a table. Published: means of the paper's four pictures.\n{}\n",
       options.repeat,
       bench.device ? "OpenCL: " + bench.device->description() : std::string("No OpenCL device"));
   nlohmann::json json_rows = nlohmann::json::array();
@@ -258,28 +259,35 @@ CommandResult BenchSource(const BenchSourceOptions& options) {
 
 void AddBenchSourceCommand(CLI::App* bench, CommandAction* action) {
   CLI::App* command = bench->add_subcommand(
-      "source", "The source's tables 1 to 4, measured here beside what it published");
+      "source", "Measure the paper's tables 1 to 4 here, beside its published values");
   const auto options = std::make_shared<BenchSourceOptions>();
-  command->add_option("--table", options->tables, "Which (all): 1 2 3 4")
+  command->add_option("--table", options->tables, "Tables to measure: 1 2 3 4 (default all)")
       ->check(CLI::Range(1, 4))
       ->type_name("N");
   command
-      ->add_option("--views", options->views,
-                   "Across and down (3 5 7; of table 4 the largest given, else 5)")
+      ->add_option(
+          "--views", options->views,
+          "Views across and down (default 3 5 7; table 4 uses the largest given, otherwise 5)")
       ->check(CLI::Range(2, 31))
       ->type_name("N");
   command
-      ->add_option("--size", options->sizes,
-                   "Of simulated pictures: K (640x480), L (256x256) or WIDTHxHEIGHT (L K)")
+      ->add_option(
+          "--size", options->sizes,
+          "Size of simulated pictures: K (640x480), L (256x256) or WIDTHxHEIGHT (default L K)")
       ->type_name("SIZE");
-  command->add_option("--image", options->given.picture_path, "A picture in place of the simulated")
+  command
+      ->add_option("--image", options->given.picture_path,
+                   "Picture to use instead of simulated ones")
       ->type_name("FILE");
-  command->add_option("--depth", options->given.depth_path, "Its depth map")->type_name("FILE");
-  command->add_option("--camera", options->given.camera_path, "Its camera")->type_name("FILE");
+  command->add_option("--depth", options->given.depth_path, "Depth map of --image")
+      ->type_name("FILE");
+  command->add_option("--camera", options->given.camera_path, "Camera file of --image")
+      ->type_name("FILE");
   AddDepthOptions(command, &options->given.depth);
   AddRepeatOption(command, &options->repeat);
-  command->add_flag("--full", options->full, "All blocks of the pictures, not a sample");
-  command->add_option("--seed", options->seed, "Of texture and noise (1)")->type_name("N");
+  command->add_flag("--full", options->full, "Solve all blocks of the pictures, not a sample");
+  command->add_option("--seed", options->seed, "Seed of texture and noise (default 1)")
+      ->type_name("N");
   AddDeviceOption(command, &options->device);
   AddCommonOptions(command, &options->common);
   command->callback([options, action] {

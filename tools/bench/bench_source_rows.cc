@@ -29,19 +29,19 @@ std::string Heading(int table) {
   switch (table) {
     case 1:
       return fmt::format(
-          "Table 1. Light field from a picture by blocks of 16 px ({}, gamma 1): matrices by\n"
-          "OpenCL kernels, or all on one thread; below what this program has beside",
+          "Table 1. Light field from a picture by blocks of 16 px ({}, gamma 1): matrices "
+          "by\nOpenCL kernels, or everything on one thread; below, the other solvers of this "
+          "program",
           UsualSolver());
     case 2:
       return "Table 2. Picture from a light field: OpenCL, transfers included, against one "
-             "thread;\n"
-             "below our best code for the processor. The second of two pictures; bandwidth: bytes\n"
-             "that must be moved, a second, over the machine's triad";
+             "thread;\nbelow, the fastest code of this program for the processor. The second of "
+             "two pictures;\nbandwidth: bytes that must be moved per second, divided by the "
+             "machine's triad";
     case 3:
-      return "Table 3. Linear solvers of the blocks (16 px, gamma 1; iterations to 1e-6, residual\n"
-             "recomputed), then the whole picture at once; one thread each, but for ViennaCL, "
-             "which\n"
-             "takes an OpenCL device for itself";
+      return "Table 3. Linear solvers of the blocks (16 px, gamma 1; iterations to 1e-6, "
+             "residual\nrecomputed), then the whole picture at once; one thread each, except "
+             "ViennaCL, which\nselects an OpenCL device itself";
     default:
       return "Table 4. Thick against thin lens, focused on the same plane: the picture formed "
              "again\n"
@@ -50,7 +50,7 @@ std::string Heading(int table) {
   }
 }
 
-// What the ratios of a table are taken to.
+// Returns the implementation that the ratios of a table refer to.
 std::string BaseOf(int table) { return table == 3 ? UsualSolver() : "cpu"; }
 
 const SourceRow* BaseRow(const SourceRow& row, const std::vector<SourceRow>& rows) {
@@ -63,8 +63,8 @@ const SourceRow* BaseRow(const SourceRow& row, const std::vector<SourceRow>& row
 
 WholeTime TimeOf(const SourceRow& row) { return {row.seconds, row.extrapolated.has_value()}; }
 
-// Whether the ratio of two rows compares the same work: on as many threads, both measured or both
-// extrapolated from the same blocks.
+// Returns whether two rows compare the same work: with the same number of threads, and both
+// measured or both extrapolated from the same blocks.
 bool IsSameWork(const SourceRow& a, const SourceRow& b) {
   return a.threads == b.threads && a.extrapolated.has_value() == b.extrapolated.has_value();
 }
@@ -135,14 +135,14 @@ std::string Columns(int table) {
                      "as much", "unlike", "published:", "x faster", "PSNR dB", more);
 }
 
-// Rows of one picture with one number of views, whose scores are of the same area.
+// Groups rows of one picture with one number of views, whose scores have the same area.
 std::string SourceGroupOf(const SourceRow& row) {
   return fmt::format("{} {}", row.picture, row.views);
 }
 
 std::string GroupLine(const SourceRow& row) {
   if (!row.scored || !(row.psnr_true_views_db || row.delta_e94_mean)) return "";
-  return fmt::format("{0}, {1} x {1} views: scores are of {2}\n", PrintableUtf8(row.picture),
+  return fmt::format("{0}, {1} x {1} views: scores are for {2}\n", PrintableUtf8(row.picture),
                      row.views, ScoredAreaText(*row.scored));
 }
 
@@ -167,14 +167,15 @@ std::string Footnotes(int table, const std::vector<SourceRow>& rows) {
   }
   if (table != 4) {
     text += fmt::format(
-        "x faster, as much: than the row of as many threads that does the same work; unlike: with "
-        "other threads{}\n",
+        "x faster, as much: relative to the row with the same number of threads and the same work; "
+        "unlike:\nrelative to other threads{}\n",
         samples.empty() ? "" : ",\nor a measured time against an extrapolated one");
   }
   if (table == 4) {
     text +=
-        "MACADE': a stand-in; the source's definition could not be had. Of two lenses focused on\n"
-        "the same plane the rays are the same, so that nothing but the fall-off can differ\n";
+        "MACADE': an approximation, because the paper's definition is not available. For two "
+        "lenses\nfocused on the same plane the rays are the same, so only the fall-off can "
+        "differ\n";
   }
   return text;
 }

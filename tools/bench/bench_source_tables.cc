@@ -17,13 +17,14 @@ namespace {
 
 using estimator::BlockSolver;
 
-// 'K' or 'L' of a picture of the source's sizes, else a blank.
+// Returns 'K' or 'L' for a picture of the paper's sizes, otherwise a blank.
 char SizeNameOf(int width_px, int height_px) {
   if (width_px == 640 && height_px == 480) return 'K';
   return width_px == 256 && height_px == 256 ? 'L' : ' ';
 }
 
-// So that each number of views takes minutes: blocks of 7 x 7 take 60 times what those of 3 x 3 do.
+// Limits the run of each number of views to minutes: blocks of 7 x 7 views take 60 times as long as
+// those of 3 x 3.
 PartCount PartCountOf(int views) {
   if (views <= 3) return PartCount::kFour;
   return views <= 5 ? PartCount::kTwo : PartCount::kOne;
@@ -43,7 +44,7 @@ SourceRow RowOf(int table, const SourcePicture& picture, const std::string& impl
   return row;
 }
 
-// The row gets the mean of the parts' PSNRs and the worst residual.
+// The row gets the mean PSNR of the parts and their worst residual.
 SourceContender ByBlocks(SourceRow row, const SourcePicture& picture, BlockSolver solver,
                          int threads, kernels::Backend* backend) {
   row.extrapolated = picture.sample;
@@ -66,7 +67,7 @@ SourceContender ByBlocks(SourceRow row, const SourcePicture& picture, BlockSolve
           }};
 }
 
-// Its PSNR is of the same parts as that of the blocks.
+// The PSNR is that of the same parts as for the blocks.
 SourceContender OfWholePicture(SourceRow row, const SourcePicture& picture, LightFieldSolver solver,
                                int threads) {
   return {std::move(row), [&picture, solver = std::move(solver), threads](SourceRow* out) {
@@ -87,14 +88,14 @@ std::string NameOf(const LightFieldSolver& solver) {
                                                           : solver.solver + " " + solver.prior;
 }
 
-// Thick or thin: the parts estimated for that lens, their pictures formed again by it, and both
-// compared.
+// Estimates the parts for a thick or thin lens, computes their pictures again for that lens, and
+// compares them.
 SourceContender OfLens(const std::string& lens, const SourcePicture& picture,
                        const model::Camera& camera, const SourceBench& bench) {
   SourceRow row = RowOf(4, picture, lens, bench.threads);
   row.published_fidelity = PublishedFidelityOf(lens, picture.size);
-  // Cut from the whole, so that each part has the same lens. Its thin twin's rays land where the
-  // lens's own do: depths are the same disparities.
+  // The parts are cut from the whole picture, so that each part has the same lens. The rays of the
+  // equivalent thin lens land at the same places, so depths give the same disparities.
   BenchScene taken = picture.whole;
   taken.input.camera = camera;
   taken.input.grid = model::DefaultGrid(camera, picture.views, picture.views);
@@ -144,7 +145,7 @@ void AddTable1(const SourceBench& bench, const SourcePicture& picture,
   }
   add("cpu", 1, bench.processor.get());
   if (bench.threads > 1) add("cpu, all threads", bench.threads, bench.processor.get());
-  // On as many threads as each of the rows above.
+  // With the same numbers of threads as the rows above.
   for (const int threads : std::set<int>{1, bench.threads}) {
     for (LightFieldSolver& solver : WholePictureSolvers(threads)) {
       if (NameOf(solver) != "scene tv") continue;
@@ -176,8 +177,8 @@ void AddTable2(const SourceBench& bench, const SourcePicture& picture,
                                                      nullptr, kernels.get(), threads);
                                return SecondsSince(start);
                              };
-                             // What ran before may have given back the memory, which a first
-                             // picture would take again for much longer than it is formed.
+                             // Earlier runs may have released memory, which a first picture would
+                             // allocate again, and that takes much longer than the picture itself.
                              form();
                              return form();
                            }});

@@ -17,20 +17,20 @@ namespace thicklens::tools {
 namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
-// How well a knife edge tells the square of the floor.
+// The accuracy of the squared floor from a knife edge.
 constexpr double kFloorVarianceSigmaPx2 = 0.01;
 
-// Written out, because the distributions of <random> differ between standard libraries.
+// Implemented here, because the distributions of <random> differ between standard libraries.
 class Draws {
  public:
   explicit Draws(std::uint64_t seed) {
-    // Not the engine that the simulator has for this seed.
+    // This engine differs from the one that the simulator uses for this seed.
     std::seed_seq sequence{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32),
                            0xbe9c4U};
     engine_ = std::mt19937_64(sequence);
   }
   double Uniform() { return (static_cast<double>(engine_() >> 11) + 0.5) * 0x1p-53; }
-  // Box and Muller's.
+  // The method of Box and Muller.
   double Normal() {
     const double radius = std::sqrt(-2 * std::log(Uniform()));
     return radius * std::cos(kTwoPi * Uniform());
@@ -40,7 +40,7 @@ class Draws {
   std::mt19937_64 engine_;
 };
 
-// The variance is what errs evenly; of a floor near 0 its root does not follow it linearly.
+// The error of the variance is Gaussian; near 0 the floor, its root, is not linear in it.
 model::Estimate DrawnFloorPx(double truth_px, double normal) {
   const double variance_px2 = truth_px * truth_px + kFloorVarianceSigmaPx2 * normal;
   const double floor_px = std::sqrt(std::max(variance_px2, 0.0));

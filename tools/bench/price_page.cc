@@ -37,9 +37,9 @@ std::vector<const PriceRow*> FrontOf(const std::vector<PriceRow>& rows) {
   return front;
 }
 
-// Names of the front's points where there is room for them.
+// The names of the points of the front, as far as there is room for them.
 std::vector<PlotNote> FrontNotes(const std::vector<const PriceRow*>& front) {
-  constexpr double kRoom = 1.15;  // of errors: a line of text
+  constexpr double kRoom = 1.15;  // a ratio of errors: the height of a line of text
   std::vector<PlotNote> notes;
   for (const PriceRow* row : front) {
     const double error = ErrorGreyLevels(row->scores.psnr_mean_db);
@@ -95,7 +95,7 @@ std::string TableOf(const std::vector<PriceRow>& rows) {
 std::string ScoredParagraph(const std::vector<PriceRow>& rows) {
   for (const PriceRow& row : rows) {
     if (!row.failure.empty()) continue;
-    return fmt::format("<p class=\"soft\">Scores are of {}.</p>\n", ScoredAreaText(row.scored));
+    return fmt::format("<p class=\"soft\">Scores are for {}.</p>\n", ScoredAreaText(row.scored));
   }
   return "";
 }
@@ -161,7 +161,7 @@ Plot PriceFigure(const std::vector<PriceRow>& rows, const std::string& id) {
 }
 
 std::string PricePage(const std::vector<PriceRow>& rows, const std::string& about) {
-  constexpr char kTitle[] = "What accuracy costs in time";
+  constexpr char kTitle[] = "Accuracy and run time";
   std::string html = PageHead(kTitle, SvgPlotStyle() + LightFieldFigureStyle());
   html += fmt::format("<h1>{}</h1>\n<p class=\"under-title\">{}</p>\n", kTitle, EscapeXml(about));
   int number = 0;
@@ -170,19 +170,18 @@ std::string PricePage(const std::vector<PriceRow>& rows, const std::string& abou
         "{0}, {1} × {1} views", PrintableUtf8(group.front().scene), group.front().views);
     html += fmt::format("<section>\n<h2>{}</h2>\n", EscapeXml(heading));
     html += Figure(SvgPlot(PriceFigure(group, fmt::format("prices-{}", ++number))),
-                   "What each way to the views costs and gives",
+                   "Run time and error of each way to the views",
                    "Rms difference from the true views, in grey levels of 255; down and to the "
-                   "left is better. Pointed at, a mark tells its name.");
+                   "left is better. Pointing at a mark shows its name.");
     html += ScoredParagraph(group) + TableOf(group) + "</section>\n";
   }
   html +=
-      "<p class=\"soft\">Bold: on the front, on which extrapolated seconds count as they are. "
-      "Extrapolated: from four parts of the picture; iterations, residual and rcond are then the "
-      "worst of these. MiB: at most, beside what the program held before. PSNR, SSIM and the "
-      "picture again are of the same area in all rows of a table, which its heading names. Picture "
-      "again: the PSNR of the "
-      "photograph formed "
-      "from the views, which a wrong light field can have, too.</p>\n";
+      "<p class=\"soft\">Bold: on the Pareto front, which uses extrapolated seconds as they are. "
+      "Extrapolated: from four parts of the picture, with the worst of their iterations, residuals "
+      "and rcond. MiB: largest increase of memory during the run. PSNR, SSIM and the picture again "
+      "refer to the same area in all rows of a table, which its heading names. Picture again: the "
+      "PSNR of the photograph computed from the views; a wrong light field can have a high one, "
+      "too.</p>\n";
   return html + "</main>\n</body>\n</html>\n";
 }
 

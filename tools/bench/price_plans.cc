@@ -31,7 +31,7 @@ class PlanList {
   std::vector<estimator::EstimatePlan> plans_;
 };
 
-// From what can hardly be called solved to what no float can tell from the answer.
+// From a tolerance that hardly solves anything to one below the resolution of float.
 const std::vector<double>& Tolerances() {
   static const std::vector<double> tolerances = {0.1, 0.01, 0.001, 1e-4, 1e-6};
   return tolerances;
@@ -47,7 +47,7 @@ std::vector<estimator::EstimatePlan> BlockPlans() {
   return plans;
 }
 
-// One choice after the other, all else as it is by itself.
+// Varies one choice at a time; all others have their defaults.
 void AddVariations(bool opencl, PlanList* list) {
   for (estimator::EstimatePlan plan : WholePicturePlans()) {
     const bool is_usual = plan.prior == "tv" || plan.prior == "patches";
@@ -75,7 +75,7 @@ void AddVariations(bool opencl, PlanList* list) {
   }
 }
 
-// Each choice with each other.
+// Combines every choice with every other.
 void AddProduct(bool opencl, PlanList* list) {
   for (const estimator::EstimatePlan& base : WholePicturePlans()) {
     for (const bool on_opencl : {false, true}) {

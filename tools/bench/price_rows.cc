@@ -21,7 +21,7 @@ std::string OrDash(const std::optional<double>& value, const char* form) {
 
 std::string GroupOf(const PriceRow& row) { return fmt::format("{} {}", row.scene, row.views); }
 
-// Groups in the order in which they begin.
+// Returns the groups in the order of their first rows.
 std::vector<std::string> GroupsOf(const std::vector<PriceRow>& rows) {
   std::vector<std::string> groups;
   for (const PriceRow& row : rows) {
@@ -32,7 +32,7 @@ std::vector<std::string> GroupsOf(const std::vector<PriceRow>& rows) {
   return groups;
 }
 
-// A cell of a table of comma-separated values.
+// Quotes a cell of a table of comma-separated values.
 std::string Quoted(const std::string& text) {
   std::string quoted = "\"";
   for (const char c : PrintableUtf8(text)) quoted += c == '"' ? "\"\"" : std::string(1, c);
@@ -42,7 +42,7 @@ std::string Quoted(const std::string& text) {
 std::string RowText(const PriceRow& row) {
   const std::string begin = fmt::format("{:<2}{:<32}", row.on_front ? ">" : "", row.Name());
   if (!row.failure.empty()) return fmt::format("{}  {}\n", begin, row.failure);
-  // Of a sample, what solving it took is in the extrapolated time alone.
+  // For a sample, only the extrapolated time contains the time of solving.
   const auto measured = [&](const std::vector<double>& seconds) {
     return row.sample ? std::string("-") : fmt::format("{:.2g}", Median(seconds));
   };

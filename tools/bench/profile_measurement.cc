@@ -41,7 +41,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Warnings about made-up pictures are nobody's concern.
+// Warnings about simulated pictures are not of interest.
 class OnlyErrors {
  public:
   OnlyErrors() : level_(spdlog::get_level()) { spdlog::set_level(spdlog::level::err); }
@@ -53,7 +53,7 @@ class OnlyErrors {
   spdlog::level::level_enum level_;
 };
 
-// In the folder of a case; the runs' own are in their folder.
+// The files in the folder of a case; each run has a folder of its own.
 constexpr char kPicture[] = "picture.png", kDepth[] = "depth.pfm", kCamera[] = "camera.yaml";
 constexpr char kLightField[] = "light-field", kSummary[] = "summary.json";
 
@@ -63,7 +63,7 @@ struct Prepared {
   std::optional<model::LightField> truth;
 };
 
-// What was measured of a case.
+// The measurements of a case.
 struct CaseRuns {
   Prepared prepared;
   std::vector<std::vector<estimator::TimedWorkload>> runs;  // of each plan
@@ -126,7 +126,7 @@ double PsnrDb(const Prepared& prepared, const model::LightField& estimate, int t
       .mean.psnr_db;
 }
 
-// The summary of a run of its own process.
+// Runs a process of its own, and returns its summary.
 nlohmann::json RunOnce(const std::string& program, const Prepared& prepared,
                        const estimator::EstimatePlan& plan) {
   const EstimateOptions& options = prepared.options;
@@ -158,7 +158,7 @@ nlohmann::json RunOnce(const std::string& program, const Prepared& prepared,
         nlohmann::json::parse(ReadWholeFile((prepared.folder / kSummary).string()), nullptr, false);
   }
   if (!summary.is_object() || !summary.contains("seconds")) {
-    throw Error(fmt::format("{} {}: it ended with {} (signal {}) and said: {}", program,
+    throw Error(fmt::format("{} {}: it ended with {} (signal {}) and wrote: {}", program,
                             ShellCommand(words), ended.exit_code, ended.signal, ended.err));
   }
   return summary;
@@ -191,13 +191,13 @@ estimator::TimedWorkload MiddleRun(std::vector<estimator::TimedWorkload> runs) {
   return *middle;
 }
 
-// The middle and the largest of |ratio - 1|.
+// Returns the median and the maximum of |ratio - 1|.
 std::pair<double, double> ErrorsOf(std::vector<double> ratios) {
   for (double& ratio : ratios) ratio = std::abs(ratio - 1);
   return {Median(ratios), *std::max_element(ratios.begin(), ratios.end())};
 }
 
-// Plans of one solver differ in what they solve alone.
+// Plans of one solver differ only in the time of solving.
 void FitLaws(MeasuredProfile* measured) {
   std::vector<estimator::PlanProfile>& plans = measured->profile.plans;
   std::map<std::string, std::vector<std::size_t>> of_solver;
@@ -291,8 +291,9 @@ MeasuredProfile MeasureProfile(const std::vector<estimator::EstimatePlan>& plans
         prepared, RunWarping(PrepareEstimate(prepared.options).input, run.threads).light_field,
         run.threads);
   }
-  if (judged == 0) throw Error("a profile needs a case that is judged by its true views");
-  // Round by round: a machine that is slower for a minute spoils one run of each, and no case.
+  if (judged == 0) throw Error("a profile needs a case that is judged by true views");
+  // The cases run in rounds: a machine that is slower for a minute affects one run of each, and not
+  // all runs of one case.
   for (int round = 0; round < run.repeat; ++round) {
     for (CaseRuns& of_case : cases) {
       const Prepared& prepared = of_case.prepared;
@@ -348,13 +349,13 @@ std::string ProfileTable(const MeasuredProfile& measured) {
   }
   text += fmt::format(
       "{:<32}{:>10.2f}{:>10.2f}\n\n"
-      "PSNR: of the true views, mean over {} of the {} pictures. K: 640 x 480 px in colour, 7 x 7\n"
-      "views, blur of 2 px, once it is read. law's error: of what it foresees, with reading, of a\n"
-      "picture of a size that it was not made from.\n\n",
+      "PSNR: against the true views, mean over {} of the {} pictures. K: 640 x 480 px in colour, 7 "
+      "x 7\nviews, blur of 2 px, after it is read. model error: error of the predicted time, with "
+      "reading, for\na picture of a size that the model was not fitted to.\n\n",
       "warping (DIBR)", profile.warping_psnr_db, profile.best_psnr_db() - profile.warping_psnr_db,
       measured.judged, measured.loads.front().size());
   if (measured.checks.front().empty()) return text;
-  text += "Larger pictures than any of these, as the law foresaw them:\n";
+  text += "Larger pictures than any of these, as the model predicted them:\n";
   std::vector<double> ratios;
   for (std::size_t i = 0; i < profile.plans.size(); ++i) {
     for (const estimator::TimedWorkload& check : measured.checks[i]) {
@@ -368,8 +369,8 @@ std::string ProfileTable(const MeasuredProfile& measured) {
     }
   }
   const auto [middle, largest] = ErrorsOf(ratios);
-  text += fmt::format("off by {:.0f} % in the middle, by {:.0f} % at most\n", 100 * middle,
-                      100 * largest);
+  text += fmt::format("error of the prediction: {:.0f} % in the median, {:.0f} % at most\n",
+                      100 * middle, 100 * largest);
   return text;
 }
 

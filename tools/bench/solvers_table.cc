@@ -9,7 +9,7 @@ using nlohmann::json;
 
 json TextOrNull(const std::string& text) { return text.empty() ? json() : json(text); }
 
-// Both measured, or both extrapolated from the same part: the same work.
+// Two rows did the same work if both were measured, or both extrapolated from the same part.
 bool AreSameWork(const SolversRow& a, const SolversRow& b) {
   return a.time.is_extrapolated == b.time.is_extrapolated;
 }
@@ -20,7 +20,7 @@ std::string RatioCell(const SolversRow& first, const SolversRow& row, bool same_
 }
 
 std::string SampledTable(const SolversRun& run, const std::vector<SolversRow>& rows) {
-  // Two lines of headings: what a column is, and of what.
+  // Two lines of headings: the quantity, and what it refers to.
   constexpr char kForm[] = "{:<11}{:<9}{:<10}{:>10}{:>14}{:>14}{:>16}{:>14}{:>11}\n";
   std::string text = fmt::format(kForm, "", "", "", "seconds", "seconds", "times faster",
                                  "times faster", "PSNR dB", "PSNR dB");
@@ -35,9 +35,9 @@ std::string SampledTable(const SolversRun& run, const std::vector<SolversRow>& r
   }
   return text + fmt::format(
                     "\nThe part: {}, in the middle of the {} x {} px that blocks solved; every "
-                    "solver is judged on it.\nextrapolated: times {:.4g}, the pixels of the whole "
-                    "picture over those solved; a ratio to it compares a\nmeasured with an "
-                    "extrapolated time. --full solves and judges all.\n",
+                    "solver is judged on it.\nextrapolated: multiplied by {:.4g}, the pixels of "
+                    "the whole picture over those solved; its ratio\ncompares a measured with an "
+                    "extrapolated time. --full solves and judges everything.\n",
                     ScoredAreaText(run.part), run.solved_px, run.solved_px, run.pixels_ratio);
 }
 

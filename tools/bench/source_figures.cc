@@ -15,7 +15,7 @@ struct Row {
   ByViews large, small;  // K, L
 };
 
-// The source's "biconjugate gradient" of Eigen can only be BiCGSTAB: Eigen has no other.
+// The paper's "biconjugate gradient" of Eigen can only be BiCGSTAB, because Eigen has no other.
 constexpr Row kRows[] = {
     {1,
      "opencl",

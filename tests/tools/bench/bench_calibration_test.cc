@@ -125,7 +125,7 @@ TEST(CalibrationRowsText, RowsOfFewerSweepsHaveATableOfTheirOwn) {
   EXPECT_FALSE(fewer.IsOfAllSweeps());
   EXPECT_THAT(Marked({fewer, all}), ElementsAre(false, true));
   const std::string text = CalibrationRowsText({all, fewer});
-  const std::size_t second = text.find("Of fewer sweeps than all");
+  const std::size_t second = text.find("These rows are from fewer sweeps");
   ASSERT_NE(second, std::string::npos);
   EXPECT_EQ(text.substr(0, second).find("0.25"), std::string::npos);
   EXPECT_THAT(text.substr(second), HasSubstr("0.25"));
